@@ -1,0 +1,42 @@
+"""The commands of `hovi`, put together."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from typing import Annotated
+
+import typer
+
+from hovi.cli import export_command, info_command, plan_command, plot_command, replay_command
+
+app = typer.Typer(
+    help="Least-torque motions of URDF robots by higher-order variational integrators.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"hovi {importlib.metadata.version('hovi')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _hovi(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
+app.command("plan")(plan_command.plan)
+app.command("replay")(replay_command.replay)
+app.command("plot")(plot_command.plot)
+app.command("export")(export_command.export)
+app.command("info")(info_command.info)

@@ -1,0 +1,39 @@
+"""`hovi info`: what a robot or a scene holds."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def info(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENE.toml",
+            help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name.",
+        ),
+    ],
+) -> None:
+    """Describe a robot, or a scene and what it leaves out."""
+    from hovi.model_files import example_scenes
+
+    if what.endswith(".toml") or what in example_scenes():
+        print(_scene(what))
+    else:
+        print(_robot(what))
+
+
+def _scene(scene: str) -> str:
+    from hovi.cli.files import find_scene
+    from hovi.cli.task_report import describe_task
+    from hovi.task_file import load_task
+
+    return describe_task(load_task(find_scene(scene)))
+
+
+def _robot(robot: str) -> str:
+    from hovi.robot import load_robot
+
+    return load_robot(robot).describe()

@@ -1,0 +1,96 @@
+"""The largest values of a motion, beside the limits that the URDF states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.robot import Robot
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+
+SAMPLES_PER_INTERVAL = 20
+MOST_SAMPLES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Extremes over time, one per velocity coordinate; NaN where there is none.
+
+    names: of the coordinates.
+    q_low, q_high: range of q, in [rad] or [m]; NaN for joints with nq != nv.
+    v, tau: largest |v| and |tau|.
+    lower, upper, v_limit, tau_limit: what the URDF states; infinite where it states nothing.
+    """
+
+    names: tuple[str, ...]
+    q_low: Array
+    q_high: Array
+    v: Array
+    tau: Array
+    lower: Array
+    upper: Array
+    v_limit: Array
+    tau_limit: Array
+
+    def exceeded(self) -> list[str]:
+        """One phrase per limit that the motion does not keep."""
+        phrases = []
+        rows = (
+            ("q", "rad or m", -self.q_low, -self.lower, -1),
+            ("q", "rad or m", self.q_high, self.upper, 1),
+            ("|v|", "1/s", self.v, self.v_limit, 1),
+            ("|tau|", "N m or N", self.tau, self.tau_limit, 1),
+        )
+        for symbol, unit, value, limit, sign in rows:
+            for i in np.flatnonzero(value > limit * (1 + 1e-9 * np.sign(limit))):
+                reached, allowed = sign * value[i], sign * limit[i]
+                phrases.append(
+                    f"{self.names[i]}: {symbol} reaches {reached:.4g}, limit {allowed:.4g} {unit}"
+                )
+        return phrases
+
+
+def peaks(trajectory: Trajectory) -> Peaks:
+    """Extremes of q, v and tau, from up to 20 samples per interval."""
+    N = trajectory.grid.intervals
+    per_interval = max(1, min(SAMPLES_PER_INTERVAL, MOST_SAMPLES // N))
+    s = np.linspace(0.0, 1.0, per_interval + 1)
+    motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    nv = motion.v.shape[1]
+    low, high = np.full(nv, np.nan), np.full(nv, np.nan)
+    lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
+    robot = trajectory.robot
+    in_q, in_v = (np.arange(nv), np.arange(nv)) if robot is None else _plain_coordinates(robot)
+    low[in_v], high[in_v] = motion.q[:, in_q].min(axis=0), motion.q[:, in_q].max(axis=0)
+    v_limit, tau_limit = np.full(nv, np.inf), np.full(nv, np.inf)
+    if robot is not None:
+        lower[in_v], upper[in_v] = -_stated(-robot.lower[in_q]), _stated(robot.upper[in_q])
+        v_limit, tau_limit = _known(robot.velocity_limit), _known(robot.effort_limit)
+    v, tau = np.abs(motion.v).max(axis=0), np.abs(motion.tau).max(axis=0)
+    names = trajectory.coordinate_names
+    return Peaks(names, low, high, v, tau, lower, upper, v_limit, tau_limit)
+
+
+def _plain_coordinates(robot: Robot) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Positions in q and in v of the coordinates of joints with nq = nv."""
+    in_q: list[int] = []
+    in_v: list[int] = []
+    for joint in list(robot.model.joints)[1:]:
+        if joint.nq == joint.nv:
+            in_q += range(joint.idx_q, joint.idx_q + joint.nq)
+            in_v += range(joint.idx_v, joint.idx_v + joint.nv)
+    return np.array(in_q, dtype=np.intp), np.array(in_v, dtype=np.intp)
+
+
+def _stated(limit: Array) -> Array:
+    """Infinite where Pinocchio's largest double says that the URDF states nothing."""
+    return np.where(limit < np.finfo(float).max, limit, np.inf)
+
+
+def _known(limit: Array) -> Array:
+    """A velocity or effort limit of zero says that nobody knew it."""
+    return np.where(limit > 0, _stated(limit), np.inf)

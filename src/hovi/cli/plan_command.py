@@ -1,0 +1,109 @@
+"""`hovi plan`: the least-torque motion of a scene file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from hovi.task_file import Task
+    from hovi.trajectory import Trajectory
+
+GUESSES = ("cubic", "minimum-jerk")
+
+
+def plan(
+    scene: Annotated[
+        str,
+        typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
+    ],
+    scheme: Annotated[str | None, typer.Option(help="Instead of the scene's.")] = None,
+    intervals: Annotated[int | None, typer.Option(help="Instead of the scene's.")] = None,
+    starts: Annotated[int | None, typer.Option(help="How many guesses are tried.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the random guesses.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Keep the best found by then.")
+    ] = None,
+    guess: Annotated[
+        str, typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="The first guess.")
+    ] = "cubic",
+    out: Annotated[
+        Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    tolerance: Annotated[float | None, typer.Option(help="Not available yet.")] = None,
+) -> None:
+    """Plan the least-torque motion of a scene.
+
+    Exit code 0 for a minimum, 1 when none was found, 2 for bad input.
+    """
+    from hovi.cli.files import check_output
+    from hovi.errors import InputError
+
+    if tolerance is not None:
+        raise InputError("--tolerance is not available yet; choose --scheme and --intervals.")
+    if time_limit is not None and not 0 < time_limit < float("inf"):
+        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    if out is not None:
+        check_output(out, ".npz")
+    chosen = {"scheme": scheme, "intervals": intervals, "starts": starts, "seed": seed}
+    task = _task(scene, {key: value for key, value in chosen.items() if value is not None})
+    raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json))
+
+
+def _task(scene: str, overrides: dict[str, Any]) -> Task:
+    import dataclasses
+
+    from hovi.cli.files import find_scene
+    from hovi.task_file import load_task
+
+    return dataclasses.replace(load_task(find_scene(scene)), **overrides)
+
+
+def _guess(guess: str) -> str | Trajectory:
+    from hovi.cli.files import load_trajectory
+    from hovi.errors import InputError, nearest
+
+    if guess in GUESSES:
+        return guess
+    if guess.endswith(".npz"):
+        return load_trajectory(Path(guess))
+    raise InputError(
+        f"--guess {guess!r} is neither a guess nor a .npz file; {nearest(guess, GUESSES)}"
+    )
+
+
+def _plan(
+    task: Task, guess: str | Trajectory, time_limit: float | None, out: Path | None, json: bool
+) -> int:
+    """Plan, write, print; returns the exit code."""
+    from hovi.plan import plan as plan_motion
+
+    from hovi.cli.progress import progress
+    from hovi.cli.report import as_json, print_report
+
+    with progress(quiet=json) as report:
+        solution = plan_motion(
+            task.scene,
+            task.start,
+            task.goal,
+            task.duration,
+            scheme=task.scheme,
+            intervals=task.intervals,
+            limits=task.limits,
+            starts=task.starts,
+            seed=task.seed,
+            guess=guess,
+            time_limit=time_limit,
+            progress=report,
+        )
+    written = out if solution.trajectory is not None else None
+    if written is not None:
+        solution.trajectory.save(written)
+    if json:
+        print(as_json(solution, task, written))
+    else:
+        print_report(solution, task, written)
+    return 0 if solution.success else 1

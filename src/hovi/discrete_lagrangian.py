@@ -1,0 +1,249 @@
+"""The discrete Lagrangian L_d on TQ x TQ: the action over one interval, by a scheme's table.
+
+Everything here is linear algebra on top of the pointwise Lagrangian, so nothing is derived,
+differentiated or compiled again when the scheme, the step or the number of intervals changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.grid import DiscretePath, Grid
+from hovi.lagrangian import EffortLagrangian, Lagrangian
+from hovi.schemes import Scheme
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Coordinates = Literal["nodal", "regular"]
+
+CHUNK = 4096
+"""Intervals that are evaluated at a time, so that memory stays bounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
+
+    Columns are (q0, h v0, q1, h v1, c) when nodal, (q0, h v0, Z0, Z1, c) when regular, with m of
+    them; inner modes that an interval does not have are zero.
+
+    values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
+    torque, jacobian: tau and d tau / d(q, v, a) at the quadrature points for an effort
+        Lagrangian, one pair per batch, for lifted Newton steps.
+    """
+
+    values: Array
+    gradient: Array
+    hessian: Array
+    torque: list[tuple[Array, Array]]
+
+    @property
+    def action(self) -> float:
+        """The discrete action, the sum of all L_d."""
+        return float(np.sum(self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class _Batch:
+    """Intervals of one scheme, evaluated together."""
+
+    scheme: Scheme
+    index: Index | slice
+    h: Array  # (B,)
+    t: Array  # (B * Q,)
+
+    @cached_property
+    def point_weights(self) -> Array:
+        """h w_j / (1, h, h^2) per point and derivative, (B, Q, 3)."""
+        powers = self.h[:, None] ** -np.arange(3)  # (B, 3)
+        return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
+
+    @cached_property
+    def pair_weights(self) -> Array:
+        """Weights of the second derivatives, (B, Q, 3, 3, 1, 1)."""
+        powers = self.h[:, None] ** -np.arange(3)
+        pair = self.point_weights[..., None] * powers[:, None, None, :]
+        return pair[..., None, None]
+
+
+@dataclass(frozen=True, eq=False)
+class DiscreteLagrangian:
+    """L_d = h sum_j w_j L(q_j, v_j, a_j) on every interval of a grid.
+
+    [ColomboFerraroMartin2016, sections 3 and 5]
+
+    lagrangian: L on T^(2)Q.
+    grid: the intervals and their schemes.
+    """
+
+    lagrangian: Lagrangian
+    grid: Grid
+
+    def values(self, path: DiscretePath) -> Array:
+        """L_d of every interval, shape (N,)."""
+        values = np.empty(self.grid.intervals)
+        for batch in self._batches:
+            jet = _jet(batch, path)
+            point_values = self.lagrangian.value(*jet, t=batch.t)
+            weights = batch.h[:, None] * batch.scheme.weights
+            values[batch.index] = np.sum(point_values.reshape(weights.shape) * weights, axis=1)
+        return values
+
+    def action(self, path: DiscretePath) -> float:
+        """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1})."""
+        return float(np.sum(self.values(path)))
+
+    def expand(
+        self,
+        path: DiscretePath,
+        coordinates: Coordinates = "nodal",
+        multipliers: list[Array] | None = None,
+    ) -> Expansion:
+        """Value, gradient and Hessian of every L_d: see Expansion.
+
+        multipliers: weights of the curvature of tau, one array per batch, as `predict` gives
+            them; the torque itself when None.
+        """
+        N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv
+        values = np.empty(N)
+        gradient = np.zeros((N, m, n))
+        hessian = np.zeros((N, m, m, n, n))
+        torque = []
+        for i, batch in enumerate(self._batches):
+            multiplier = None if multipliers is None else multipliers[i]
+            value, point_gradient, point_hessian, tau_J = self._evaluate(batch, path, multiplier)
+            torque += tau_J
+            table = _table(batch.scheme, coordinates)
+            k = table.shape[2]
+            values[batch.index] = value
+            gradient[batch.index, :k] = _contract_gradient(batch, table, point_gradient)
+            hessian[batch.index, :k, :k] = _contract_hessian(batch, table, point_hessian)
+        return Expansion(values, gradient, hessian, torque)
+
+    def predict(
+        self, expansion: Expansion, step: Array, coordinates: Coordinates
+    ) -> list[Array] | None:
+        """R (tau + J dx) at the quadrature points after a step: multipliers for `expand`.
+
+        step: in the intervals' scaled coordinates, shape (N, m, n).
+        """
+        if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
+            return None
+        multipliers = []
+        for batch, (tau, J) in zip(self._batches, expansion.torque, strict=True):
+            table = _table(batch.scheme, coordinates)
+            points = np.tensordot(step[batch.index, : table.shape[2]], table, axes=(1, 2))
+            jet = points.transpose(0, 2, 3, 1) * batch.h[:, None, None, None] ** _MINUS_POWERS
+            dx = jet.reshape(len(tau), -1, 1)
+            predicted = tau + np.matmul(J, dx)[:, :, 0]
+            multipliers.append(self.lagrangian.weight * predicted)
+        return multipliers
+
+    def momenta(self, path: DiscretePath) -> Array:
+        """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
+
+        p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k (F-), and
+        p_N = D3 L_d, p~_N = D4 L_d of the last (F+). [ColomboFerraroMartin2016, section 3, with F+
+        and F- the other way round, as the paper's later text uses them]
+        """
+        g = self.derivatives(path)
+        return np.concatenate([-g[:, :2], g[-1:, 2:]])
+
+    def derivatives(self, path: DiscretePath) -> Array:
+        """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
+
+        At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
+        """
+        N, n = self.grid.intervals, self.lagrangian.nv
+        g = np.empty((N, 4, n))
+        for batch in self._batches:
+            _, gradient, _ = self.lagrangian.evaluate(*_jet(batch, path), t=batch.t)
+            regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
+            g[batch.index] = regular[:, :4]
+        h = self.grid.steps[:, None]
+        d1, d2, d3, d4 = g[:, 0], g[:, 1], g[:, 2], g[:, 3]
+        return np.stack([d1 - d3, h * (d2 - d3 - d4), d3, h * d4], axis=1)
+
+    @cached_property
+    def _batches(self) -> list[_Batch]:
+        return list(_split(self.grid))
+
+    def _evaluate(
+        self, batch: _Batch, path: DiscretePath, multiplier: Array | None
+    ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
+        """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
+        jet = _jet(batch, path)
+        weights = batch.h[:, None] * batch.scheme.weights
+        if isinstance(self.lagrangian, EffortLagrangian):
+            value, gradient, hessian, tau, J = self.lagrangian.expand(
+                *jet, t=batch.t, multiplier=multiplier
+            )
+            torque = [(tau, J)]
+        else:
+            value, gradient, hessian = self.lagrangian.evaluate(*jet, t=batch.t)
+            torque = []
+        action = np.sum(value.reshape(weights.shape) * weights, axis=1)
+        return action, gradient, hessian, torque
+
+
+_MINUS_POWERS = -np.arange(3)[:, None]
+
+
+def _split(grid: Grid) -> Iterator[_Batch]:
+    """Batches of at most CHUNK intervals, each of one scheme."""
+    t0 = grid.t
+    for scheme, index in grid.groups:
+        for first in range(0, len(index), CHUNK):
+            chosen: Index | slice = index[first : first + CHUNK]
+            if len(grid.groups) == 1:
+                chosen = slice(first, min(first + CHUNK, len(index)))
+            h = grid.steps[chosen]
+            t = t0[:-1][chosen][:, None] + h[:, None] * scheme.points
+            yield _Batch(scheme, chosen, h, t.ravel())
+
+
+def _jet(batch: _Batch, path: DiscretePath) -> tuple[Array, Array, Array]:
+    """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n).
+
+    The chart of an interval is the identity: q = q0 + x.
+    """
+    h = batch.h[:, None]
+    r = batch.scheme.inner_modes
+    N, n = len(h), path.v.shape[1]
+    q0, v0 = path.q[:-1][batch.index], path.v[:-1][batch.index]
+    z, inner = path.z[batch.index], path.inner[batch.index, :r]
+    local = np.concatenate([(h * v0)[:, None], h[:, None] ** 2 * z, h[:, None] ** 2 * inner], 1)
+    table = batch.scheme.table
+    points = np.matmul(table.reshape(-1, 3 + r), local).reshape(N, -1, 3, n)
+    q = q0[:, None] + points[:, :, 0]
+    v = points[:, :, 1] / h[:, None]
+    a = points[:, :, 2] / h[:, None] ** 2
+    return q.reshape(-1, n), v.reshape(-1, n), a.reshape(-1, n)
+
+
+def _table(scheme: Scheme, coordinates: Coordinates) -> Array:
+    return scheme.nodal_table if coordinates == "nodal" else scheme.regular_table
+
+
+def _contract_gradient(batch: _Batch, table: Array, gradient: Array) -> Array:
+    """Gradient of L_d in the columns of the table, shape (B, m, n)."""
+    B, (Q, _, m) = len(batch.h), table.shape
+    weighted = gradient.reshape(B, Q, 3, -1) * batch.point_weights[..., None]
+    return np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1))
+
+
+def _contract_hessian(batch: _Batch, table: Array, hessian: Array) -> Array:
+    """Hessian of L_d in the columns of the table, shape (B, m, m, n, n)."""
+    B, (Q, _, m) = len(batch.h), table.shape
+    n = hessian.size // (B * Q * 9)
+    n = int(round(np.sqrt(n)))
+    blocks = hessian.reshape(B, Q, 3, n, 3, n).transpose(0, 1, 2, 4, 3, 5)
+    weighted = (blocks * batch.pair_weights).reshape(B, Q * 9, n * n)
+    pairs = np.einsum("qri,qsj->ijqrs", table, table).reshape(m * m, Q * 9)
+    return np.matmul(pairs, weighted).reshape(B, m, m, n, n)

@@ -1,0 +1,77 @@
+"""The paper's potential that keeps a joint in its range."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from hovi.effects.effect import Effect, SceneSymbols
+from hovi.errors import SceneError, nearest
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class JointLimitPotential(Effect):
+    """V(q) = slope * sum over joints of r(lower - q) + r(q - upper), a part of the cost.
+
+    r is the ramp max(x, 0), made twice differentiable within `width` of its kink:
+    r(x) = (x + w)^3 (3 w - x) / (16 w^3) for |x| < w. [ColomboFerraroMartin2016, section 5: the
+    elbow, with slope 1000 between 0 and 170 degrees]
+
+    ranges: (lower, upper) by joint name, in [rad] or [m].
+    slope: of the cost, per [rad] or [m].
+    width: w > 0, in [rad] or [m].
+    """
+
+    ranges: Mapping[str, tuple[float, float]]
+    slope: float = 1000.0
+    width: float = 1e-3
+    key: ClassVar[str] = "joint_limit_potential"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown joints, empty ranges, and numbers that make no ramp."""
+        for name, value in (("slope", self.slope), ("width", self.width)):
+            if not (np.isfinite(value) and value > 0):
+                raise SceneError(
+                    f"effect 'joint_limit_potential': {name} must be positive and finite, "
+                    f"got {value}."
+                )
+        for joint, (lower, upper) in self.ranges.items():
+            if joint not in robot.coordinate_names:
+                raise SceneError(
+                    f"effect 'joint_limit_potential': robot {robot.name!r} has no joint "
+                    f"{joint!r} with one coordinate: {nearest(joint, robot.coordinate_names)}"
+                )
+            if not lower < upper:
+                raise SceneError(
+                    f"effect 'joint_limit_potential': the range of {joint!r} must rise, "
+                    f"got [{lower}, {upper}]."
+                )
+
+    def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        """V as a CasADi expression."""
+        terms = []
+        for joint, (lower, upper) in self.ranges.items():
+            x = symbols.q[robot.coordinate_names.index(joint)]
+            terms += [smooth_ramp(lower - x, self.width), smooth_ramp(x - upper, self.width)]
+        return self.slope * ca.sum1(ca.vertcat(*terms))
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        ranges = ", ".join(f"{j} in [{a:.6g}, {b:.6g}]" for j, (a, b) in self.ranges.items())
+        return (
+            f"joint_limit_potential: {ranges}; slope {self.slope:g} per rad or m, "
+            f"smoothed over {self.width:g}"
+        )
+
+
+def smooth_ramp(x: ca.SX, width: float) -> ca.SX:
+    """max(x, 0), twice differentiable: (x + w)^3 (3 w - x) / (16 w^3) within w of the kink."""
+    y = ca.fmin(ca.fmax(x + width, 0.0), 2 * width)
+    return y**3 * (4 * width - y) / (16 * width**3) + ca.fmax(x - width, 0.0)

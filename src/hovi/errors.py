@@ -1,0 +1,50 @@
+"""The errors that hovi raises: one root, one class per door through which bad input comes.
+
+Every message is one sentence or two: what was expected, what came, what to do.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class HoviError(Exception):
+    """Root of everything that hovi raises on purpose."""
+
+
+class InputError(HoviError):
+    """An argument of a public function is missing, of the wrong shape, or not finite."""
+
+
+class ModelError(HoviError):
+    """A robot model cannot be read, is not physical, or cannot be planned on."""
+
+
+class SceneError(HoviError):
+    """A scene or its file names something that does not exist or does not fit."""
+
+
+class SchemeError(HoviError):
+    """A scheme is unknown, or is not regular and so does not define a motion."""
+
+
+class TrajectoryFileError(HoviError):
+    """A trajectory file cannot be read or written."""
+
+
+class DisplayError(HoviError):
+    """A picture, a page or a viewer cannot be made."""
+
+
+def nearest(name: str, valid: Iterable[str]) -> str:
+    """The end of a sentence about an unknown name: the nearest valid names, or all of them.
+
+    name: what came.
+    valid: the names that would have been accepted.
+    """
+    names = sorted(valid)
+    close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    if close:
+        return "did you mean " + " or ".join(repr(c) for c in close) + "?"
+    return "valid names are " + ", ".join(repr(n) for n in names) + "."

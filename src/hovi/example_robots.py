@@ -1,0 +1,98 @@
+"""The robots of example-robot-data, read without the package's own loader.
+
+That loader opens every mesh of a robot (0.3 to 0.5 s) and may pick up reference postures. Here
+only its table is read: the URDF's place, whether the base floats, and the SRDF of those
+robots whose rotor inertias are written there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+
+from hovi.errors import ModelError, nearest
+
+BUILT_IN_CODE = ("human", "talos_legs")
+"""Robots whose loader changes the model after reading the URDF: the URDF alone is not the robot."""
+
+
+@dataclass(frozen=True)
+class ExampleRobot:
+    """One entry of the table. `srdf` is set where the rotor inertias are to be read from it."""
+
+    name: str
+    urdf: Path
+    package_dir: Path
+    free_flyer: bool
+    srdf: Path | None
+
+
+def example_names() -> tuple[str, ...]:
+    """Every name that example-robot-data knows, sorted."""
+    return tuple(sorted(_loaders().ROBOTS))
+
+
+def example_robot(name: str) -> ExampleRobot:
+    """The entry called `name`. Raises ModelError for an unknown name or a robot without a URDF."""
+    loader = _loader_class(name)
+    relative = Path(loader.path) / loader.urdf_subpath / loader.urdf_filename
+    if not loader.urdf_filename:
+        raise ModelError(
+            f"example robot {name!r} is described by an SDF file ({loader.sdf_filename}), "
+            "and hovi reads URDF: choose another robot or convert it to URDF first."
+        )
+    try:
+        folder = Path(_loaders().getModelPath(str(relative)))
+    except OSError as error:
+        raise ModelError(
+            f"example-robot-data is installed without {relative}: install it again "
+            "(pip install --force-reinstall example-robot-data)."
+        ) from error
+    srdf = folder / loader.path / loader.srdf_subpath / loader.srdf_filename
+    return ExampleRobot(
+        name=name,
+        urdf=folder / relative,
+        package_dir=folder.parent.parent,
+        free_flyer=bool(loader.free_flyer),
+        srdf=srdf if loader.has_rotor_parameters else None,
+    )
+
+
+def build_in_code(name: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
+    """Model, visual and collision geometry of a robot that only its own loader can build."""
+    wrapper = _loader_class(name)().robot
+    return wrapper.model, wrapper.visual_model, wrapper.collision_model
+
+
+def rotor_armature(model: pin.Model, srdf: Path) -> tuple[tuple[str, float], ...]:
+    """Reflected rotor inertias, I_rotor ratio^2 in [kg m^2], of the joints that an SRDF lists."""
+    work = model.copy()
+    pin.loadRotorParameters(work, str(srdf), False)
+    reflected = work.rotorInertia * work.rotorGearRatio**2
+    pairs = zip(work.joints[1:], work.names[1:], strict=True)
+    values = ((name, float(reflected[joint.idx_v])) for joint, name in pairs if joint.nv == 1)
+    return tuple((name, value) for name, value in values if value != 0.0)
+
+
+def _loader_class(name: str) -> Any:
+    robots = _loaders().ROBOTS
+    if name not in robots:
+        raise ModelError(
+            f"there is no example robot called {name!r}: {nearest(name, robots)} "
+            "(A path to a URDF file ends in .urdf.)"
+        )
+    return robots[name]
+
+
+def _loaders() -> Any:
+    try:
+        from example_robot_data import robots_loader
+    except ImportError as error:
+        raise ModelError(
+            "robots by name need example-robot-data: pip install example-robot-data "
+            "example-robot-data-loaders, or give the path of a URDF file."
+        ) from error
+    return robots_loader

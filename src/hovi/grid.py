@@ -1,0 +1,108 @@
+"""The grid of a discrete motion, and the numbers that live on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError
+from hovi.schemes import Scheme
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Intervals of time, each with its own length and scheme.
+
+    steps: lengths of the intervals, shape (N,), in [s].
+    schemes: one per interval.
+    """
+
+    steps: Array
+    schemes: tuple[Scheme, ...]
+    groups: tuple[tuple[Scheme, npt.NDArray[np.intp]], ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        steps = np.array(self.steps, dtype=np.float64)
+        if steps.ndim != 1 or len(steps) == 0 or len(steps) != len(self.schemes):
+            raise InputError(
+                f"a grid needs one step and one scheme per interval and at least one interval, "
+                f"got {steps.size} steps and {len(self.schemes)} schemes."
+            )
+        if not (np.isfinite(steps).all() and (steps > 0).all()):
+            raise InputError("every step of a grid must be positive and finite.")
+        steps.setflags(write=False)
+        object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "groups", _groups(self.schemes))
+
+    @classmethod
+    def uniform(cls, duration: float, intervals: int, scheme: Scheme) -> Grid:
+        """N intervals of equal length T/N with one scheme.
+
+        duration: T > 0 in [s]. intervals: N >= 1. Raises InputError otherwise.
+        """
+        if not (np.isfinite(duration) and duration > 0):
+            raise InputError(f"the duration must be positive and finite, got {duration} s.")
+        if intervals != int(intervals) or intervals < 1:
+            raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
+        return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
+
+    @property
+    def intervals(self) -> int:
+        """Number N of intervals."""
+        return len(self.steps)
+
+    @property
+    def t(self) -> Array:
+        """Times of the nodes, shape (N + 1,), in [s]."""
+        if np.ptp(self.steps) == 0:
+            return np.arange(self.intervals + 1) * self.steps[0]
+        return np.concatenate([[0.0], np.cumsum(self.steps)])
+
+    @property
+    def duration(self) -> float:
+        """T, in [s]."""
+        return float(self.t[-1])
+
+    @property
+    def inner_modes(self) -> int:
+        """The largest number of inner modes of an interval."""
+        return max(scheme.inner_modes for scheme, _ in self.groups)
+
+
+def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.intp]], ...]:
+    """The intervals of each scheme, so that work can be done in batches."""
+    members: dict[str, list[int]] = {}
+    by_name: dict[str, Scheme] = {}
+    for i, scheme in enumerate(schemes):
+        members.setdefault(scheme.name, []).append(i)
+        by_name.setdefault(scheme.name, scheme)
+    return tuple((by_name[name], np.array(index)) for name, index in members.items())
+
+
+@dataclass(frozen=True, eq=False)
+class DiscretePath:
+    """The numbers of a discrete motion on a grid.
+
+    The regularised coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are carried, not
+    recomputed: from q and v alone they would lose 12 eps q/h^2 and more.
+    [ColomboFerraroMartin2016, section 2]
+
+    q: nodes, shape (N + 1, nq), in [rad] or [m].
+    v: velocities at the nodes, shape (N + 1, nv), per [s].
+    z: regularised coordinates of the intervals, shape (N, 2, nv), per [s^2].
+    inner: inner modes c/h^2, shape (N, r, nv), per [s^2]; 0 where an interval has fewer.
+    """
+
+    q: Array
+    v: Array
+    z: Array
+    inner: Array
+
+    @property
+    def intervals(self) -> int:
+        """Number N of intervals."""
+        return len(self.z)

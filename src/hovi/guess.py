@@ -1,0 +1,137 @@
+"""First guesses of a motion: curves between the boundary data, put on a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError, nearest
+from hovi.grid import DiscretePath, Grid
+from hovi.robot import Robot
+from hovi.schemes.polynomials import interval_rows
+
+Array = npt.NDArray[np.float64]
+Boundary = tuple[Array, Array, Array, Array]
+"""(q0, v0, q1, v1)."""
+
+
+class Curve(Protocol):
+    """q, v and a at times t of shape (M,), as arrays of shape (M, n)."""
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]: ...
+
+
+def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The cubic through both ends: the least motion in the sense of 1/2 |a|^2."""
+    q0, v0, q1, v1 = boundary
+    T = duration
+    x1 = robot.difference(q0, q1)
+    local = np.stack([T * v0, x1 - T * v0, T * (v1 - v0)])  # h v0, Z0, Z1
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
+        q = robot.integrate(np.broadcast_to(q0, (len(jet), robot.nq)), jet[:, 0])
+        return q, jet[:, 1] / T, jet[:, 2] / T**2
+
+    return curve
+
+
+def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The quintic through both ends whose accelerations vanish there."""
+    q0, v0, q1, v1 = boundary
+    T = duration
+    dq = robot.difference(q0, q1)
+    power = np.arange(6)[:, None]
+    conditions = np.zeros((6, 6))
+    for row, (s, derivative) in enumerate([(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]):
+        for j in range(derivative, 6):
+            conditions[row, j] = np.prod(range(j - derivative + 1, j + 1)) * float(s) ** (
+                j - derivative
+            )
+    zero = np.zeros(robot.nv)
+    ends = np.stack([zero, T * v0, zero, dq, T * v1, zero])
+    c = np.linalg.solve(conditions, ends)  # (6, n)
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        s = (t / T)[None]
+        x = (s**power).T @ c
+        dx = (power[1:] * s ** power[:-1]).T @ c[1:]
+        ddx = (power[2:] * power[1:-1] * s ** power[:-2]).T @ c[2:]
+        return robot.integrate(np.broadcast_to(q0, (len(t), robot.nq)), x), dx / T, ddx / T**2
+
+    return curve
+
+
+def random_curve(robot: Robot, boundary: Boundary, duration: float, seed: int) -> Curve:
+    """The cubic with a smooth random bump of up to about one turn, zero with its rate at both ends.
+
+    x(s) = sum_j c_j (1 - cos 2 pi j s)/2 or s (1-s) sin(pi j s), with c_j falling like 1/j.
+    """
+    random = np.random.default_rng(seed)
+    amplitude = random.uniform(0.2, 3.0)
+    modes = 4
+    c = amplitude * random.standard_normal((modes, robot.nv)) / np.arange(1, modes + 1)[:, None]
+    base = cubic(robot, boundary, duration)
+    j = np.arange(1, modes + 1)
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        q, v, a = base(t)
+        w = np.pi / duration
+        # sin(pi s) sin(j pi s) = (cos((j-1) pi s) - cos((j+1) pi s)) / 2
+        low, high = np.outer(t, j - 1) * w, np.outer(t, j + 1) * w
+        x = (np.cos(low) - np.cos(high)) / 2
+        dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
+        ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
+        return robot.integrate(q, x @ c), v + dx @ c, a + ddx @ c
+
+    return curve
+
+
+NAMED: dict[str, Callable[[Robot, Boundary, float], Curve]] = {
+    "cubic": cubic,
+    "minimum-jerk": minimum_jerk,
+}
+"""Guesses that a file or the command line can name."""
+
+
+def named_curve(name: str, robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The guess called `name`. Raises InputError for an unknown name."""
+    if name not in NAMED:
+        raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
+    return NAMED[name](robot, boundary, duration)
+
+
+def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+    """The curve on a grid: its nodes, and its acceleration projected on the inner modes.
+
+    The ends are the boundary data to the last bit.
+    """
+    q, v, _ = (x.copy() for x in curve(grid.t))
+    q[0], v[0], q[-1], v[-1] = boundary
+    return DiscretePath(q, v, regularised(robot, grid, q, v), _inner_modes(curve, grid, v.shape[1]))
+
+
+def regularised(robot: Robot, grid: Grid, q: Array, v: Array) -> Array:
+    """z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h of every interval, shape (N, 2, nv)."""
+    h = grid.steps[:, None]
+    z0 = (robot.difference(q[:-1], q[1:]) - h * v[:-1]) / h**2
+    return np.stack([z0, np.diff(v, axis=0) / h], axis=1)
+
+
+def _inner_modes(curve: Curve, grid: Grid, n: int) -> Array:
+    """c_j = integral of b_j a over the interval, by Gauss quadrature, shape (N, r, n)."""
+    inner = np.zeros((grid.intervals, grid.inner_modes, n))
+    for scheme, index in grid.groups:
+        r = scheme.inner_modes
+        if r == 0:
+            continue
+        x, w = np.polynomial.legendre.leggauss(r + 2)
+        s = (x + 1) / 2
+        t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
+        a = curve(t.ravel())[2].reshape(len(index), len(s), n)
+        basis = interval_rows(s, r)[:, 2, 3:]  # (Q, r)
+        inner[index, :r] = np.einsum("kqn,qj,q->kjn", a, basis, w / 2)
+    return inner

@@ -1,0 +1,269 @@
+"""Lagrangians on T^(k)Q, evaluated at batches of points with their exact derivatives.
+
+This is the narrow waist: below it are CasADi and Pinocchio, above it NumPy and LAPACK.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Protocol
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.point_function import PointFunction
+from hovi.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+
+class Lagrangian(ABC):
+    """L on T^(k)Q: what a discrete Lagrangian needs to know of it.
+
+    Derivatives live in the tangent space: with respect to q they are taken along `integrate`.
+    """
+
+    order: int
+    """k, the highest derivative that L depends on."""
+
+    @property
+    @abstractmethod
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+
+    @property
+    @abstractmethod
+    def nv(self) -> int:
+        """Degrees of freedom."""
+
+    @abstractmethod
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """L at P points of the jet (q, v, a, ...), shape (P,).
+
+        jet: q of shape (P, nq) and k arrays of shape (P, nv). t: times, shape (P,), in [s].
+        """
+
+    @abstractmethod
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """L, its gradient and its Hessian at P points.
+
+        Returns value (P,), gradient (P, k+1, nv), hessian (P, k+1, nv, k+1, nv).
+        """
+
+
+class EffortScene(Protocol):
+    """Where an effort Lagrangian comes from: the robot whose torques it squares."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+
+class TorqueModel(Protocol):
+    """tau(q, v, a, t) with its derivatives in the tangent space."""
+
+    nv: int
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv), in [N m] or [N]."""
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv).
+
+        R: weight of each joint, shape (nv,). curvature: shape (P, nv); R * tau when None.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class EffortLagrangian(Lagrangian):
+    """L~ = 1/2 tau^T diag(R) tau + V(q): the cost of control as a Lagrangian on T^(2)Q.
+
+    [ColomboFerraroMartin2016, section 5]
+
+    torques: tau(q, v, a, t).
+    scene: the scene that it belongs to.
+    potential: (q, v, a, t) -> V, gradient (3 nv), Hessian (3 nv, 3 nv), or None where V = 0.
+    weight: R, shape (nv,).
+    """
+
+    torques: TorqueModel
+    scene: EffortScene
+    weight: Array
+    potential: PotentialTerm | None = None
+    order: int = 2
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return self.scene.robot.nq
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self.scene.robot.nv
+
+    def torque(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+        return self.torques.linearize(q, v, a, t)
+
+    def hessian(
+        self, q: Array, v: Array, a: Array, t: Array | None, R: Array, curvature: Array
+    ) -> Array:
+        """J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        return self.torques.expand(q, v, a, t, R, curvature)[2]
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """1/2 tau^T diag(R) tau + V, shape (P,)."""
+        tau = self.torques.torque(jet[0], jet[1], jet[2], t)
+        value = 0.5 * np.einsum("pi,pi,i->p", tau, tau, self.weight)
+        if self.potential is not None:
+            value = value + self.potential.value(*jet, t=t)
+        return np.asarray(value)
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """Value, gradient and Hessian: see Lagrangian.evaluate."""
+        value, gradient, hessian, _, _ = self.expand(*jet, t=t)
+        points, n = len(value), self.nv
+        return value, gradient.reshape(points, 3, n), hessian.reshape(points, 3, n, 3, n)
+
+    def expand(
+        self, *jet: Array, t: Array | None = None, multiplier: Array | None = None
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """As evaluate, with the curvature of tau weighted by `multiplier` instead of R tau.
+
+        multiplier: shape (P, nv). Weighted with the torque that the last step predicted
+        (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
+        Returns value (P,), gradient (P, 3 nv), hessian (P, 3 nv, 3 nv), tau, J.
+        """
+        q, v, a = jet
+        tau, J, hessian = self.torques.expand(q, v, a, t, self.weight, multiplier)
+        effort = self.weight * tau
+        value = 0.5 * np.einsum("pi,pi->p", tau, effort)
+        gradient = np.matmul(effort[:, None], J)[:, 0]
+        if self.potential is not None:
+            V, dV, ddV = self.potential.expand(q, v, a, t=t)
+            value, gradient, hessian = value + V, gradient + dV, hessian + ddV
+        return value, gradient, hessian, tau, J
+
+
+class PotentialTerm:
+    """A term V(q, v, a, t) of the cost from a CasADi expression."""
+
+    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], expression: ca.SX) -> None:
+        q, v, a, t = symbols
+        hessian, gradient = ca.hessian(expression, ca.vertcat(q, v, a))
+        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]))
+        self._expand = PointFunction(
+            ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
+        )
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """V at P points, shape (P,)."""
+        return self._value(*jet, times(t, len(jet[0])))[0]
+
+    def expand(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """V (P,), its gradient (P, 3 nv) and its Hessian (P, 3 nv, 3 nv)."""
+        value, gradient, hessian = self._expand(*jet, times(t, len(jet[0])))
+        return value, gradient, hessian
+
+
+class CasadiTorque:
+    """A torque model from CasADi expressions: the definition, and the fallback of faster ones."""
+
+    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX) -> None:
+        q, v, a, t = symbols
+        x = ca.vertcat(q, v, a)
+        weight = ca.SX.sym("weight", tau.shape[0])
+        J = ca.jacobian(tau, x)
+        curvature = ca.hessian(ca.dot(weight, tau), x)[0]
+        self.nv = int(tau.shape[0])
+        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]))
+        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]))
+        self._curvature = PointFunction(ca.Function("ddtau", [q, v, a, t, weight], [curvature]))
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv)."""
+        return self._torque(q, v, a, times(t, len(q)))[0].reshape(len(q), self.nv)
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau and its Jacobian."""
+        tau, J = self._linearize(q, v, a, times(t, len(q)))
+        return tau.reshape(len(q), self.nv), J.reshape(len(q), self.nv, 3 * self.nv)
+
+    def curvature(self, q: Array, v: Array, a: Array, t: Array | None, weight: Array) -> Array:
+        """sum_i weight_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        return self._curvature(q, v, a, times(t, len(q)), weight)[0]
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and the Hessian of TorqueModel.expand."""
+        tau, J = self.linearize(q, v, a, t)
+        weight = R * tau if curvature is None else curvature
+        hessian = np.matmul(J.transpose(0, 2, 1) * R, J) + self.curvature(q, v, a, t, weight)
+        return tau, J, hessian
+
+
+class CasadiLagrangian(Lagrangian):
+    """A Lagrangian of any order k on a vector space from a CasADi expression.
+
+    jet: symbols (q, v, a, ...), k + 1 columns of n each.
+    expression: L as a function of them. [ColomboFerraroMartin2016, section 2]
+    """
+
+    def __init__(self, jet: list[ca.SX], expression: ca.SX) -> None:
+        self.order = len(jet) - 1
+        self._n = int(jet[0].shape[0])
+        hessian, gradient = ca.hessian(expression, ca.vertcat(*jet))
+        self._value = PointFunction(ca.Function("L", jet, [expression]))
+        self._expand = PointFunction(ca.Function("L_expand", jet, [expression, gradient, hessian]))
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return self._n
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self._n
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """L at P points, shape (P,)."""
+        return self._value(*jet)[0]
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """Value, gradient and Hessian: see Lagrangian.evaluate."""
+        value, gradient, hessian = self._expand(*jet)
+        shape = (len(value), self.order + 1, self.nv)
+        return value, gradient.reshape(shape), hessian.reshape(*shape, *shape[1:])
+
+
+def times(t: Array | None, points: int) -> Array:
+    """Times as a column, zeros where nothing depends on time, shape (P, 1)."""
+    return np.zeros((points, 1)) if t is None else np.asarray(t, dtype=np.float64).reshape(-1, 1)

@@ -1,0 +1,118 @@
+"""What a meshcat page shows, kept as messages, and the page as one file that needs no network.
+
+`meshcat.Visualizer` talks to a window. Its own window starts a server process that listens on
+every interface of the machine; this one only keeps the messages, so that a page can be written
+without any server, or be served by `meshcat_server` on the loopback interface alone.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol
+
+import meshcat.servers.zmqserver
+import umsgpack
+
+VIEWER_FOLDER = Path(meshcat.servers.zmqserver.VIEWER_ROOT).resolve()
+
+_UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-1[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}")
+
+# The policy makes "no network" a rule that the browser enforces, not a hope.
+_PAGE = """<!DOCTYPE html>
+<html>
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; \
+script-src 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
+img-src data: blob:; connect-src data: blob:">
+<title>{title}</title>
+<style>
+body {{ margin: 0; font: 13px system-ui, sans-serif; }}
+#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
+#caption {{ position: fixed; left: 12px; bottom: 10px; color: #333; pointer-events: none; }}
+</style>
+</head>
+<body>
+<div id="meshcat-pane"></div>
+<div id="caption">{caption}</div>
+<script>{meshcat}</script>
+<script>
+var viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+for (const message of {messages}) {{
+    viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
+}}
+viewer.animator.mixer.timeScale = {speed};
+viewer.gui.__folders["Scene"].close();
+viewer.gui.open();
+</script>
+</body>
+</html>
+"""
+
+
+class Command(Protocol):
+    """What meshcat sends to a window."""
+
+    def lower(self) -> dict[str, Any]:
+        """The message as MessagePack can hold it."""
+
+
+class Page:
+    """A window for `meshcat.Visualizer` that keeps what is drawn.
+
+    Messages that a later one overrides are dropped, so the page stays as small as its content.
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[tuple[str, str, str], bytes] = {}
+        self._uuids: dict[bytes, bytes] = {}
+        self.web_url = ""
+
+    def send(self, command: Command) -> None:
+        """Keep a message; the name is meshcat's."""
+        self.keep(command.lower())
+
+    def keep(self, message: Mapping[str, Any]) -> bytes:
+        """Add a message to what is drawn and return its bytes."""
+        kind, path = message["type"], message.get("path", "")
+        if kind == "delete":
+            self._forget(path)
+        packed = _UUID.sub(self._stable_uuid, umsgpack.packb(message))
+        if kind != "delete":
+            self._messages[path, kind, str(message.get("property", ""))] = packed
+        return packed
+
+    @property
+    def messages(self) -> list[bytes]:
+        """What a browser must be told to show the page."""
+        # A browser in the middle of a motion may ask: the copy is one atomic step.
+        return list(self._messages.values())
+
+    def html(self, title: str, caption: str, speed: float = 1.0) -> str:
+        """The page as one file with nothing left to fetch.
+
+        title: of the browser's window. caption: a line in the page's corner.
+        speed: time scale of the animation.
+        """
+        return _PAGE.format(
+            title=html.escape(title),
+            caption=html.escape(caption),
+            meshcat=(VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8"),
+            messages=json.dumps([base64.b64encode(m).decode() for m in self.messages]),
+            speed=float(speed),
+        )
+
+    def _forget(self, path: str) -> None:
+        inside = path.rstrip("/") + "/"
+        for key in [k for k in self._messages if k[0] == path or k[0].startswith(inside)]:
+            del self._messages[key]
+
+    def _stable_uuid(self, match: re.Match[bytes]) -> bytes:
+        """meshcat's identifiers hold the time and the machine's address; these only count."""
+        number = len(self._uuids)
+        return self._uuids.setdefault(match[0], b"%08x-0000-4000-8000-000000000000" % number)

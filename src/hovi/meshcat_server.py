@@ -1,0 +1,124 @@
+"""A meshcat page served to browsers on this machine only, from a thread of this process."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Mapping
+from typing import Any
+
+import tornado.httpserver
+import tornado.netutil
+import tornado.web
+import tornado.websocket
+
+from hovi.errors import DisplayError
+from hovi.meshcat_page import VIEWER_FOLDER, Command, Page
+
+_HOST = "127.0.0.1"
+
+
+class ServedPage(Page):
+    """A page that browsers see change while it changes.
+
+    port: port on the loopback interface; 0 for any free one.
+    Raises DisplayError when the port cannot be had.
+    """
+
+    def __init__(self, port: int = 0) -> None:
+        super().__init__()
+        try:
+            sockets = tornado.netutil.bind_sockets(port, _HOST)
+        except (OSError, OverflowError) as error:
+            raise DisplayError(
+                f"cannot serve a page on port {port} of {_HOST}: {error}; "
+                "another program may hold it: choose another port, or 0 for any free one."
+            ) from error
+        self.web_url = f"http://{_HOST}:{sockets[0].getsockname()[1]}/static/"
+        self._browsers: set[_Browser] = set()
+        self._connected = threading.Event()
+        self._loop = asyncio.new_event_loop()
+        self._loop.call_soon(self._listen, sockets)
+        self._thread = threading.Thread(target=self._run, name="hovi-viewer", daemon=True)
+        self._thread.start()
+
+    def send(self, command: Command) -> None:
+        """Keep a message and show it in every browser."""
+        packed = self.keep(command.lower())
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._broadcast, packed)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until a browser shows the page; False when none came in that time."""
+        return self._connected.wait(seconds)
+
+    def close(self) -> None:
+        """Stop serving. Browsers keep what they show."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            self._thread.join()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_forever()
+        finally:
+            self._server.stop()
+            for browser in list(self._browsers):
+                browser.close()
+            self._loop.run_until_complete(self._server.close_all_connections())
+            self._loop.run_until_complete(self._loop.shutdown_asyncgens())
+            self._loop.close()
+
+    def _listen(self, sockets: list[Any]) -> None:
+        files = {"path": str(VIEWER_FOLDER), "default_filename": "index.html"}
+        routes: list[tuple[str, type[tornado.web.RequestHandler], Mapping[str, Any]]] = [
+            (r"/static/(.*)", _ViewerFiles, files),
+            (r"/", _Browser, {"page": self}),
+        ]
+        application = tornado.web.Application([tornado.web.url(*route) for route in routes])
+        self._server = tornado.httpserver.HTTPServer(application)
+        self._server.add_sockets(sockets)
+
+    def _broadcast(self, packed: bytes) -> None:
+        for browser in list(self._browsers):
+            browser.show(packed)
+
+    def _enter(self, browser: _Browser) -> None:
+        for message in self.messages:
+            browser.show(message)
+        self._browsers.add(browser)
+        self._connected.set()
+
+    def _leave(self, browser: _Browser) -> None:
+        self._browsers.discard(browser)
+
+
+class _ViewerFiles(tornado.web.StaticFileHandler):
+    """meshcat's page and script, never from a browser's cache."""
+
+    def set_extra_headers(self, path: str) -> None:
+        self.set_header("Cache-Control", "no-store")
+
+
+class _Browser(tornado.websocket.WebSocketHandler):
+    """One connected page. Tornado refuses connections that another site's page opens."""
+
+    def initialize(self, page: ServedPage) -> None:
+        self.page = page
+
+    def open(self, *args: str, **kwargs: str) -> None:
+        self.page._enter(self)
+
+    def on_message(self, message: str | bytes) -> None:
+        """Nothing that a page says is wanted."""
+
+    def on_close(self) -> None:
+        self.page._leave(self)
+
+    def show(self, packed: bytes) -> None:
+        try:
+            future = self.write_message(packed, binary=True)
+        except tornado.websocket.WebSocketClosedError:
+            return self.page._leave(self)
+        future.add_done_callback(lambda done: done.exception())  # a browser may leave any time

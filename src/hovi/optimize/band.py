@@ -1,0 +1,95 @@
+"""The block-tridiagonal model in LAPACK's banded storage, inner modes included in the band.
+
+Unknowns are ordered node, inner modes, node, ...: H + shift D is then one banded matrix whose
+Cholesky factorisation (`pbtrf`) gives the step and decides definiteness at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg.lapack import dpbtrf, dpbtrs
+
+from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class BandLayout:
+    """Where the columns of the intervals stand among the unknowns, and the band's entries.
+
+    unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
+        column is fixed.
+    """
+
+    unknowns: Index
+    size: int
+    bandwidth: int
+    entries: Index
+    positions: Index
+
+    @classmethod
+    def of(cls, unknowns: Index) -> BandLayout:
+        """The layout of given unknowns: entry (i, j), i >= j, stands at j (bandwidth + 1) + i - j."""
+        N = len(unknowns)
+        flat = unknowns.reshape(N, -1)
+        size = int(flat.max()) + 1
+        i, j = flat[:, :, None], flat[:, None, :]
+        lower = (i >= j) & (j >= 0)
+        bandwidth = int(np.max(np.where(lower, i - j, 0)))
+        position = (j * (bandwidth + 1) + i - j)[lower]
+        # columns (m, n, m, n) of a flat interval Hessian, which is stored as (m, m, n, n)
+        m, n = unknowns.shape[1:]
+        stored = np.arange(m * m * n * n).reshape(m, m, n, n).transpose(0, 2, 1, 3)
+        offset = np.arange(N)[:, None, None] * (m * m * n * n)
+        entries = (offset + stored.reshape(m * n, m * n))[lower]
+        return cls(unknowns, size, bandwidth, entries, position)
+
+    def assemble(self, hessian: Array) -> Array:
+        """The band of a sum over intervals, shape (size, bandwidth + 1): column j at row j."""
+        length = self.size * (self.bandwidth + 1)
+        band = np.bincount(self.positions, hessian.reshape(-1)[self.entries], minlength=length)
+        return band.reshape(self.size, self.bandwidth + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class BandFactor:
+    """A banded Cholesky factor."""
+
+    factor: Array
+
+    def solve(self, rhs: Array) -> Array:
+        """(H + shift D)^-1 rhs."""
+        return np.asarray(dpbtrs(self.factor, rhs, lower=1)[0])
+
+
+class BandModel(QuadraticModel):
+    """A quadratic model whose unknowns are the nodes and the inner modes."""
+
+    def __init__(self, intervals: IntervalSum, layout: BandLayout, metric_band: Array) -> None:
+        self.layout = layout
+        self._band: Array | None = None
+        self._metric_band = metric_band
+        super().__init__(intervals)
+
+    def scatter(self, local: Array) -> Array:
+        """Sum of the intervals' covectors per unknown, shape (size,)."""
+        index = self.layout.unknowns.ravel()
+        sums = np.bincount(index + 1, local.ravel(), minlength=self.layout.size + 1)
+        return sums[1:]
+
+    def gather(self, s: Array) -> Array:
+        """Columns of every interval, zero where they are fixed."""
+        return np.append(s, 0.0)[self.layout.unknowns]
+
+    def factor(self, shift: float) -> Factor | None:
+        """Banded Cholesky of H + shift D; None where it fails."""
+        if self._band is None:
+            self._band = self.layout.assemble(self.intervals.hessian)
+        band = self._band + shift * self._metric_band
+        factor, info = dpbtrf(band.T, lower=1, overwrite_ab=1)
+        return BandFactor(factor) if info == 0 else None

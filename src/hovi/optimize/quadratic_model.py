@@ -1,0 +1,69 @@
+"""A quadratic model g.s + 1/2 s.H s that is a sum over intervals, with a metric D.
+
+Each interval couples its own columns only: the two nodes at its ends and its inner modes. A
+solver brings these sums into an order in which H + shift D can be factored in O(N n^3).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Factor(Protocol):
+    """A factorisation of H + shift D."""
+
+    def solve(self, rhs: Array) -> Array:
+        """(H + shift D)^-1 rhs."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntervalSum:
+    """What every interval contributes.
+
+    gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
+    metric: D of an interval, the same for every component, shape (N, m, m).
+    """
+
+    gradient: Array
+    hessian: Array
+    metric: Array
+
+
+class QuadraticModel(ABC):
+    """The model in the coordinates of a solver, vectors s of any shape with `np.vdot` as pairing."""
+
+    def __init__(self, intervals: IntervalSum) -> None:
+        self.intervals = intervals
+        self.gradient = self.scatter(intervals.gradient)
+
+    @abstractmethod
+    def scatter(self, local: Array) -> Array:
+        """The sum over intervals of a covector of shape (N, m, n), in the solver's coordinates."""
+
+    @abstractmethod
+    def gather(self, s: Array) -> Array:
+        """What a step s is in every interval, shape (N, m, n)."""
+
+    @abstractmethod
+    def factor(self, shift: float) -> Factor | None:
+        """A factorisation of H + shift D, or None where that is not positive definite."""
+
+    def metric_product(self, s: Array) -> Array:
+        """D s."""
+        return self.scatter(np.matmul(self.intervals.metric, self.gather(s)))
+
+    def curvature_scale(self) -> float:
+        """A size of H relative to D, for a first shift."""
+        largest = float(np.max(np.abs(self.intervals.hessian)))
+        return largest / float(np.max(np.abs(self.intervals.metric)))
+
+    def random_vector(self, seed: int) -> Array:
+        """A reproducible step that is orthogonal to nothing in particular."""
+        return np.random.default_rng(seed).standard_normal(self.gradient.shape)

@@ -1,0 +1,306 @@
+"""A trust region whose subproblem is solved by repeated factorisation of H + shift D.
+
+It copes with indefinite Hessians, leaves saddles along negative curvature, and stops on scaled
+quantities: the decrease that a Newton step predicts, relative to the cost, or the size of the
+step, relative to the data. [ConnGouldToint2000, chapter 7; MoreSorensen1983]
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize.quadratic_model import Factor, QuadraticModel
+
+Array = npt.NDArray[np.float64]
+X = TypeVar("X")
+
+PASS_SHIFTS = 30
+"""Factorisations that one subproblem may take."""
+
+
+class Stop(StrEnum):
+    """Why the iteration ended."""
+
+    STATIONARY = "stationary"
+    ITERATION_LIMIT = "iteration_limit"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+    DIVERGED = "diverged"
+
+
+class Objective(ABC, Generic[X]):
+    """What the trust region minimises: it evaluates, retracts and has a norm."""
+
+    @abstractmethod
+    def value(self, x: X) -> float:
+        """The objective at x; not finite where it is not defined."""
+
+    @abstractmethod
+    def model(self, x: X, previous: QuadraticModel | None, step: Array | None) -> QuadraticModel:
+        """The quadratic model at x; `step` led here from the `previous` model, where given."""
+
+    @abstractmethod
+    def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
+        """The point that a step of a model leads to."""
+
+    @abstractmethod
+    def relative_size(self, x: X, step: Array, model: QuadraticModel) -> float:
+        """The largest change of a step, relative to the size of the data."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Tolerances and budgets.
+
+    decrease: stop when a Newton step predicts less than this, relative to the value.
+    step: stop when a Newton step changes less than this, relative to the data.
+    radius: first radius of the trust region, in the metric's norm.
+    """
+
+    decrease: float = 1e-15
+    step: float = 1e-13
+    max_iterations: int = 500
+    time_limit: float | None = None
+    radius: float = 10.0
+    escape_saddles: bool = True
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One accepted or rejected step."""
+
+    value: float
+    decrease: float
+    ratio: float
+    shift: float
+    radius: float
+
+
+@dataclass
+class Outcome(Generic[X]):
+    """Where the iteration ended."""
+
+    x: X
+    value: float
+    stop: Stop
+    iterations: int
+    history: list[Iteration] = field(default_factory=list)
+    saddles_left: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A solution of the subproblem min g.s + 1/2 s.H s, |s| <= radius.
+
+    shift: multiplier of the radius; 0 for a Newton step. definite: whether H itself is.
+    """
+
+    step: Array
+    decrease: float
+    shift: float
+    norm: float
+    along_negative_curvature: bool = False
+
+    @property
+    def newton(self) -> bool:
+        """Whether this is an unconstrained Newton step of a convex model."""
+        return self.shift == 0.0
+
+
+def minimize(
+    objective: Objective[X],
+    x: X,
+    options: Options,
+    report: Callable[[int, float], None] | None = None,
+) -> Outcome[X]:
+    """Minimise from x; a KeyboardInterrupt ends it with the best point so far."""
+    value = objective.value(x)
+    outcome = Outcome(x, value, Stop.ITERATION_LIMIT, 0)
+    if not np.isfinite(value):
+        outcome.stop = Stop.DIVERGED
+        return outcome
+    try:
+        _iterate(objective, outcome, options, report)
+    except KeyboardInterrupt:
+        outcome.stop = Stop.INTERRUPTED
+    return outcome
+
+
+def _iterate(
+    objective: Objective[X],
+    outcome: Outcome[X],
+    options: Options,
+    report: Callable[[int, float], None] | None,
+) -> None:
+    started = time.monotonic()
+    radius, shift = options.radius, 0.0
+    model = objective.model(outcome.x, None, None)
+    while outcome.iterations < options.max_iterations:
+        if options.time_limit is not None and time.monotonic() - started > options.time_limit:
+            outcome.stop = Stop.TIME_LIMIT
+            return
+        trial = solve_subproblem(model, radius, shift)
+        stationary = _is_stationary(objective, outcome, model, trial, options)
+        if stationary and trial.along_negative_curvature and not options.escape_saddles:
+            outcome.stop = Stop.STATIONARY
+            return
+        candidate = objective.retract(outcome.x, trial.step, model)
+        value = objective.value(candidate)
+        noise = 1e-14 * abs(outcome.value)
+        ratio = _ratio(outcome.value - value, trial.decrease, noise)
+        outcome.iterations += 1
+        outcome.history.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
+        if report is not None:
+            report(outcome.iterations, min(value, outcome.value))
+        radius = _next_radius(radius, trial, ratio)
+        accepted = ratio > 1e-4
+        if accepted:
+            if trial.along_negative_curvature and stationary:
+                outcome.saddles_left.append(outcome.value)
+            outcome.x, outcome.value = candidate, value
+        if stationary and trial.newton:
+            outcome.stop = Stop.STATIONARY
+            return
+        shift = trial.shift
+        if accepted:
+            model = objective.model(outcome.x, model, trial.step)
+        elif radius < 1e-14 * options.radius:
+            outcome.stop = Stop.DIVERGED
+            return
+
+
+def _is_stationary(
+    objective: Objective[X],
+    outcome: Outcome[X],
+    model: QuadraticModel,
+    trial: Trial,
+    options: Options,
+) -> bool:
+    """Whether the gradient is zero to working precision, whatever the curvature."""
+    if trial.along_negative_curvature:
+        return True
+    if not trial.newton:
+        return False
+    if trial.decrease <= options.decrease * abs(outcome.value):
+        return True
+    return objective.relative_size(outcome.x, trial.step, model) <= options.step
+
+
+def _ratio(actual: float, predicted: float, noise: float) -> float:
+    """Actual over predicted decrease; 1 where both drown in rounding, -1 where not finite."""
+    if not np.isfinite(actual):
+        return -1.0
+    if abs(actual) <= noise and predicted <= 10 * noise:
+        return 1.0
+    return actual / predicted if predicted > 0 else -1.0
+
+
+def _next_radius(radius: float, trial: Trial, ratio: float) -> float:
+    if ratio < 0.1:
+        return 0.25 * min(radius, trial.norm)
+    if ratio < 0.25:
+        return 0.5 * min(radius, trial.norm)
+    if ratio > 0.75 and trial.norm > 0.8 * radius:
+        return 2.5 * radius
+    return radius
+
+
+def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Trial:
+    """A step with |s| within a quarter of the radius, or a shorter Newton step.
+
+    guess: the shift of the last subproblem, a first value for this one.
+    """
+    search = _ShiftSearch(model, radius)
+    shift = 0.0
+    for attempt in range(PASS_SHIFTS):
+        factor = model.factor(shift)
+        if factor is None:
+            shift = search.after_failure(shift, guess)
+            continue
+        trial, slope = search.step_at(factor, shift)
+        if trial.norm <= 1.25 * radius and (shift == 0.0 or trial.norm >= 0.75 * radius):
+            return trial
+        if trial.norm < radius and search.is_hard_case(shift):
+            return search.complete(factor, trial)
+        shift = search.after_step(shift, trial, slope)
+        if attempt == PASS_SHIFTS - 1:
+            return trial
+    raise ArithmeticError("H + shift D stays indefinite: the model holds numbers that are not finite")
+
+
+class _ShiftSearch:
+    """Bracket and safeguarded Newton iteration on 1/|s(shift)| = 1/radius."""
+
+    def __init__(self, model: QuadraticModel, radius: float) -> None:
+        self.model = model
+        self.radius = radius
+        self.low = 0.0
+        self.high = np.inf
+        self.indefinite = False
+
+    def after_failure(self, shift: float, guess: float) -> float:
+        """The next shift where H + shift D is not positive definite."""
+        self.indefinite = True
+        self.low = max(self.low, shift)
+        if np.isfinite(self.high):
+            return max(np.sqrt(self.low * self.high), 0.1 * self.high)
+        scale = self.model.curvature_scale()
+        return max(guess if shift == 0.0 else 0.0, 10.0 * shift, 1e-6 * scale)
+
+    def step_at(self, factor: Factor, shift: float) -> tuple[Trial, float]:
+        """The step of a shift, and the slope s.D (H + shift D)^-1 D s."""
+        g = self.model.gradient
+        s = factor.solve(-g)
+        Ds = self.model.metric_product(s)
+        norm2 = max(float(np.vdot(s, Ds)), 0.0)
+        decrease = -0.5 * float(np.vdot(g, s)) + 0.5 * shift * norm2
+        trial = Trial(s, decrease, shift, float(np.sqrt(norm2)))
+        if trial.norm <= 1.25 * self.radius and (shift == 0.0 or trial.norm >= 0.75 * self.radius):
+            return trial, 0.0
+        return trial, float(np.vdot(Ds, factor.solve(Ds)))
+
+    def after_step(self, shift: float, trial: Trial, slope: float) -> float:
+        """The next shift after a step that is too long or too short."""
+        if trial.norm > self.radius:
+            self.low = max(self.low, shift)
+        else:
+            self.high = min(self.high, shift)
+        newton = shift
+        if slope > 0:
+            newton = shift + trial.norm**2 / slope * (trial.norm - self.radius) / self.radius
+        if self.low < newton < self.high:
+            return newton
+        if not np.isfinite(self.high):
+            return max(10 * shift, 1e-6 * self.model.curvature_scale())
+        return max(np.sqrt(self.low * self.high), 1e-3 * self.high)
+
+    def is_hard_case(self, shift: float) -> bool:
+        """Whether the step stays short down to the edge of definiteness."""
+        return self.indefinite and (shift - self.low) <= 0.2 * shift
+
+    def complete(self, factor: Factor, trial: Trial) -> Trial:
+        """A short step completed to the radius along the lowest curvature."""
+        u = self.model.random_vector(seed=0)
+        for _ in range(4):
+            u = factor.solve(self.model.metric_product(u))
+            u /= np.sqrt(np.vdot(u, self.model.metric_product(u)))
+        if np.vdot(self.model.gradient, u) > 0:
+            u = -u
+        Du = self.model.metric_product(u)
+        b = float(np.vdot(trial.step, Du))
+        length = -b + np.sqrt(max(b * b + self.radius**2 - trial.norm**2, 0.0))
+        step = trial.step + length * u
+        rest = factor.solve(Du)
+        # u.H u from u.(H + shift D) u by one more inverse iteration: a Rayleigh quotient
+        rayleigh = 1.0 / float(np.vdot(Du, rest)) - trial.shift
+        decrease = trial.decrease - 0.5 * length**2 * min(rayleigh, 0.0)
+        negligible = trial.norm < 1e-6 * self.radius
+        return Trial(step, decrease, trial.shift, self.radius, negligible)

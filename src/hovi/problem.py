@@ -1,0 +1,77 @@
+"""The trajectory problem: which boundary data a motion of least action has to meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.errors import InputError, ModelError
+from hovi.grid import Grid
+from hovi.guess import Boundary
+from hovi.lagrangian import EffortLagrangian
+from hovi.robot import Robot
+from hovi.scene import Scene
+from hovi.schemes import require_regular
+from hovi.state import State
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryProblem:
+    """Make the discrete action stationary between two given states.
+
+    The discrete Euler-Lagrange equations D1 L_d(k) + D3 L_d(k-1) = 0 and
+    D2 L_d(k) + D4 L_d(k-1) = 0 at the inner nodes are its first-order conditions.
+    [ColomboFerraroMartin2016, section 3]
+
+    ld: the discrete Lagrangian of a scene's effort on a grid.
+    start, goal: states at t = 0 and t = T.
+    Raises InputError, ModelError or SchemeError when no motion can be planned.
+    """
+
+    ld: DiscreteLagrangian
+    start: State
+    goal: State
+    boundary: Boundary = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for scheme, _ in self.grid.groups:
+            require_regular(scheme)
+        require_plannable(self.robot)
+        start, goal = self.start.on(self.robot, "start"), self.goal.on(self.robot, "goal")
+        object.__setattr__(self, "boundary", (*start, *goal))
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of the motion."""
+        return self.ld.grid
+
+    @property
+    def scene(self) -> Scene:
+        """The scene whose effort is minimised."""
+        lagrangian = self.ld.lagrangian
+        if isinstance(lagrangian, EffortLagrangian) and isinstance(lagrangian.scene, Scene):
+            return lagrangian.scene
+        raise InputError("a trajectory problem needs the effort Lagrangian of a Scene.")
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the scene."""
+        return self.scene.robot
+
+
+def require_plannable(robot: Robot) -> None:
+    """Raise ModelError for a robot on which motions cannot be planned."""
+    if not robot.vector_joints:
+        joints = ", ".join(repr(joint) for joint in robot.manifold_joints)
+        raise ModelError(
+            f"robot {robot.name!r} cannot be planned on yet: configurations of {joints} are not "
+            "vectors (nq differs from nv); lock these joints with load_robot(..., locked=[...])."
+        )
+    if robot.nv == 0:
+        raise ModelError(f"robot {robot.name!r} has no joint that moves; nothing can be planned.")
+    robot.check_mass_matrix()

@@ -1,0 +1,157 @@
+"""Inverse dynamics in doubles over many points, with analytic derivatives, in C++.
+
+The fast sibling of `RigidBodyFunctions.inverse_dynamics`: Pinocchio's own derivatives of RNEA
+[CarpentierMansard2018] [SinghRussellWensing2022], contracted point by point.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import InputError, ModelError
+from hovi.rigid_body import _core
+from hovi.rigid_body.extension import archive
+
+Array = npt.NDArray[np.float64]
+
+# Joints along whose own motion the axes do not change: Pinocchio's second derivatives assume it.
+# "RevoluteUnbounded" and "FreeFlyer" have nq != nv; "SphericalZYX" and "Universal" bend their axes.
+_FIXED_AXES = frozenset(
+    ["JointModelTranslation"]
+    + [f"JointModel{kind}{axis}" for kind in "RPH" for axis in "XYZ"]
+    + [f"JointModel{kind}Unaligned" for kind in ("Revolute", "Prismatic", "Helical")]
+)
+
+
+def joints_without_kernel(model: pin.Model) -> tuple[str, ...]:
+    """Names of the joints for which there are no analytic second derivatives."""
+    mimicking = set(model.mimicking_joints)
+    return tuple(
+        name
+        for index, (name, joint) in enumerate(zip(model.names, model.joints, strict=True))
+        if index > 0 and (joint.shortname() not in _FIXED_AXES or index in mimicking)
+    )
+
+
+class InverseDynamicsKernel:
+    """tau = M(q) a + b(q, v) with its first and second derivatives over a batch of points.
+
+    Points come as q, v, a of shape (P, n) in [rad], [rad/s], [rad/s^2] (metres for sliding joints).
+    The points are shared out over `threads` threads; their number does not change a bit of the
+    result. Pinocchio's GIL is released and nothing is allocated per point. One call at a time runs
+    on a kernel: calls from several Python threads wait for each other.
+    """
+
+    def __init__(self, model: pin.Model) -> None:
+        """Reads the model, gravity and armature included; later changes to it have no effect.
+
+        model: a model all of whose joints are ordinary: revolute, prismatic, helical, translation.
+
+        Raises ModelError when it has others: continuous joints, free-flyers, mimic joints.
+        """
+        unsupported = joints_without_kernel(model)
+        if unsupported:
+            raise ModelError(
+                "analytic second derivatives exist only for joints with as many coordinates as "
+                f"velocities and fixed axes, not for {', '.join(map(repr, unsupported))}; use "
+                "hovi.rigid_body.casadi_functions, or lock these joints."
+            )
+        self._restore(archive(model), model.nv)
+
+    def _restore(self, text: str, n: int) -> None:
+        self._text = text
+        self._n = n
+        self._core = _core.InverseDynamicsKernel(text)
+
+    def __getstate__(self) -> tuple[str, int]:
+        """Pickled as Pinocchio's archive: the kernel is built again on the other side."""
+        return self._text, self._n
+
+    def __setstate__(self, state: tuple[str, int]) -> None:
+        """Builds the kernel again from what `__getstate__` gave."""
+        self._restore(*state)
+
+    @property
+    def n(self) -> int:
+        """Number of joint coordinates."""
+        return self._n
+
+    def torque(self, q: Array, v: Array, a: Array, threads: int = 1) -> Array:
+        """tau(q, v, a) at each point.
+
+        q, v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
+        threads: how many threads share the points.
+
+        Returns tau (P, n) in [N m]. Raises InputError on a wrong shape.
+        """
+        q, v, a = self._points(q, v, a)
+        tau = np.empty_like(q)
+        self._core.torque(q, v, a, tau, threads)
+        return tau
+
+    def linearize(self, q: Array, v: Array, a: Array, threads: int = 1) -> tuple[Array, Array]:
+        """tau and J = d tau / d(q, v, a) at each point.
+
+        q, v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
+        threads: how many threads share the points.
+
+        Returns tau (P, n) in [N m] and J (P, n, 3n), columns dq | dv | da. Raises InputError on a
+        wrong shape.
+        """
+        q, v, a = self._points(q, v, a)
+        tau = np.empty_like(q)
+        J = np.empty((*q.shape, 3 * self._n))
+        self._core.linearize(q, v, a, tau, J, threads)
+        return tau, J
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        weight: Array,
+        curvature: Array | None = None,
+        threads: int = 1,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and H = J^T diag(weight) J + sum_i curvature_i d^2 tau_i at each point.
+
+        q, v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
+        weight: shape (n,), the metric of the torques.
+        curvature: shape (P, n), what multiplies each torque's second derivative; None drops the
+            sum. With curvature = weight * tau, H is the Hessian of 1/2 tau^T diag(weight) tau.
+        threads: how many threads share the points.
+
+        Returns tau (P, n), J (P, n, 3n) and H (P, 3n, 3n), symmetric to the last bit, with index
+        [k * n + i, l * n + j] for the i-th coordinate of the k-th of (q, v, a). Raises InputError
+        on a wrong shape.
+        """
+        q, v, a = self._points(q, v, a)
+        weight = self._array("weight", weight, (self._n,))
+        if curvature is not None:
+            curvature = self._array("curvature", curvature, q.shape)
+        tau = np.empty_like(q)
+        J = np.empty((*q.shape, 3 * self._n))
+        H = np.empty((len(q), 3 * self._n, 3 * self._n))
+        self._core.expand(q, v, a, weight, curvature, tau, J, H, threads)
+        return tau, J, H
+
+    def time_pinocchio_calls(self, q: Array, v: Array, a: Array, repeats: int) -> float:
+        """Seconds per point that Pinocchio's two calls take in C++: the yardstick of `expand`.
+
+        The calls are computeRNEADerivatives and ComputeRNEASecondOrderDerivatives, one thread.
+        """
+        return _core.time_pinocchio_calls(self._text, *self._points(q, v, a), repeats)
+
+    def _points(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        q = self._array("q", q, (len(q), self._n))
+        return q, self._array("v", v, q.shape), self._array("a", a, q.shape)
+
+    def _array(self, name: str, x: Array, shape: tuple[int, ...]) -> Array:
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        if x.shape != shape:
+            raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
+        return x

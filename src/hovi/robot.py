@@ -1,0 +1,383 @@
+"""A robot: its model, its limits and names, and the group operations of its configuration space.
+
+Coordinates follow Pinocchio: q (nq,) in [rad] or [m], v and a (nv,). Continuous, spherical and
+floating joints have nq != nv: their q moves by `integrate` and is compared by `difference`, never
+by + and -. Limits are those of the URDF as Pinocchio reads them: a missing limit is the largest
+double, a velocity or effort limit of 0 in the file stays 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi import robot_model
+from hovi.errors import InputError, ModelError, nearest
+from hovi.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.robot_geometry import Shapes, load_shapes
+from hovi.robot_report import describe
+from hovi.robot_source import RobotSource, text_hash
+from hovi.urdf_check import MAXIMUM_FREEDOM, check_urdf, read_urdf
+
+Array = npt.NDArray[np.float64]
+
+UNIT_TOLERANCE = 1e-4
+"""How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot that is ready to be put into a scene. Made by `load_robot`.
+
+    name: what the user calls it.
+    model: its Pinocchio model, locked joints taken out; treat it as read-only.
+    source: where it came from.
+    given: visual and collision geometry handed over together with a pinocchio.Model.
+    """
+
+    name: str
+    model: pin.Model
+    source: RobotSource
+    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None] = (None, None)
+
+    # Sizes and names
+
+    @property
+    def nq(self) -> int:
+        """Length of a configuration q."""
+        return int(self.model.nq)
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom: length of v, a and tau."""
+        return int(self.model.nv)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """The movable joints, in Pinocchio's order."""
+        return tuple(self.model.names)[1:]
+
+    @cached_property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """One name per velocity, (nv,): the joint's name, with [i] where it has several."""
+        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
+        return tuple(
+            name if joint.nv == 1 else f"{name}[{i}]" for name, joint in pairs for i in range(joint.nv)
+        )
+
+    @cached_property
+    def manifold_joints(self) -> tuple[str, ...]:
+        """The joints whose configuration is not a plain vector (nq != nv)."""
+        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
+        return tuple(name for name, joint in pairs if joint.nq != joint.nv)
+
+    @property
+    def vector_joints(self) -> bool:
+        """Whether every joint has nq = nv, so that configurations add like vectors."""
+        return not self.manifold_joints
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Every frame of the model: links, joints and extra frames."""
+        return tuple(frame.name for frame in self.model.frames)
+
+    @cached_property
+    def tip_frame(self) -> str:
+        """The last link (or operational frame) of the model: where a tool would sit."""
+        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+        links = [frame.name for frame in self.model.frames if frame.type in kinds]
+        return links[-1] if links else self.frame_names[-1]
+
+    # What the URDF says
+
+    @property
+    def lower(self) -> Array:
+        """Lower position limits, (nq,), in [rad] or [m]."""
+        return np.array(self.model.lowerPositionLimit, dtype=float)
+
+    @property
+    def upper(self) -> Array:
+        """Upper position limits, (nq,), in [rad] or [m]."""
+        return np.array(self.model.upperPositionLimit, dtype=float)
+
+    @property
+    def velocity_limit(self) -> Array:
+        """Largest joint speeds, (nv,), in [rad/s] or [m/s]."""
+        return np.array(self.model.velocityLimit, dtype=float)
+
+    @property
+    def effort_limit(self) -> Array:
+        """Largest joint efforts, (nv,), in [N m] or [N]."""
+        return np.array(self.model.effortLimit, dtype=float)
+
+    @property
+    def damping(self) -> Array:
+        """Viscous damping of the joints, (nv,), in [N m s/rad] or [N s/m]."""
+        return np.array(self.model.damping, dtype=float)
+
+    @property
+    def friction(self) -> Array:
+        """Dry friction of the joints, (nv,), in [N m] or [N]."""
+        return np.array(self.model.friction, dtype=float)
+
+    @property
+    def armature(self) -> Array:
+        """Reflected rotor inertia of the joints, (nv,), in [kg m^2] or [kg]."""
+        return np.array(self.model.armature, dtype=float)
+
+    # Shapes
+
+    @property
+    def visual(self) -> pin.GeometryModel | None:
+        """What the robot looks like, loaded at the first look; None where nothing was found."""
+        return self._visual_shapes.geometry
+
+    @property
+    def collision(self) -> pin.GeometryModel | None:
+        """Its collision shapes, loaded at the first look; None where nothing was found."""
+        return self._collision_shapes.geometry
+
+    @property
+    def visual_problem(self) -> str:
+        """Why `visual` is None or incomplete, in a sentence; "" where nothing is missing."""
+        return self._visual_shapes.problem
+
+    @cached_property
+    def _visual_shapes(self) -> Shapes:
+        given = self.given[0]
+        return load_shapes(self.source, "visual") if given is None else Shapes(given, "")
+
+    @cached_property
+    def _collision_shapes(self) -> Shapes:
+        given = self.given[1]
+        return load_shapes(self.source, "collision") if given is None else Shapes(given, "")
+
+    # Configurations
+
+    def neutral(self) -> Array:
+        """The neutral configuration, (nq,): zeros, with unit quaternions and angles of 0."""
+        return np.array(pin.neutral(self.model), dtype=float)
+
+    def integrate(self, q: Array, dq: Array) -> Array:
+        """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq)."""
+        if self.vector_joints:
+            return np.asarray(q, dtype=float) + dq
+        return self._each(pin.integrate, (q, self.nq), (dq, self.nv), self.nq)
+
+    def difference(self, q0: Array, q1: Array) -> Array:
+        """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq)."""
+        if self.vector_joints:
+            return np.asarray(q1, dtype=float) - q0
+        return self._each(pin.difference, (q0, self.nq), (q1, self.nq), self.nv)
+
+    def frame_position(self, frame: str, q: Array) -> Array:
+        """Where a frame's origin is in the world, in [m]: q (M, nq) -> (M, 3)."""
+        if frame not in self.frame_names:
+            raise InputError(
+                f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
+            )
+        index, data = self.model.getFrameId(frame), self.model.createData()
+        positions = np.empty((len(q), 3))
+        for position, one in zip(positions, np.asarray(q, dtype=float), strict=True):
+            pin.forwardKinematics(self.model, data, one)
+            position[:] = pin.updateFramePlacement(self.model, data, index).translation
+        return positions
+
+    def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
+        """`q` as a float array (nq,), finite and with unit quaternions and angles.
+
+        name: what the argument is called, for the message. Raises InputError.
+        """
+        checked = self._check_vector(q, name, self.nq, self._position_names())
+        if self.vector_joints:
+            return checked
+        self._check_unit_norms(checked, name)
+        return np.array(pin.normalize(self.model, checked), dtype=float)
+
+    def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
+        """`v` as a finite float array (nv,). Raises InputError naming the joint."""
+        return self._check_vector(v, name, self.nv, self.coordinate_names)
+
+    def check_mass_matrix(self) -> None:
+        """Raise ModelError if M(q) is singular to working precision (see robot_model)."""
+        robot_model.check_mass_matrix(self.model)
+
+    # Text and files
+
+    def describe(self) -> str:
+        """What the robot is, for a terminal: joints, limits, mass, and what a scene must name."""
+        return describe(self.name, self.model, self.source, self.tip_frame)
+
+    def to_dict(self) -> dict[str, Any]:
+        """A JSON-able dictionary that holds the URDF and no path of this machine."""
+        return {"name": self.name, **self.source.to_dict()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], package_dirs: Iterable[str | Path] = ()) -> Robot:
+        """The robot that `to_dict` wrote, built from the URDF's text.
+
+        package_dirs: folders in which the meshes are found on this machine.
+        Raises ModelError, also for a robot that was given as a pinocchio.Model.
+        """
+        if not isinstance(data, Mapping) or not isinstance(data.get("name"), str):
+            raise ModelError("a stored robot needs a text under 'name'.")
+        source = RobotSource.from_dict(data, tuple(str(folder) for folder in package_dirs))
+        return cls(data["name"], robot_model.build_model(source), source)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a worker process needs: the fields, without shapes that are loaded on demand."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def _each(self, function: Any, first: Any, second: Any, size: int) -> Array:
+        """Apply a function of two vectors over all (broadcast) leading axes."""
+        (x, nx), (y, ny) = first, second
+        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        lead = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
+        rows_x = np.broadcast_to(x, (*lead, nx)).reshape(-1, nx)
+        rows_y = np.broadcast_to(y, (*lead, ny)).reshape(-1, ny)
+        result = np.empty((len(rows_x), size))
+        for row, one, other in zip(result, rows_x, rows_y, strict=True):
+            row[:] = function(self.model, one, other)
+        return result.reshape(*lead, size)
+
+    def _position_names(self) -> tuple[str, ...]:
+        """One name per entry of q, (nq,)."""
+        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
+        return tuple(
+            name if joint.nq == 1 else f"{name}[{i}]" for name, joint in pairs for i in range(joint.nq)
+        )
+
+    def _check_vector(
+        self, value: npt.ArrayLike, name: str, size: int, names: tuple[str, ...]
+    ) -> Array:
+        try:
+            vector = np.array(value, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{name} must be {size} numbers, not {value!r}.") from error
+        if vector.shape != (size,):
+            raise InputError(
+                f"{name} has shape {vector.shape}, expected ({size},): "
+                f"one number each for {', '.join(names)}."
+            )
+        for entry, joint in zip(vector, names, strict=True):
+            if not np.isfinite(entry):
+                raise InputError(f"{name} is {entry} at joint {joint!r}: give a finite number.")
+        return vector
+
+    def _check_unit_norms(self, q: Array, name: str) -> None:
+        for joint_name in self.manifold_joints:
+            joint = self.model.joints[self.model.getJointId(joint_name)]
+            part = slice(joint.idx_q, joint.idx_q + joint.nq)
+            alone = self.neutral()
+            alone[part] = q[part]
+            if not pin.isNormalized(self.model, alone, UNIT_TOLERANCE):
+                raise InputError(
+                    f"{name} is {q[part].tolist()} at joint {joint_name!r}, which is not of unit "
+                    f"norm: a joint with nq={joint.nq}, nv={joint.nv} holds a unit quaternion "
+                    "(x, y, z, w) or (cos, sin) of its angle; normalize it."
+                )
+
+
+def load_robot(
+    x: str | Path | pin.Model,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    free_flyer: bool | None = None,
+    locked: Iterable[str] = (),
+    visual: pin.GeometryModel | None = None,
+    collision: pin.GeometryModel | None = None,
+) -> Robot:
+    """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
+
+    x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
+        pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
+    package_dirs: folders in which `package://` meshes are looked up.
+    free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
+    locked: joints held at the neutral configuration.
+    visual, collision: geometry that goes with a pinocchio.Model.
+    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock.
+    """
+    names = _names(locked)
+    folders = tuple(str(Path(folder).absolute()) for folder in _names(package_dirs))
+    if isinstance(x, pin.Model):
+        return _from_model(x, x.name, names, (visual, collision))
+    if not isinstance(x, str | Path):
+        raise ModelError(
+            f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}."
+        )
+    if isinstance(x, str) and not _is_path(x):
+        if x in BUILT_IN_CODE:
+            model, *shapes = build_in_code(x)
+            return _from_model(model, x, names, (shapes[0], shapes[1]))
+        source = _example_source(x, folders, free_flyer)
+    else:
+        source = _file_source(Path(x), folders, bool(free_flyer))
+    source = replace(source, locked=names)
+    model = robot_model.build_model(source)
+    return Robot(x if source.kind == "example" else model.name, model, source)  # type: ignore[arg-type]
+
+
+def _is_path(text: str) -> bool:
+    return text.lower().endswith((".urdf", ".xml")) or "/" in text or "\\" in text
+
+
+def _names(values: Iterable[Any]) -> tuple[Any, ...]:
+    """Names as a tuple; a single one may come without brackets."""
+    return (values,) if isinstance(values, str | Path) else tuple(values)
+
+
+def _file_source(path: Path, folders: tuple[str, ...], free_flyer: bool) -> RobotSource:
+    text = read_urdf(path)
+    check_urdf(text, path.name, (str(path.parent.absolute()), *folders))
+    return RobotSource(
+        kind="urdf",
+        reference=path.name,
+        urdf=text,
+        sha256=text_hash(text),
+        package_dirs=folders,
+        free_flyer=free_flyer,
+        folder=str(path.parent.absolute()),
+    )
+
+
+def _example_source(name: str, folders: tuple[str, ...], free_flyer: bool | None) -> RobotSource:
+    example = example_robot(name)
+    text = read_urdf(example.urdf)
+    source = RobotSource(
+        kind="example",
+        reference=name,
+        urdf=text,
+        sha256=text_hash(text),
+        package_dirs=folders,
+        free_flyer=example.free_flyer if free_flyer is None else free_flyer,
+    )
+    if example.srdf is None:
+        return source
+    full = robot_model.build_full_model(source)
+    return replace(source, armature=rotor_armature(full, example.srdf))
+
+
+def _from_model(
+    model: pin.Model,
+    name: str,
+    locked: tuple[str, ...],
+    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
+) -> Robot:
+    if model.nv > MAXIMUM_FREEDOM:
+        raise ModelError(
+            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_FREEDOM} are "
+            "accepted: lock joints with pinocchio.buildReducedModel first."
+        )
+    shapes = [shape.copy() for shape in given if shape is not None]
+    reduced, shapes = robot_model.reduce_with_geometry(model.copy(), shapes, locked)
+    queue = iter(shapes)
+    kept = [None if shape is None else next(queue) for shape in given]
+    source = RobotSource(kind="model", reference=name, locked=locked)
+    return Robot(name, reduced, source, (kept[0], kept[1]))

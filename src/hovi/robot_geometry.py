@@ -1,0 +1,130 @@
+"""The shapes of a robot, loaded when somebody looks at them: planning never waits for a mesh.
+
+Mesh names come from strangers, so each must lie inside its own package folder (or, for plain
+paths, inside the URDF's folder or one of `package_dirs`). A shape whose mesh is missing or lies
+outside is left out and the reason is kept; the robot stays usable.
+"""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pinocchio as pin
+
+from hovi.errors import ModelError
+from hovi.example_robots import example_robot
+from hovi.robot_model import build_full_model, reduce_with_geometry
+from hovi.robot_source import RobotSource
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """What could be loaded (None for nothing), and a sentence about what could not ("" for none)."""
+
+    geometry: pin.GeometryModel | None
+    problem: str
+
+
+def load_shapes(source: RobotSource, kind: str) -> Shapes:
+    """The "visual" or "collision" geometry of a source, its locked joints held."""
+    if source.urdf is None:
+        return Shapes(None, f"robot {source.reference!r} was given without {kind} geometry.")
+    text, problems = _with_found_meshes(source, kind)
+    geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
+    model = build_full_model(source)
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
+    except (ValueError, RuntimeError) as error:
+        return Shapes(None, f"the {kind} shapes of {source.reference!r} cannot be read: {error}.")
+    _, (geometry,) = reduce_with_geometry(model, [geometry], source.locked)
+    problem = _sentence(source, kind, problems)
+    return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
+
+
+def find_mesh(filename: str, source: RobotSource) -> Path:
+    """The file that a mesh name means. Raises ModelError when it escapes or does not exist."""
+    candidates = list(_candidates(filename, source))
+    for root, path in candidates:
+        if not _inside(path, root):
+            raise ModelError(
+                f"mesh {filename!r} lies outside {str(root)!r}: mesh names must stay inside "
+                "their package; to allow another folder, name it in package_dirs."
+            )
+        if path.is_file():
+            return path
+    raise ModelError(f"mesh {filename!r} was not found in {_places(candidates)}.")
+
+
+def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path]]:
+    """(folder that must contain the mesh, place of the mesh), in the order of search."""
+    scheme, _, rest = filename.rpartition("://")
+    if scheme in ("package", "model"):
+        package = rest.split("/", 1)[0]
+        for folder in _package_folders(package, source):
+            yield folder, Path(os.path.normpath(folder.parent / rest))
+        return
+    folders = [Path(folder) for folder in (source.folder, *source.package_dirs) if folder]
+    path = Path(rest)
+    if path.is_absolute():
+        allowed = [folder for folder in folders if _inside(Path(os.path.normpath(path)), folder)]
+        folders = allowed or folders[:1]
+    for folder in folders:
+        yield folder.absolute(), Path(os.path.normpath(folder.absolute() / path))
+
+
+def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
+    """Folders called `package`: in the package folders, or around the URDF file itself."""
+    for parent in _package_dirs(source):
+        yield parent.absolute() / package
+        if parent.name == package:
+            yield parent.absolute()
+    if source.folder:
+        folder = Path(source.folder).absolute()
+        yield from (p for p in (folder, *folder.parents) if p.name == package)
+
+
+def _package_dirs(source: RobotSource) -> list[Path]:
+    folders = [Path(folder) for folder in source.package_dirs]
+    if source.kind == "example":
+        try:
+            folders.append(example_robot(source.reference).package_dir)
+        except ModelError:
+            return folders
+    return folders
+
+
+def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
+    """The URDF with absolute mesh names, without the shapes whose mesh is unusable, and why."""
+    root = ElementTree.fromstring(source.urdf or "")
+    problems = []
+    for link in root.iter("link"):
+        for shape in link.findall(kind):
+            for mesh in shape.iter("mesh"):
+                try:
+                    mesh.set("filename", f"file://{find_mesh(mesh.get('filename', ''), source)}")
+                except ModelError as error:
+                    problems.append(f"link {link.get('name')!r}: {error}")
+                    link.remove(shape)
+                    break
+    return ElementTree.tostring(root, encoding="unicode"), problems
+
+
+def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
+    if not problems:
+        return ""
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"robot {source.reference!r} lacks {kind} shapes: {problems[0]}{more}"
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.is_relative_to(os.path.normpath(folder.absolute()))
+
+
+def _places(candidates: list[tuple[Path, Path]]) -> str:
+    if not candidates:
+        return "any package folder; give package_dirs=[the folder that holds the package]"
+    return ", ".join(repr(str(root)) for root, _ in candidates)

@@ -1,0 +1,109 @@
+"""From a source to a Pinocchio model: build, give armature, lock joints, check the mass matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import ModelError, nearest
+from hovi.robot_source import RobotSource
+from hovi.urdf_check import check_urdf
+
+Array = npt.NDArray[np.float64]
+
+
+def build_full_model(source: RobotSource) -> pin.Model:
+    """The model of a source's URDF with no joint locked. Raises ModelError."""
+    if source.urdf is None:
+        raise ModelError(
+            f"robot {source.reference!r} was given as a pinocchio.Model, which no file can hold: "
+            "load it again with hovi.load_robot(model)."
+        )
+    check_urdf(source.urdf, source.reference)
+    root = (pin.JointModelFreeFlyer(),) if source.free_flyer else ()
+    try:
+        model = pin.buildModelFromXML(source.urdf, *root)
+    except (ValueError, RuntimeError) as error:
+        raise ModelError(
+            f"Pinocchio cannot read the URDF {source.reference!r}: {error}; "
+            "its parser's own words are on stderr."
+        ) from error
+    return _with_armature(model, source.armature)
+
+
+def build_model(source: RobotSource) -> pin.Model:
+    """The model of a source, its locked joints taken out. Raises ModelError."""
+    model = build_full_model(source)
+    if not source.locked:
+        return model
+    return pin.buildReducedModel(model, joint_ids(model, source.locked), pin.neutral(model))
+
+
+def reduce_with_geometry(
+    model: pin.Model, geometry: list[pin.GeometryModel], locked: Iterable[str]
+) -> tuple[pin.Model, list[pin.GeometryModel]]:
+    """Model and geometry with the `locked` joints held at the neutral configuration."""
+    ids = joint_ids(model, locked)
+    if not ids:
+        return model, geometry
+    reduced, shapes = pin.buildReducedModel(model, geometry, ids, pin.neutral(model))
+    return reduced, list(shapes)
+
+
+def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
+    """Pinocchio's indices of joints. Raises ModelError with the nearest names for an unknown one."""
+    movable = list(model.names)[1:]
+    for name in names:
+        if name not in movable:
+            raise ModelError(
+                f"robot {model.name!r} has no joint {name!r} to lock: {nearest(name, movable)}"
+            )
+    return [model.getJointId(name) for name in names]
+
+
+def check_mass_matrix(model: pin.Model) -> None:
+    """Refuse a model whose mass matrix M(q) is singular to working precision.
+
+    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at the neutral and at three fixed
+    random configurations. Raises ModelError naming the joint that nothing resists.
+    """
+    data = model.createData()
+    for q in _sample_configurations(model):
+        upper = np.triu(pin.crba(model, data, q))
+        mass = upper + np.triu(upper, 1).T  # (nv, nv)
+        values, vectors = np.linalg.eigh(mass)
+        if not values[0] > 10.0 * model.nv * np.finfo(float).eps * values[-1]:
+            raise ModelError(_singular_mass_sentence(model, vectors[:, 0]))
+
+
+def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:
+    values = np.array(model.armature, dtype=float)
+    for name, value in armature:
+        values[model.joints[model.getJointId(name)].idx_v] = value
+    model.armature = values
+    return model
+
+
+def _sample_configurations(model: pin.Model) -> Iterator[Array]:
+    neutral = pin.neutral(model)
+    yield neutral
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        yield pin.integrate(model, neutral, rng.uniform(-1.0, 1.0, model.nv))
+
+
+def _singular_mass_sentence(model: pin.Model, direction: Array) -> str:
+    """Name the last joint that takes part in the direction (nv,) without inertia."""
+    strong = np.flatnonzero(np.abs(direction) > 0.5 * np.abs(direction).max())
+    last = int(strong[-1])
+    joint = max(j for j in range(1, model.njoints) if model.joints[j].idx_v <= last)
+    links = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.BODY]
+    carried = f" (link {links[0]!r})" if links else ""
+    return (
+        f"the mass matrix of robot {model.name!r} is singular to working precision: joint "
+        f"{model.names[joint]!r}{carried} moves almost no mass and no inertia; give its link a "
+        f"mass and an inertia, or lock the joint with locked=[{model.names[joint]!r}]."
+    )

@@ -1,0 +1,91 @@
+"""Where a robot came from: enough to build the same model again, here or on another machine."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+from hovi.errors import ModelError
+
+SourceKind = Literal["urdf", "example", "model"]
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """The text and the options that a model is built from.
+
+    kind: "urdf" (a file), "example" (a name of example-robot-data) or "model" (a pinocchio.Model).
+    reference: the file's name, the example's name or the model's name; never a path.
+    urdf: the URDF's text; None for kind "model", which has none.
+    sha256: of that text in UTF-8, in hexadecimal.
+    package_dirs: folders in which `package://` meshes are looked up.
+    locked: joints held at the neutral configuration and so no longer part of the model.
+    free_flyer: the base floats.
+    folder: the folder of the URDF file, for its meshes; "" when the file is not at hand.
+    armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
+    """
+
+    kind: SourceKind
+    reference: str
+    urdf: str | None = None
+    sha256: str | None = None
+    package_dirs: tuple[str, ...] = ()
+    locked: tuple[str, ...] = ()
+    free_flyer: bool = False
+    folder: str = ""
+    armature: tuple[tuple[str, float], ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """A JSON-able dictionary without any path of this machine."""
+        return {
+            "kind": self.kind,
+            "reference": self.reference,
+            "urdf": self.urdf,
+            "sha256": self.sha256,
+            "locked": list(self.locked),
+            "free_flyer": self.free_flyer,
+            "armature": dict(self.armature),
+        }
+
+    @classmethod
+    def from_dict(
+        cls, data: Mapping[str, Any], package_dirs: tuple[str, ...] = ()
+    ) -> RobotSource:
+        """The source that `to_dict` wrote. Raises ModelError when it is not whole."""
+        kind = _entry(data, "kind", str)
+        if kind not in get_args(SourceKind):
+            raise ModelError(
+                f"a stored robot is of kind 'urdf', 'example' or 'model', not {kind!r}."
+            )
+        urdf, sha256 = data.get("urdf"), data.get("sha256")
+        if kind != "model" and (not isinstance(urdf, str) or sha256 != text_hash(urdf)):
+            raise ModelError(
+                f"the URDF stored with robot {data.get('reference')!r} does not match its own "
+                "sha256: the file was damaged or edited; load the robot again from its URDF."
+            )
+        return cls(
+            kind=kind,  # type: ignore[arg-type]
+            reference=_entry(data, "reference", str),
+            urdf=urdf,
+            sha256=sha256,
+            package_dirs=package_dirs,
+            locked=tuple(str(name) for name in _entry(data, "locked", list)),
+            free_flyer=_entry(data, "free_flyer", bool),
+            armature=tuple((str(k), float(v)) for k, v in _entry(data, "armature", dict).items()),
+        )
+
+
+def text_hash(text: str) -> str:
+    """The sha256 of a text in UTF-8, in hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _entry(data: Mapping[str, Any], key: str, expected: type) -> Any:
+    value = data.get(key)
+    if not isinstance(value, expected):
+        raise ModelError(
+            f"a stored robot needs a {expected.__name__} under {key!r}, not {value!r}."
+        )
+    return value

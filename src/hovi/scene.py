@@ -1,0 +1,138 @@
+"""A scene: a robot and the effects that a person decided to simulate."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.effects import REGISTRY, Effect, SceneSymbols
+from hovi.errors import SceneError, nearest
+from hovi.lagrangian import CasadiTorque, EffortLagrangian, PotentialTerm, TorqueModel
+from hovi.rigid_body import casadi_functions
+from hovi.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot with the effects that act on it; what is not named is not simulated.
+
+    robot: the robot.
+    effects: at most one of each kind.
+    model: the scene's own copy of the robot's model, with gravity and armature as the effects
+        say (none where no effect says so).
+    Raises SceneError when an effect does not fit the robot, or is named twice.
+    """
+
+    robot: Robot
+    effects: Sequence[Effect] = ()
+    model: pin.Model = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        effects = tuple(self.effects)
+        keys = [effect.key for effect in effects]
+        for key in set(keys):
+            if keys.count(key) > 1:
+                raise SceneError(f"the effect {key!r} is named twice; a scene takes one of each.")
+        model = self.robot.model.copy()
+        model.gravity.linear = np.zeros(3)
+        model.armature = np.zeros(model.nv)
+        for effect in effects:
+            effect.check(self.robot)
+            effect.configure(model)
+        object.__setattr__(self, "effects", effects)
+        object.__setattr__(self, "model", model)
+
+    @cached_property
+    def torques(self) -> TorqueModel:
+        """tau(q, v, a, t): RNEA and what the effects add to it, with exact derivatives."""
+        symbols = self._symbols()
+        functions = casadi_functions(self.model)
+        tau = functions.inverse_dynamics(symbols.q, symbols.v, symbols.a)
+        for effect in self.effects:
+            added = effect.torque(self.robot, symbols)
+            tau = tau if added is None else tau + added
+        return CasadiTorque(symbols.columns(), tau)
+
+    def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
+        """L~ = 1/2 tau^T diag(R) tau + V on T^(2)Q.
+
+        weight: R, shape (nv,), all ones when not given. [ColomboFerraroMartin2016, section 5]
+        """
+        R = np.ones(self.robot.nv) if weight is None else np.asarray(weight, dtype=np.float64)
+        if R.shape != (self.robot.nv,) or not (np.isfinite(R).all() and (R > 0).all()):
+            raise SceneError(
+                f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
+            )
+        return EffortLagrangian(self.torques, self, R, self._potential())
+
+    def inverse_dynamics(
+        self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
+    ) -> Array:
+        """tau = RNEA(q, v, a) + effects, shape (M, nv), in [N m] or [N].
+
+        q: shape (M, nq). v, a: shape (M, nv). t: shape (M,), in [s].
+        """
+        jet = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
+        return self.torques.torque(*jet, None if t is None else np.asarray(t, dtype=np.float64))
+
+    def describe(self) -> str:
+        """What is simulated, and what the URDF holds but the scene leaves out."""
+        lines = [f"scene of robot {self.robot.name!r}", "simulated:"]
+        lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
+        lines.append("left out:")
+        lines += [f"  {line}" for line in self._left_out()] or ["  nothing that the URDF holds"]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as JSON-able data, the URDF's text included."""
+        effects = {effect.key: dataclasses.asdict(effect) for effect in self.effects}
+        return {"robot": self.robot.to_dict(), "effects": effects}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Scene:
+        """The scene that to_dict wrote. Raises SceneError for an unknown effect."""
+        effects = []
+        for key, values in data["effects"].items():
+            if key not in REGISTRY:
+                raise SceneError(f"there is no effect {key!r}: {nearest(key, REGISTRY)}")
+            effects.append(REGISTRY[key](**values))
+        return cls(Robot.from_dict(data["robot"]), effects)
+
+    def _symbols(self) -> SceneSymbols:
+        nq, nv = self.robot.nq, self.robot.nv
+        sym = ca.SX.sym
+        return SceneSymbols(sym("q", nq), sym("v", nv), sym("a", nv), sym("t"))
+
+    def _potential(self) -> PotentialTerm | None:
+        symbols = self._symbols()
+        terms = [effect.potential(self.robot, symbols) for effect in self.effects]
+        named = [term for term in terms if term is not None]
+        return PotentialTerm(symbols.columns(), sum(named[1:], named[0])) if named else None
+
+    def _left_out(self) -> list[str]:
+        robot, keys = self.robot, {effect.key for effect in self.effects}
+        lines = [] if "gravity" in keys else ["gravity"]
+        held = (("damping", robot.damping), ("friction", robot.friction))
+        for name, values in (*held, ("armature", robot.armature)):
+            joints = [j for j, x in zip(robot.coordinate_names, values, strict=True) if x != 0]
+            if joints:
+                lines.append(f"{name} of {', '.join(joints)}")
+        return lines
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is cached, so that worker processes build their own functions."""
+        return {"robot": self.robot, "effects": self.effects, "model": self.model}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)

@@ -1,0 +1,56 @@
+"""Schemes: tables that turn a Lagrangian into a discrete Lagrangian."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from hovi.errors import SchemeError, nearest
+from hovi.schemes.classic import (
+    hermite_simpson,
+    mean_difference,
+    taylor_midpoint,
+    taylor_trapezoid,
+    trapezoid_difference,
+)
+from hovi.schemes.galerkin_table import galerkin
+from hovi.schemes.regularity import is_regular, regularity_matrix, require_regular
+from hovi.schemes.scheme import Scheme
+
+CLASSIC: dict[str, Callable[[], Scheme]] = {
+    "taylor-midpoint": taylor_midpoint,
+    "taylor-trapezoid": taylor_trapezoid,
+    "mean-difference": mean_difference,
+    "trapezoid-difference": trapezoid_difference,
+    "hermite-simpson": hermite_simpson,
+}
+
+
+def by_name(name: str) -> Scheme:
+    """The scheme that a file or the command line calls `name`.
+
+    name: one of CLASSIC, or `galerkin-R` with R inner modes. Raises SchemeError otherwise.
+    """
+    if name in CLASSIC:
+        return CLASSIC[name]()
+    match = re.fullmatch(r"galerkin-(\d{1,4})", name)
+    if match:
+        return galerkin(int(match.group(1)))
+    known = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-3"]
+    raise SchemeError(f"there is no scheme {name!r}: {nearest(name, known)}")
+
+
+__all__ = [
+    "CLASSIC",
+    "Scheme",
+    "by_name",
+    "galerkin",
+    "hermite_simpson",
+    "is_regular",
+    "mean_difference",
+    "regularity_matrix",
+    "require_regular",
+    "taylor_midpoint",
+    "taylor_trapezoid",
+    "trapezoid_difference",
+]

@@ -1,0 +1,80 @@
+"""A scheme is a table of numbers: what each quadrature point of an interval sees of its end data.
+
+It depends neither on the step h, nor on the robot, nor on the number of joints. It is the
+higher-order sibling of a Butcher tableau.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.schemes.polynomials import interval_rows
+
+Array = npt.NDArray[np.float64]
+
+_REGULAR_COLUMNS = np.array(
+    # q0, h v0, q1, h v1
+    [[1.0, 0, 0, 0], [0, 1, 0, 0], [-1, -1, 1, 0], [0, -1, 0, 1]]
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Scheme:
+    """The discrete Lagrangian L_d = h sum_j w_j L(q_j, v_j, a_j) as numbers.
+
+    In scaled variables the j-th point is (q_j - q0, h v_j, h^2 a_j) = table[j] @ (h v0, Z0, Z1, c),
+    with Z0 = q1 - q0 - h v0 and Z1 = h v1 - h v0 (h^2 and h^2 times the regularised coordinates
+    z0, z1) and c the interval's inner modes. [ColomboFerraroMartin2016, sections 2 and 5]
+
+    name: how the scheme is called in files and on the command line.
+    order: order of the nodes; 0 for a table that does not define a method.
+    points: node of each quadrature point in [0, 1], shape (Q,).
+    weights: quadrature weights, shape (Q,), of sum 1.
+    table: shape (Q, 3, 3 + r) with r inner modes.
+    """
+
+    name: str
+    order: int
+    points: Array
+    weights: Array
+    table: Array
+
+    @property
+    def inner_modes(self) -> int:
+        """Number r of inner modes of an interval."""
+        return self.table.shape[2] - 3
+
+    @property
+    def regular_table(self) -> Array:
+        """The table for (q0, h v0, Z0, Z1, c), the configuration's base point included.
+
+        Shape (Q, 3, 4 + r).
+        """
+        base = np.zeros((*self.table.shape[:2], 1))
+        base[:, 0] = 1.0
+        return np.concatenate([base, self.table], axis=2)
+
+    @property
+    def nodal_table(self) -> Array:
+        """The table for (q0, h v0, q1, h v1, c), shape (Q, 3, 4 + r)."""
+        return self.regular_table @ regular_from_nodal(self.inner_modes)
+
+    def rows(self, s: Array) -> Array:
+        """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).
+
+        s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite where r = 0.
+        """
+        return interval_rows(s, self.inner_modes)
+
+    def __reduce__(self) -> tuple[type[Scheme], tuple[object, ...]]:
+        return Scheme, (self.name, self.order, self.points, self.weights, self.table)
+
+
+def regular_from_nodal(inner_modes: int) -> Array:
+    """Matrix R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r)."""
+    R = np.eye(4 + inner_modes)
+    R[:4, :4] = _REGULAR_COLUMNS
+    return R

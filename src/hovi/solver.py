@@ -1,0 +1,199 @@
+"""solve: from a trajectory problem to a Solution."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError
+from hovi.grid import DiscretePath, Grid
+from hovi.guess import Curve, named_curve, path_on_grid
+from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
+from hovi.problem import TrajectoryProblem
+from hovi.trajectory import Trajectory
+from hovi.trajectory_objective import ActionObjective
+
+Array = npt.NDArray[np.float64]
+Report = Callable[[int, float], None]
+
+
+class Status(StrEnum):
+    """What a solve ended in."""
+
+    MINIMUM = "minimum"
+    SADDLE = "saddle"
+    INFEASIBLE = "infeasible"
+    ITERATION_LIMIT = "iteration_limit"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+    DIVERGED = "diverged"
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """The answer to a trajectory problem.
+
+    success: whether a minimum was found. status, message: what happened, in a word and in a
+        sentence.
+    trajectory: the motion, the best so far where no minimum was found.
+    cost: the discrete action of L~, 1/2 integral |tau|^2 where nothing else was asked.
+    error_estimate: relative, in the cost; None where there is none.
+    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian.
+    minima: costs of all minima that a multi-start found, ascending.
+    history: what each step did.
+    setup_seconds, solve_seconds: wall time before and during the solve.
+    """
+
+    success: bool
+    status: Status
+    message: str
+    trajectory: Trajectory
+    cost: float
+    nit: int
+    n_neg: int
+    error_estimate: float | None = None
+    minima: tuple[float, ...] = ()
+    history: tuple[Iteration, ...] = field(default=(), repr=False)
+    setup_seconds: float = 0.0
+    solve_seconds: float = 0.0
+
+
+def solve(
+    problem: TrajectoryProblem,
+    guess: str | Trajectory | DiscretePath = "cubic",
+    *,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    escape_saddles: bool = True,
+    report: Report | None = None,
+) -> Solution:
+    """A motion that makes the discrete action stationary, by a trust-region Newton method.
+
+    problem: the boundary data and the discrete Lagrangian.
+    guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
+    max_iterations: steps. time_limit: in [s]. Both return the best motion so far.
+    escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
+    report: called with the number of each step and the least cost so far.
+    Raises InputError for a guess that does not fit.
+    """
+    began = time.perf_counter()
+    path = guess_path(problem, guess)
+    objective = ActionObjective(problem)
+    options = Options(
+        max_iterations=max_iterations, time_limit=time_limit, escape_saddles=escape_saddles
+    )
+    started = time.perf_counter()
+    outcome = minimize(objective, path, options, report)
+    n_neg, outcome = _certify(problem, outcome)
+    solved = time.perf_counter()
+    status, message = _verdict(outcome, n_neg)
+    trajectory = _trajectory(problem, outcome, status, n_neg)
+    return Solution(
+        success=status is Status.MINIMUM,
+        status=status,
+        message=message,
+        trajectory=trajectory,
+        cost=outcome.value,
+        nit=outcome.iterations,
+        n_neg=n_neg,
+        minima=(outcome.value,) if status is Status.MINIMUM else (),
+        history=tuple(outcome.history),
+        setup_seconds=started - began,
+        solve_seconds=solved - started,
+    )
+
+
+def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
+    """A guess as a path on the problem's grid, with the problem's boundary data."""
+    robot, grid, boundary = problem.robot, problem.grid, problem.boundary
+    if isinstance(guess, DiscretePath):
+        if guess.intervals != grid.intervals or guess.v.shape[1] != robot.nv:
+            raise InputError(
+                f"the guess has {guess.intervals} intervals and {guess.v.shape[1]} joints, the "
+                f"problem {grid.intervals} and {robot.nv}; hand in a Trajectory to change grids."
+            )
+        return guess
+    if isinstance(guess, str):
+        return path_on_grid(named_curve(guess, robot, boundary, grid.duration), grid, boundary, robot)
+    if guess.v.shape[1] != robot.nv:
+        raise InputError(
+            f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."
+        )
+    return path_on_grid(_resampled(guess, grid), grid, boundary, robot)
+
+
+def _resampled(trajectory: Trajectory, grid: Grid) -> Curve:
+    """A trajectory as a curve over the grid's duration."""
+    stretch = trajectory.duration / grid.duration
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        sample = trajectory.sample(np.clip(t * stretch, 0.0, trajectory.duration))
+        return sample.q, sample.v * stretch, sample.a * stretch**2
+
+    return curve
+
+
+def _certify(
+    problem: TrajectoryProblem, outcome: Outcome[DiscretePath]
+) -> tuple[int, Outcome[DiscretePath]]:
+    """n_neg from the exact Hessian, and one more Newton step where a minimum was found."""
+    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
+        return -1, outcome
+    objective = ActionObjective(problem, algebra="tree")
+    model = objective.merge_model(outcome.x)
+    factor = model.factor(0.0)
+    if factor is None:
+        return model.negative_eigenvalues(), outcome
+    if outcome.stop is Stop.STATIONARY:
+        path = objective.retract(outcome.x, factor.solve(-model.gradient), model)
+        value = objective.value(path)
+        if value <= outcome.value + 1e-12 * abs(outcome.value):
+            outcome.x, outcome.value = path, value
+    return 0, outcome
+
+
+_LIMITS = {
+    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
+    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
+    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
+    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
+}
+
+
+def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
+    """Status and sentence of an outcome."""
+    if not np.isfinite(outcome.value):
+        return Status.DIVERGED, "the cost of the guess is not finite; hand in another guess."
+    left = "".join(
+        f" A saddle of cost {cost:.10g} was left along negative curvature."
+        for cost in outcome.saddles_left
+    )
+    if outcome.stop is Stop.STATIONARY and n_neg == 0:
+        return (
+            Status.MINIMUM,
+            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps.{left}",
+        )
+    if outcome.stop is Stop.STATIONARY:
+        return (
+            Status.SADDLE,
+            f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
+            f"solve again with escape_saddles=True or another guess.",
+        )
+    status, reason = _LIMITS[outcome.stop]
+    return status, (
+        f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
+        f"best so far, of cost {outcome.value:.10g}.{left}"
+    )
+
+
+def _trajectory(
+    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], status: Status, n_neg: int
+) -> Trajectory:
+    metadata = {"cost": outcome.value, "status": str(status), "n_neg": n_neg}
+    momenta = problem.ld.momenta(outcome.x)
+    return Trajectory(problem.grid, outcome.x, momenta, problem.scene, metadata)

@@ -1,0 +1,104 @@
+"""The tables [effects.NAME]: each key is a field of the effect's dataclass."""
+
+from __future__ import annotations
+
+import functools
+import operator
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+from pydantic import AllowInfNan, BaseModel, Field, Strict, ValidationError, create_model
+
+from hovi.effects import REGISTRY, Effect
+from hovi.errors import SceneError, nearest
+from hovi.robot import Robot
+from hovi.task_file.schema import Table
+from hovi.task_file.sentences import TomlText, first_sentence
+
+_NUMBERS = {float: "finite number", int: "whole number", str: "string", bool: "true or false"}
+
+
+def read_effects(
+    tables: Mapping[str, Mapping[str, Any]], robot: Robot, toml: TomlText
+) -> list[Effect]:
+    """The effects that a file names, in its order, checked against the robot."""
+    return [_read_effect(name, table, robot, toml) for name, table in tables.items()]
+
+
+def effect_table(effect: Effect) -> dict[str, Any]:
+    """The table that `read_effects` reads back as this effect."""
+    return {field.name: _plain(getattr(effect, field.name)) for field in fields(effect)}
+
+
+def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlText) -> Effect:
+    keys = ("effects", name)
+    if name not in REGISTRY:
+        raise toml.error(keys, f"there is no effect {name!r}; {nearest(name, REGISTRY)}")
+    schema = _schema(REGISTRY[name])
+    try:
+        checked = schema.model_validate(dict(table))
+    except ValidationError as invalid:
+        raise first_sentence(invalid, schema, toml, above=keys) from None
+    given = {key: getattr(checked, key) for key in table}
+    effect = REGISTRY[name](**given)
+    try:
+        effect.check(robot)
+    except SceneError as refused:
+        raise toml.error(keys, str(refused)) from None
+    return effect
+
+
+@functools.cache
+def _schema(effect: type[Effect]) -> type[BaseModel]:
+    hints = get_type_hints(effect)
+    keys: dict[str, Any] = {}
+    for field in fields(effect):
+        needed = field.default is MISSING and field.default_factory is MISSING
+        description = _in_words(hints[field.name])
+        keys[field.name] = (
+            _strict(hints[field.name]),
+            Field(... if needed else None, description=description),
+        )
+    return create_model(effect.__name__, __base__=Table, **keys)
+
+
+def _strict(hint: Any) -> Any:
+    """The hint with strict, finite scalars; a TOML list may still become a tuple."""
+    if hint is float:
+        return Annotated[float, Strict(), AllowInfNan(False)]
+    if hint in (int, str, bool):
+        return Annotated[hint, Strict()]
+    inner = tuple(_strict(each) if each is not Ellipsis else each for each in get_args(hint))
+    origin = get_origin(hint)
+    if origin in (Union, types.UnionType):
+        return functools.reduce(operator.or_, inner)
+    if isinstance(origin, type):
+        return Annotated[origin[inner], Strict(False)]  # type: ignore[index]
+    return hint
+
+
+def _in_words(hint: Any) -> str:
+    if hint in _NUMBERS:
+        return _NUMBERS[hint] if hint is bool else f"a {_NUMBERS[hint]}"
+    inner = get_args(hint)
+    origin = get_origin(hint)
+    if origin is tuple and Ellipsis not in inner:
+        return f"a list of {len(inner)} {_NUMBERS.get(inner[0], 'value')}s"
+    if origin in (list, tuple):
+        return f"a list, each {_in_words(inner[0])}"
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return f"a table of names, each with {_in_words(inner[1])}"
+    if origin in (Union, types.UnionType):
+        return " or ".join(_in_words(each) for each in inner if each is not type(None))
+    return "a value of the right type"
+
+
+def _plain(value: Any) -> Any:
+    """The value as TOML can hold it."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [_plain(each) for each in value] if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,82 @@
+"""The keys of a task file and what each of them must be.
+
+The description of a field ends the sentence "`key` must be ...".
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, dict):
+        return "<table>"
+    return "<list>" if isinstance(value, list) else "<number>"
+
+
+Numbers = Annotated[list[FiniteFloat], Tag("<list>")]
+Coordinates = Annotated[
+    Numbers
+    | Annotated[
+        dict[
+            str,
+            Annotated[Annotated[FiniteFloat, Tag("<number>")] | Numbers, Discriminator(_kind)],
+        ],
+        Tag("<table>"),
+    ],
+    Discriminator(_kind),
+]
+
+
+class Table(BaseModel):
+    """A table that takes no other keys and converts nothing."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class EndTable(Table):
+    """[start] or [goal]."""
+
+    q: Coordinates = Field(
+        description="a list of finite numbers, one per coordinate, or a table of joint names"
+    )
+    v: Coordinates | None = Field(
+        default=None,
+        description="a list of finite numbers, one per velocity, or a table of joint names",
+    )
+
+
+class SchemeTable(Table):
+    """[scheme]."""
+
+    name: str = Field(
+        default="galerkin-2", description='the name of a scheme, such as "galerkin-2"'
+    )
+    intervals: int = Field(
+        default=16, ge=1, le=1_000_000, description="a whole number from 1 to 1,000,000"
+    )
+
+
+class TaskTable(Table):
+    """The whole file."""
+
+    robot: str = Field(
+        description="the path of a .urdf relative to this file, or a name of example-robot-data"
+    )
+    locked: list[str] = Field(default=[], description="a list of joint names")
+    package_dirs: list[str] = Field(
+        default=[], description="a list of folders relative to this file"
+    )
+    free_flyer: bool = Field(default=False, description="true or false")
+    duration: FiniteFloat = Field(gt=0, description="a positive number of seconds")
+    limits: Any = Field(default="none", description='"none"')
+    starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
+    seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
+    start: EndTable = Field(description="a table [start] with q and, if moving, v")
+    goal: EndTable = Field(description="a table [goal] with q and, if moving, v")
+    scheme: SchemeTable = Field(
+        default=SchemeTable(), description="a table [scheme] with name and intervals"
+    )
+    effects: dict[str, dict[str, Any]] = Field(default={}, description="tables [effects.NAME]")

@@ -1,0 +1,126 @@
+"""From a position in a TOML file and a pydantic error to one sentence for a person."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from hovi.errors import SceneError, nearest
+
+Keys = tuple[str | int, ...]
+
+_HEADER = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
+_ELEMENTS = {
+    "finite_number": "a finite number",
+    "float_type": "a finite number",
+    "string_type": "a string",
+    "list_type": "a list",
+    "dict_type": "a table",
+}
+_ENTRY = re.compile(r"^\s*([A-Za-z0-9_.\"'\- ]+?)\s*=")
+
+
+@dataclass(frozen=True)
+class TomlText:
+    """The text of a TOML file and where it came from."""
+
+    path: Path
+    text: str
+
+    def line(self, keys: Keys) -> int | None:
+        """The line, from 1, of the longest leading part of `keys` that the text spells out."""
+        wanted = tuple(str(key) for key in keys if isinstance(key, str))
+        best, where = 0, None
+        table: tuple[str, ...] = ()
+        for number, line in enumerate(self.text.splitlines(), start=1):
+            here = table
+            if header := _HEADER.match(line):
+                here = table = _split(header[1])
+            elif entry := _ENTRY.match(line):
+                here = table + _split(entry[1])
+            else:
+                continue
+            if len(here) > best and wanted[: len(here)] == here:
+                best, where = len(here), number
+        return where
+
+    def error(self, keys: Keys, sentence: str) -> SceneError:
+        """The sentence with file and line in front, ready to be raised."""
+        line = self.line(keys)
+        place = f"{self.path}, line {line}" if line else str(self.path)
+        end = "" if sentence.endswith((".", "?")) else "."
+        return SceneError(f"{place}: {sentence}{end}")
+
+
+def first_sentence(
+    invalid: ValidationError, model: type[BaseModel], toml: TomlText, above: Keys = ()
+) -> SceneError:
+    """The most telling of pydantic's complaints, as one sentence.
+
+    Unknown keys come first: a misspelt key is also a missing one.
+    above: the keys of the table that was validated.
+    """
+    details = sorted(invalid.errors(), key=lambda error: error["type"] != "extra_forbidden")[0]
+    keys = tuple(key for key in details["loc"] if not str(key).startswith(("<", "dict[", "list[")))
+    key = spelled(above + keys)
+    kind = details["type"]
+    if kind == "extra_forbidden":
+        valid = _fields_of(_model_at(model, keys[:-1]))
+        return toml.error(above + keys, f"unknown key `{key}`; {nearest(str(keys[-1]), valid)}")
+    expected = _expected(model, keys, details)
+    if kind == "missing":
+        return toml.error(above + keys[:-1], f"`{key}` is missing; it must be {expected}")
+    return toml.error(above + keys, f"`{key}` must be {expected}, but it is {shown(details)}")
+
+
+def spelled(keys: Iterable[str | int]) -> str:
+    """Keys as a person writes them: start.q[1]."""
+    text = ""
+    for key in keys:
+        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
+    return text
+
+
+def shown(details: ErrorDetails) -> str:
+    """What came, short enough for a sentence."""
+    return in_toml(details["input"])
+
+
+def in_toml(value: Any) -> str:
+    """A value as TOML spells it, cut to a readable length."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    text = f'"{value}"' if isinstance(value, str) else f"{value}"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:
+    owner = _model_at(model, keys[:-1])
+    field = owner.model_fields.get(str(keys[-1])) if owner else None
+    if field and field.description:
+        return field.description
+    return _ELEMENTS.get(details["type"], details["msg"].lower())
+
+
+def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:
+    for key in keys:
+        field = model.model_fields.get(str(key))
+        annotation = field.annotation if field else None
+        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+            return None
+        model = annotation
+    return model
+
+
+def _fields_of(model: type[BaseModel] | None) -> list[str]:
+    return list(model.model_fields) if model else []
+
+
+def _split(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))

@@ -1,0 +1,60 @@
+"""Task: all that a person says before a motion can be planned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hovi.errors import InputError, SceneError
+from hovi.scene import Scene
+from hovi.schemes import by_name
+from hovi.state import State
+
+MOST_INTERVALS = 1_000_000
+LIMITS_SENTENCE = (
+    'limits are not enforced yet; write limits = "none" and compare the peaks of the motion '
+    "with the limits of the robot."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """A planning task, valid once built.
+
+    scene: the robot and the effects that act on it.
+    start, goal: the two ends of the motion, q in [rad] or [m], v per second.
+    duration: length of the motion, in [s].
+    scheme: name of the scheme, as in `hovi.schemes.by_name`.
+    intervals: number N of intervals of equal length.
+    starts: number of guesses that are tried.
+    seed: seed of the random guesses.
+    limits: "none"; limits are not enforced yet.
+    name: what the task is called in reports.
+    """
+
+    scene: Scene
+    start: State
+    goal: State
+    duration: float
+    scheme: str = "galerkin-2"
+    intervals: int = 16
+    starts: int = 1
+    seed: int = 0
+    limits: str = "none"
+    name: str = "task"
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that make no task, and schemes that do not exist."""
+        if not (math.isfinite(self.duration) and self.duration > 0):
+            raise InputError(f"duration must be a positive number of seconds, not {self.duration}.")
+        if not 1 <= self.intervals <= MOST_INTERVALS:
+            raise InputError(
+                f"intervals must be from 1 to {MOST_INTERVALS:,}, not {self.intervals}."
+            )
+        if self.starts < 1:
+            raise InputError(f"starts must be 1 or more, not {self.starts}.")
+        if self.seed < 0:
+            raise InputError(f"seed must be 0 or more, not {self.seed}.")
+        if self.limits != "none":
+            raise SceneError(LIMITS_SENTENCE)
+        by_name(self.scheme)

@@ -1,0 +1,99 @@
+"""Writing a task file that `load_task` reads back as the same task."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import tomlkit
+from tomlkit.items import Table
+
+from hovi.errors import SceneError
+from hovi.robot_source import RobotSource
+from hovi.task_file.effect_tables import effect_table
+from hovi.task_file.task import Task
+from hovi.whole_file import reason, whole_file
+
+
+def save_task(task: Task, path: str | Path) -> Path:
+    """Write a task as TOML; returns the path.
+
+    task: what to write.
+    path: the file, replaced whole or not at all. The URDF of a robot that came from a file is
+        written beside it when it is not there yet.
+    Raises SceneError when the robot has no file, or when another URDF of the same name is there.
+    """
+    path = Path(path)
+    source = task.scene.robot.source
+    try:
+        _keep_urdf_beside(source, path)
+        _write(path, tomlkit.dumps(_document(task, path.parent)).encode("utf-8"))
+    except OSError as refused:
+        raise SceneError(f"{path} cannot be written: {reason(refused)}.") from None
+    return path
+
+
+def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
+    source = task.scene.robot.source
+    document = tomlkit.document()
+    document["robot"] = source.reference
+    if source.locked:
+        document["locked"] = list(source.locked)
+    if source.package_dirs:
+        document["package_dirs"] = _relative(source, folder)
+    if source.free_flyer:
+        document["free_flyer"] = True
+    document["duration"] = float(task.duration)
+    document["limits"] = task.limits
+    document["starts"] = task.starts
+    document["seed"] = task.seed
+    for name, state in (("start", task.start), ("goal", task.goal)):
+        q, v = state.on(task.scene.robot, name)
+        document[name] = _table({"q": _floats(q)} | ({"v": _floats(v)} if np.any(v) else {}))
+    document["scheme"] = _table({"name": task.scheme, "intervals": task.intervals})
+    if task.scene.effects:
+        effects = tomlkit.table(is_super_table=True)
+        for effect in task.scene.effects:
+            effects[effect.key] = _table(effect_table(effect))
+        document["effects"] = effects
+    return document
+
+
+def _table(values: dict[str, Any]) -> Table:
+    table = tomlkit.table()
+    for key, value in values.items():
+        table[key] = value
+    return table
+
+
+def _floats(values: npt.ArrayLike) -> list[float]:
+    return [float(each) for each in np.asarray(values)]
+
+
+def _relative(source: RobotSource, folder: Path) -> list[str]:
+    """Package folders as a file in `folder` names them."""
+    return [os.path.relpath(each, folder.resolve()) for each in source.package_dirs]
+
+
+def _keep_urdf_beside(source: RobotSource, path: Path) -> None:
+    if source.kind == "model":
+        raise SceneError(
+            "a robot given as a pinocchio.Model has no file that a task file can name; "
+            "load it from a URDF to save the task."
+        )
+    if source.kind != "urdf" or source.urdf is None:
+        return
+    text = source.urdf.encode("utf-8")
+    urdf = path.parent / Path(source.reference).name
+    if not urdf.exists():
+        _write(urdf, text)
+    elif urdf.read_bytes() != text:
+        raise SceneError(f"{urdf} is another URDF than the task's; choose another folder.")
+
+
+def _write(path: Path, content: bytes) -> None:
+    with whole_file(path) as stream:
+        stream.write(content)

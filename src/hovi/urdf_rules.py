@@ -1,0 +1,289 @@
+"""The rules of a URDF, one function each: it yields a sentence for every place that breaks it.
+
+They ask for what RNEA needs and no more: published robots break the triangle inequality of the
+principal inertias by factors of five, and name mimicked joints that do not exist; both load.
+"""
+
+from __future__ import annotations
+
+import math
+import posixpath
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from hovi.errors import nearest
+
+Rule = Callable[[Element], Iterator[str]]
+
+MAXIMUM_MAGNITUDE = 1e12
+MAXIMUM_LIMIT = 1e30
+"""Limits are compared, never computed with; robots write 1e16 for "none"."""
+
+INERTIA_TOLERANCE = 1e-7
+"""Negative principal inertia, in [kg m^2], that still passes as a rounding of the CAD export."""
+
+JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+_NUMBERS: dict[str, dict[str, int]] = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(_INERTIA, 1),
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+    "dynamics": {"damping": 1, "friction": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "mesh": {"scale": 3},
+    "color": {"rgba": 4},
+}
+"""How many numbers each attribute holds, by element."""
+
+_REQUIRED: dict[str, tuple[str, ...]] = {
+    "mass": ("value",),
+    "inertia": _INERTIA,
+    "mesh": ("filename",),
+    "mimic": ("joint",),
+    "parent": ("link",),
+    "child": ("link",),
+}
+
+
+def links_are_named(robot: Element) -> Iterator[str]:
+    if robot.find("link") is None:
+        yield "it has no <link>: a robot needs at least one."
+    yield from _named(robot, "link")
+
+
+def joints_are_named(robot: Element) -> Iterator[str]:
+    yield from _named(robot, "joint")
+
+
+def joints_have_a_type(robot: Element) -> Iterator[str]:
+    for joint in robot.iterfind("joint"):
+        kind = joint.get("type", "")
+        if kind not in JOINT_TYPES:
+            yield f"joint {_name(joint)} has type {kind!r}; {nearest(kind, JOINT_TYPES)}"
+
+
+def attributes_are_there(robot: Element) -> Iterator[str]:
+    for owner, element in _elements(robot):
+        for attribute in _REQUIRED.get(element.tag, ()):
+            if not element.get(attribute):
+                yield f"<{element.tag}> of {_called(owner)} needs {attribute}=."
+
+
+def numbers_are_finite(robot: Element) -> Iterator[str]:
+    for owner, element in _elements(robot):
+        for attribute, count in _NUMBERS.get(element.tag, {}).items():
+            text = element.get(attribute)
+            if text is not None and (problem := _number_problem(text, count, element.tag)):
+                place = f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)}"
+                yield f"{place} must be {problem}."
+
+
+def joints_connect_links(robot: Element) -> Iterator[str]:
+    links = {link.get("name", "") for link in robot.iterfind("link")}
+    for joint in robot.iterfind("joint"):
+        for end in ("parent", "child"):
+            link = _end(joint, end)
+            if not link:
+                yield f"joint {_name(joint)} needs <{end} link=...>."
+            elif link not in links:
+                yield f"joint {_name(joint)} has {end} link {link!r}, which does not exist: " + (
+                    nearest(link, links)
+                )
+
+
+def links_have_one_parent(robot: Element) -> Iterator[str]:
+    parents: dict[str, str] = {}
+    for joint in robot.iterfind("joint"):
+        child = _end(joint, "child")
+        if child in parents:
+            yield (
+                f"link {child!r} hangs from two joints, {parents[child]} and {_name(joint)}: "
+                "a URDF is a tree, so cut the loop at one of them."
+            )
+        parents[child] = _name(joint)
+
+
+def links_form_one_tree(robot: Element) -> Iterator[str]:
+    parent = {_end(j, "child"): _end(j, "parent") for j in robot.iterfind("joint")}
+    links = [link.get("name", "") for link in robot.iterfind("link")]
+    grounded = set(links) - set(parent)
+    for link in links:
+        walked = {}
+        while link not in grounded and link not in walked:
+            walked[link] = None
+            link = parent[link]
+        if link in walked:
+            yield f"link {link!r} is its own ancestor: a URDF is a tree, so cut that cycle."
+            return
+        grounded.update(walked)
+    roots = [link for link in links if link not in parent]
+    if len(roots) > 1:
+        yield (
+            f"it has {len(roots)} root links ({', '.join(map(repr, roots[:4]))}): "
+            "connect all but one to the tree with a joint."
+        )
+
+
+def masses_are_not_negative(robot: Element) -> Iterator[str]:
+    for link in robot.iterfind("link"):
+        for mass in link.iterfind("inertial/mass"):
+            if float(mass.get("value", "0")) < 0.0:
+                yield f"link {_name(link)} has mass {mass.get('value')} kg: give 0 or more."
+
+
+def inertias_are_complete(robot: Element) -> Iterator[str]:
+    for link in robot.iterfind("link"):
+        for inertial in link.iterfind("inertial"):
+            for tag in ("mass", "inertia"):
+                if inertial.find(tag) is None:
+                    yield f"<inertial> of link {_name(link)} needs a <{tag}>."
+
+
+def inertias_are_positive(robot: Element) -> Iterator[str]:
+    for link in robot.iterfind("link"):
+        for inertia in link.iterfind("inertial/inertia"):
+            xx, xy, xz, yy, yz, zz = (float(inertia.get(key, "0")) for key in _INERTIA)
+            values = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            if values[0] < -INERTIA_TOLERANCE - 1e-6 * abs(values[-1]):
+                yield (
+                    f"link {_name(link)} has a principal inertia of {values[0]:.3g} kg m^2: "
+                    "the inertia tensor must be positive semi-definite; check ixx ... izz."
+                )
+
+
+def shapes_have_a_size(robot: Element) -> Iterator[str]:
+    for owner, element in _elements(robot):
+        for attribute in ("size", "radius", "length"):
+            text = element.get(attribute) if element.tag in _NUMBERS else None
+            if text is not None and min(map(float, text.split())) < 0.0:
+                yield f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)} is negative."
+
+
+def axes_are_not_zero(robot: Element) -> Iterator[str]:
+    for joint in robot.iterfind("joint"):
+        axis = joint.find("axis")
+        if axis is None or joint.get("type") in ("fixed", "floating"):
+            continue
+        if math.hypot(*map(float, axis.get("xyz", "1 0 0").split())) < 1e-9:
+            yield f"joint {_name(joint)} has the axis {axis.get('xyz')!r}: give it a direction."
+
+
+def limits_are_ordered(robot: Element) -> Iterator[str]:
+    for joint in robot.iterfind("joint"):
+        limit = joint.find("limit")
+        if limit is None:
+            if joint.get("type") in ("revolute", "prismatic"):
+                yield (
+                    f"joint {_name(joint)} is {joint.get('type')} and needs "
+                    "<limit lower= upper= effort= velocity=>."
+                )
+            continue
+        lower, upper = limit.get("lower", "0"), limit.get("upper", "0")
+        if float(lower) > float(upper):
+            yield f"joint {_name(joint)} has limits with lower={lower} above upper={upper}."
+        for attribute in ("effort", "velocity"):
+            if float(limit.get(attribute, "0")) < 0.0:
+                yield f"joint {_name(joint)} has a negative {attribute} limit: give 0 or more."
+
+
+def joints_mimic_others(robot: Element) -> Iterator[str]:
+    for joint in robot.iterfind("joint"):
+        for mimic in joint.iterfind("mimic"):
+            if mimic.get("joint") == joint.get("name"):
+                yield f"joint {_name(joint)} mimics itself: name another joint or drop <mimic>."
+
+
+def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
+    for owner, element in _elements(robot):
+        filename = element.get("filename", "") if element.tag in ("mesh", "texture") else ""
+        scheme, separator, rest = filename.partition("://")
+        package = rest.split("/", 1)[0]
+        inside = posixpath.normpath(rest).startswith(f"{package}/")
+        if separator and scheme != "file" and (package in ("", ".", "..") or not inside):
+            yield (
+                f"{element.tag} {_short(filename)} of {_called(owner)} leaves its package: "
+                "write package://<package>/<path inside it>."
+            )
+
+
+RULES: tuple[Rule, ...] = (
+    links_are_named,
+    joints_are_named,
+    joints_have_a_type,
+    attributes_are_there,
+    numbers_are_finite,
+    joints_connect_links,
+    links_have_one_parent,
+    links_form_one_tree,
+    inertias_are_complete,
+    masses_are_not_negative,
+    inertias_are_positive,
+    shapes_have_a_size,
+    axes_are_not_zero,
+    limits_are_ordered,
+    joints_mimic_others,
+    meshes_stay_in_their_package,
+)
+"""In this order: a rule may rely on those before it."""
+
+
+def _named(robot: Element, tag: str) -> Iterator[str]:
+    names = Counter(element.get("name", "") for element in robot.iterfind(tag))
+    for name, count in names.items():
+        if not name.strip():
+            yield f"a <{tag}> has no name: every {tag} needs name=."
+        elif count > 1:
+            yield f"{tag} {name!r} is there {count} times: {tag} names must be unique."
+
+
+def _elements(robot: Element) -> Iterator[tuple[Element, Element]]:
+    """(link or joint, element inside it) for everything that Pinocchio reads."""
+    for link in robot.iterfind("link"):
+        for tag in ("inertial", "visual", "collision"):
+            for part in link.iterfind(tag):
+                yield from ((link, element) for element in part.iter())
+    for joint in robot.iterfind("joint"):
+        yield from ((joint, element) for element in joint)
+
+
+def _number_problem(text: str, count: int, tag: str) -> str:
+    words = text.split()
+    largest = MAXIMUM_LIMIT if tag == "limit" else MAXIMUM_MAGNITUDE
+    if len(words) != count:
+        return "one number" if count == 1 else f"{count} numbers separated by spaces"
+    if not all(_NUMBER.fullmatch(word) for word in words):
+        return "a plain finite number such as 1.5 (decimal point, no units)"
+    if max(abs(float(word)) for word in words) > largest:
+        return f"at most {largest:g} in size"
+    return ""
+
+
+def _end(joint: Element, tag: str) -> str:
+    element = joint.find(tag)
+    return "" if element is None else element.get("link", "")
+
+
+def _called(owner: Element) -> str:
+    return f"{owner.tag} {_name(owner)}"
+
+
+def _name(element: Element) -> str:
+    return repr(element.get("name", ""))
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else text[:57] + "...")
