@@ -52,7 +52,7 @@ class Tab:
     def open(self, url: str) -> None:
         """Go to a page and wait until its meshcat viewer has drawn something."""
         self.call("Page.navigate", url=url)
-        ready = "typeof viewer == 'object' && viewer.scene_tree.children['robot'] !== undefined"
+        ready = "typeof viewer == 'object' && viewer.scene_tree.children['meshcat'] !== undefined"
         self.until(ready)
 
     def until(self, condition: str) -> None:

@@ -44,7 +44,7 @@ def test_every_shipped_scene_loads(name: str) -> None:
     task = load_task(example(name))
     assert task.name == name
     assert task.limits == "none"
-    assert [effect.key for effect in task.scene.effects][0] == "gravity"
+    assert task.scene.effects[0].key == "gravity"
 
 
 @pytest.mark.parametrize("name", ["two_link_swing_up", "two_link_elbow", "two_link_reach"])

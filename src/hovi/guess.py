@@ -12,10 +12,16 @@ from hovi.errors import InputError, nearest
 from hovi.grid import DiscretePath, Grid
 from hovi.robot import Robot
 from hovi.schemes.polynomials import interval_rows
+from hovi.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
 """(q0, v0, q1, v1)."""
+
+
+BUMP_MODES = 8
+BUMP_AMPLITUDES = (0.2, 1.5)
+"""Range of a random bump's amplitude, in [rad] or [m]."""
 
 
 class Curve(Protocol):
@@ -65,22 +71,21 @@ def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
     return curve
 
 
-def random_curve(robot: Robot, boundary: Boundary, duration: float, seed: int) -> Curve:
-    """The cubic with a smooth random bump of up to about one turn, zero with its rate at both ends.
+def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
+    """A curve with a smooth random bump, zero with its rate at both ends.
 
-    x(s) = sum_j c_j (1 - cos 2 pi j s)/2 or s (1-s) sin(pi j s), with c_j falling like 1/j.
+    x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed, falling
+    like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
     """
     random = np.random.default_rng(seed)
-    amplitude = random.uniform(0.2, 3.0)
-    modes = 4
-    c = amplitude * random.standard_normal((modes, robot.nv)) / np.arange(1, modes + 1)[:, None]
-    base = cubic(robot, boundary, duration)
-    j = np.arange(1, modes + 1)
+    j = np.arange(1, BUMP_MODES + 1)
+    amplitude = random.uniform(*BUMP_AMPLITUDES)
+    c = amplitude * random.standard_normal((BUMP_MODES, robot.nv)) / np.sqrt(j)[:, None]
+    w = np.pi / duration
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
         q, v, a = base(t)
-        w = np.pi / duration
-        # sin(pi s) sin(j pi s) = (cos((j-1) pi s) - cos((j+1) pi s)) / 2
+        # sin(s) sin(j s) = (cos((j-1) s) - cos((j+1) s)) / 2
         low, high = np.outer(t, j - 1) * w, np.outer(t, j + 1) * w
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
@@ -102,6 +107,17 @@ def named_curve(name: str, robot: Robot, boundary: Boundary, duration: float) ->
     if name not in NAMED:
         raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
     return NAMED[name](robot, boundary, duration)
+
+
+def stretched(trajectory: Trajectory, duration: float) -> Curve:
+    """A motion as a curve over another duration."""
+    stretch = trajectory.duration / duration
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        sample = trajectory.sample(np.clip(t * stretch, 0.0, trajectory.duration))
+        return sample.q, sample.v * stretch, sample.a * stretch**2
+
+    return curve
 
 
 def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:

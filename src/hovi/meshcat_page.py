@@ -9,27 +9,29 @@ from __future__ import annotations
 
 import base64
 import html
+import importlib.util
 import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
-import meshcat.servers.zmqserver
 import umsgpack
 
-VIEWER_FOLDER = Path(meshcat.servers.zmqserver.VIEWER_ROOT).resolve()
+_MESHCAT = importlib.util.find_spec("meshcat")
+assert _MESHCAT is not None
+assert _MESHCAT.origin is not None
+VIEWER_FOLDER = Path(_MESHCAT.origin).parent / "viewer" / "dist"
 
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-1[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}")
 
-# The policy makes "no network" a rule that the browser enforces, not a hope.
+# meshcat's script merges the parts of a Collada file, and a part with several materials gets a
+# list of them where one is expected, which hides it: the UR5's shoulder, for instance.
 _PAGE = """<!DOCTYPE html>
 <html>
 <head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; \
-script-src 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
-img-src data: blob:; connect-src data: blob:">
+<meta charset="utf-8">{policy}
+<link rel="icon" href="data:,">
 <title>{title}</title>
 <style>
 body {{ margin: 0; font: 13px system-ui, sans-serif; }}
@@ -39,20 +41,35 @@ body {{ margin: 0; font: 13px system-ui, sans-serif; }}
 </head>
 <body>
 <div id="meshcat-pane"></div>
-<div id="caption">{caption}</div>
-<script>{meshcat}</script>
+<div id="caption">{title}</div>
+{meshcat}
 <script>
+const drawObject = MeshCat.Viewer.prototype.set_object;
+MeshCat.Viewer.prototype.set_object = function (path, object) {{
+    if (Array.isArray(object.material)) {{
+        object.material = object.material.map(m => Array.isArray(m) ? m[0] : m);
+    }}
+    return drawObject.call(this, path, object);
+}};
 var viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-for (const message of {messages}) {{
-    viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
-}}
-viewer.animator.mixer.timeScale = {speed};
 viewer.gui.__folders["Scene"].close();
-viewer.gui.open();
+{start}
 </script>
 </body>
 </html>
 """
+
+# The policy makes "no network" a rule that the browser enforces, not a hope.
+_POLICY = """
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; \
+script-src 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
+img-src data: blob:; connect-src data: blob:">"""
+
+_PLAY = """for (const message of {messages}) {{
+    viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
+}}
+viewer.animator.mixer.timeScale = {speed};
+viewer.gui.open();"""
 
 
 class Command(Protocol):
@@ -66,12 +83,15 @@ class Page:
     """A window for `meshcat.Visualizer` that keeps what is drawn.
 
     Messages that a later one overrides are dropped, so the page stays as small as its content.
+
+    title: of the browser's window, and a line in the page's corner.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self.web_url = ""
         self._messages: dict[tuple[str, str, str], bytes] = {}
         self._uuids: dict[bytes, bytes] = {}
-        self.web_url = ""
 
     def send(self, command: Command) -> None:
         """Keep a message; the name is meshcat's."""
@@ -93,19 +113,23 @@ class Page:
         # A browser in the middle of a motion may ask: the copy is one atomic step.
         return list(self._messages.values())
 
-    def html(self, title: str, caption: str, speed: float = 1.0) -> str:
+    def offline_html(self, speed: float = 1.0) -> str:
         """The page as one file with nothing left to fetch.
 
-        title: of the browser's window. caption: a line in the page's corner.
         speed: time scale of the animation.
         """
-        return _PAGE.format(
-            title=html.escape(title),
-            caption=html.escape(caption),
-            meshcat=(VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8"),
-            messages=json.dumps([base64.b64encode(m).decode() for m in self.messages]),
-            speed=float(speed),
-        )
+        script = (VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8")
+        messages = json.dumps([base64.b64encode(m).decode() for m in self.messages])
+        start = _PLAY.format(messages=messages, speed=float(speed))
+        return self._fill(_POLICY, f"<script>{script}</script>", start)
+
+    def live_html(self) -> str:
+        """The page that asks its server for what is drawn."""
+        return self._fill("", '<script src="main.min.js"></script>', "viewer.connect();")
+
+    def _fill(self, policy: str, meshcat: str, start: str) -> str:
+        title = html.escape(self.title)
+        return _PAGE.format(policy=policy, title=title, meshcat=meshcat, start=start)
 
     def _forget(self, path: str) -> None:
         inside = path.rstrip("/") + "/"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Mapping
 from typing import Any
 
 import tornado.httpserver
@@ -21,12 +20,13 @@ _HOST = "127.0.0.1"
 class ServedPage(Page):
     """A page that browsers see change while it changes.
 
+    title: of the page.
     port: port on the loopback interface; 0 for any free one.
     Raises DisplayError when the port cannot be had.
     """
 
-    def __init__(self, port: int = 0) -> None:
-        super().__init__()
+    def __init__(self, title: str, port: int = 0) -> None:
+        super().__init__(title)
         try:
             sockets = tornado.netutil.bind_sockets(port, _HOST)
         except (OSError, OverflowError) as error:
@@ -34,7 +34,7 @@ class ServedPage(Page):
                 f"cannot serve a page on port {port} of {_HOST}: {error}; "
                 "another program may hold it: choose another port, or 0 for any free one."
             ) from error
-        self.web_url = f"http://{_HOST}:{sockets[0].getsockname()[1]}/static/"
+        self.web_url = f"http://{_HOST}:{sockets[0].getsockname()[1]}/view/"
         self._browsers: set[_Browser] = set()
         self._connected = threading.Event()
         self._loop = asyncio.new_event_loop()
@@ -71,12 +71,14 @@ class ServedPage(Page):
             self._loop.close()
 
     def _listen(self, sockets: list[Any]) -> None:
-        files = {"path": str(VIEWER_FOLDER), "default_filename": "index.html"}
-        routes: list[tuple[str, type[tornado.web.RequestHandler], Mapping[str, Any]]] = [
-            (r"/static/(.*)", _ViewerFiles, files),
-            (r"/", _Browser, {"page": self}),
-        ]
-        application = tornado.web.Application([tornado.web.url(*route) for route in routes])
+        application = tornado.web.Application(
+            [
+                tornado.web.url(r"/view/", _LivePage, {"page": self}),
+                tornado.web.url(r"/view/(main.min.js)", _Script, {"path": str(VIEWER_FOLDER)}),
+                tornado.web.url(r"/", _Browser, {"page": self}),
+            ],
+            log_function=lambda handler: None,
+        )
         self._server = tornado.httpserver.HTTPServer(application)
         self._server.add_sockets(sockets)
 
@@ -94,8 +96,18 @@ class ServedPage(Page):
         self._browsers.discard(browser)
 
 
-class _ViewerFiles(tornado.web.StaticFileHandler):
-    """meshcat's page and script, never from a browser's cache."""
+class _LivePage(tornado.web.RequestHandler):
+    """The page itself."""
+
+    def initialize(self, page: ServedPage) -> None:
+        self.page = page
+
+    def get(self) -> None:
+        self.write(self.page.live_html())
+
+
+class _Script(tornado.web.StaticFileHandler):
+    """meshcat's script, never from a browser's cache."""
 
     def set_extra_headers(self, path: str) -> None:
         self.set_header("Cache-Control", "no-store")

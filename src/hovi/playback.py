@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import html as html_text
+import itertools
 import math
 import os
 import time
+import warnings
 import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-import meshcat
-import meshcat.animation
-import meshcat.geometry
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from pinocchio.visualize import MeshcatVisualizer
 
 from hovi.errors import DisplayError
 from hovi.meshcat_page import Page
@@ -28,11 +26,21 @@ from hovi.skeleton import skeleton
 from hovi.trajectory import Trajectory
 from hovi.whole_file import reason, whole_file
 
+with warnings.catch_warnings():
+    # meshcat imports a module that ZeroMQ calls obsolete; hovi does not use that part of it.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    import meshcat
+    import meshcat.animation
+    import meshcat.geometry
+    from pinocchio.visualize import MeshcatVisualizer
+
 Array = npt.NDArray[np.float64]
 
 _FIELD_OF_VIEW = math.radians(75.0)  # meshcat's camera, vertically
 _ELEVATION = 0.25
-_TRACE_COLOR = 0xCC79A7
+_MARGIN = 1.0
+_TRACE_COLOR = (0.80, 0.47, 0.65)
+_TRACE_WIDTH = 0.006  # of the picture's size
 _FRAME_RATE = 60.0
 _MAX_FRAMES = 20_000
 _VIEW_SAMPLES = 60
@@ -91,7 +99,7 @@ class Replay:
         if isinstance(self.page, ServedPage):
             source = f'src="{self.url}"'
         else:
-            source = f'srcdoc="{html_text.escape(_html(self.trajectory, self.page))}"'
+            source = f'srcdoc="{html_text.escape(self.page.offline_html())}"'
         return f'<iframe {source} style="width:100%;height:480px;border:none"></iframe>'
 
     def __enter__(self) -> Self:
@@ -131,7 +139,7 @@ def replay(
     if html is not None:
         return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
     robot = _robot(trajectory)
-    page = ServedPage(port)
+    page = ServedPage(_title(trajectory, robot), port)
     try:
         shown = Replay(trajectory, _draw(trajectory, robot, page, trace), page.web_url, page)
         announce(page.web_url)
@@ -159,10 +167,11 @@ def write_html(
     The same motion gives the same bytes. Arguments as in `replay`. Raises DisplayError.
     """
     _check_positive("speed", speed)
-    page = Page()
-    visualizer = _draw(trajectory, _robot(trajectory), page, trace)
+    robot = _robot(trajectory)
+    page = Page(_title(trajectory, robot))
+    visualizer = _draw(trajectory, robot, page, trace)
     page.keep(_animation(trajectory, visualizer, loop))
-    text = _html(trajectory, page, speed)
+    text = page.offline_html(speed)
     try:
         with whole_file(path) as stream:
             stream.write(text.encode())
@@ -198,12 +207,11 @@ def _draw(trajectory: Trajectory, robot: Robot, page: Page, trace: bool) -> Mesh
     visualizer.loadViewerModel(rootNodeName="robot")
     visualizer.setBackgroundColor("gray")
     visualizer.display(trajectory.q[0])
-    tip = robot.frame_position(robot.tip_frame, _along(trajectory, _TRACE_SAMPLES))
+    lower, upper = _swept_box(visualizer, _along(trajectory, _VIEW_SAMPLES))
     if trace:
-        material = meshcat.geometry.LineBasicMaterial(color=_TRACE_COLOR, linewidth=3)
-        points = meshcat.geometry.PointsGeometry(tip.T.astype(np.float32))
-        visualizer.viewer["trace"].set_object(meshcat.geometry.Line(points, material))
-    _aim_camera(visualizer, *_swept_box(visualizer, _along(trajectory, _VIEW_SAMPLES)))
+        tip = robot.frame_position(robot.tip_frame, _along(trajectory, _TRACE_SAMPLES))
+        _draw_trace(visualizer, tip, _TRACE_WIDTH * float(np.linalg.norm(upper - lower)))
+    _set_the_stage(visualizer, lower, upper)
     return visualizer
 
 
@@ -215,35 +223,56 @@ def _along(trajectory: Trajectory, most: int) -> Array:
 
 def _swept_box(visualizer: MeshcatVisualizer, q: Array) -> tuple[Array, Array]:
     """Lower and upper corner of what the drawn robot passes through, each (3,), in [m]."""
-    items = visualizer.visual_model.geometryObjects
-    lower, upper = np.zeros(3), np.zeros(3)  # the base belongs to the picture
-    for item in items:
-        item.geometry.computeLocalAABB()
+    corners = [_corners(item) for item in visualizer.visual_model.geometryObjects]
+    points = [np.zeros((1, 3))]  # the base belongs to the picture
     for placements in _placements(visualizer, q):
-        for item, place in zip(items, placements, strict=True):
-            scale = np.abs(item.meshScale)
-            center = place.act(item.geometry.aabb_center * scale)
-            radius = item.geometry.aabb_radius * scale.max()
-            lower = np.minimum(lower, center - radius)
-            upper = np.maximum(upper, center + radius)
-    return lower, upper
+        pairs = zip(corners, placements, strict=True)
+        points += [c @ place.rotation.T + place.translation for c, place in pairs]
+    swept = np.concatenate(points)
+    return swept.min(axis=0), swept.max(axis=0)
 
 
-def _aim_camera(visualizer: MeshcatVisualizer, lower: Array, upper: Array) -> None:
-    """Look across the larger horizontal extent, from far enough to have everything in view."""
+def _corners(item: pin.GeometryObject) -> Array:
+    """Corners of a drawn object's own bounding box, shape (8, 3), in [m]."""
+    item.geometry.computeLocalAABB()
+    box = item.geometry.aabb_local
+    choices = np.array(list(itertools.product((0, 1), repeat=3)))
+    corners: Array = np.where(choices, box.max_, box.min_)
+    return corners
+
+
+def _draw_trace(visualizer: MeshcatVisualizer, points: Array, width: float) -> None:
+    """A path as close points: browsers draw lines one pixel wide, whatever is asked."""
+    colors = np.tile(_TRACE_COLOR, (len(points), 1))
+    geometry = meshcat.geometry.PointsGeometry(*(x.T.astype(np.float32) for x in (points, colors)))
+    material = meshcat.geometry.PointsMaterial(size=width)
+    visualizer.viewer["trace"].set_object(meshcat.geometry.Points(geometry, material))
+
+
+def _set_the_stage(visualizer: MeshcatVisualizer, lower: Array, upper: Array) -> None:
+    """Look across the larger horizontal extent, from far enough to have everything in view.
+
+    meshcat's camera turns about the world's origin, so the middle of the motion is put there.
+    """
     size, center = upper - lower, 0.5 * (lower + upper)
     aside = np.array([size[1], -size[0], 0.0])
-    direction = aside / np.linalg.norm(aside) + np.array([0.0, 0.0, _ELEVATION])
-    distance = 0.5 * float(np.linalg.norm(size)) / math.sin(_FIELD_OF_VIEW / 2)
+    direction = aside / max(float(np.linalg.norm(aside)), 1e-12) + np.array([0, 0, _ELEVATION])
+    diagonal = max(float(np.linalg.norm(size)), 1e-3)
+    distance = _MARGIN * 0.5 * diagonal / math.sin(_FIELD_OF_VIEW / 2)
     x, y, z = distance * direction / np.linalg.norm(direction)
-    target, floor = np.eye(4), np.eye(4)
-    target[:3, 3], floor[2, 3] = center, lower[2]
     viewer = visualizer.viewer
-    viewer["/Cameras/default"].set_transform(target)
     camera = viewer["/Cameras/default/rotated/<object>"]
     camera.set_property("position", [x, z, -y])  # this node's y points up
     camera.set_property("far", max(100.0, 4 * distance))
-    viewer["/Grid"].set_transform(floor)
+    viewer["/meshcat"].set_transform(_shift(-center))
+    viewer["/Grid"].set_transform(_shift(np.array([-center[0], -center[1], lower[2] - center[2]])))
+    viewer["/Axes"].set_transform(_shift(-center) @ np.diag([*np.full(3, 0.2 * diagonal), 1.0]))
+
+
+def _shift(offset: Array) -> Array:
+    placement = np.eye(4)
+    placement[:3, 3] = offset
+    return placement
 
 
 def _placements(visualizer: MeshcatVisualizer, q: Array) -> list[list[pin.SE3]]:
@@ -267,11 +296,10 @@ def _animation(
     animation = meshcat.animation.Animation()
     for number, item in enumerate(visualizer.visual_model.geometryObjects):
         places = [frame[number] for frame in placements]
+        turns = [pin.Quaternion(place.rotation).coeffs() for place in places]
         tracks = {
             "position": _track("position", "vector3", times, [p.translation for p in places]),
-            "quaternion": _track(
-                "quaternion", "quaternion", times, [pin.Quaternion(p.rotation).coeffs() for p in places]
-            ),
+            "quaternion": _track("quaternion", "quaternion", times, turns),
         }
         node = visualizer.viewer[visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL)]
         animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
@@ -289,9 +317,8 @@ def _track(
     )
 
 
-def _html(trajectory: Trajectory, page: Page, speed: float = 1.0) -> str:
-    name = _robot(trajectory).name
-    return page.html(f"hovi: {name}", f"{name}, {trajectory.duration:g} s", speed)
+def _title(trajectory: Trajectory, robot: Robot) -> str:
+    return f"{robot.name}, {trajectory.duration:g} s"
 
 
 def _check_positive(name: str, value: float) -> None:

@@ -9,7 +9,7 @@ double, a velocity or effort limit of 0 in the file stays 0.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,18 +18,18 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi import robot_model
+from hovi import configuration, robot_model
 from hovi.errors import InputError, ModelError, nearest
-from hovi.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.example_robots import BUILT_IN_CODE, build_in_code
 from hovi.robot_geometry import Shapes, load_shapes
+from hovi.robot_reading import example_source, file_source, is_path
 from hovi.robot_report import describe
-from hovi.robot_source import RobotSource, text_hash
-from hovi.urdf_check import MAXIMUM_FREEDOM, check_urdf, read_urdf
+from hovi.robot_source import RobotSource
+from hovi.urdf_check import MAXIMUM_FREEDOM
+
+__all__ = ["Robot", "RobotSource", "load_robot"]
 
 Array = npt.NDArray[np.float64]
-
-UNIT_TOLERANCE = 1e-4
-"""How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +67,7 @@ class Robot:
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
         """One name per velocity, (nv,): the joint's name, with [i] where it has several."""
-        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
-        return tuple(
-            name if joint.nv == 1 else f"{name}[{i}]" for name, joint in pairs for i in range(joint.nv)
-        )
+        return configuration.entry_names(self.model, "nv")
 
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:
@@ -169,13 +166,13 @@ class Robot:
         """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq)."""
         if self.vector_joints:
             return np.asarray(q, dtype=float) + dq
-        return self._each(pin.integrate, (q, self.nq), (dq, self.nv), self.nq)
+        return configuration.integrate(self.model, q, dq)
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq)."""
         if self.vector_joints:
             return np.asarray(q1, dtype=float) - q0
-        return self._each(pin.difference, (q0, self.nq), (q1, self.nq), self.nv)
+        return configuration.difference(self.model, q0, q1)
 
     def frame_position(self, frame: str, q: Array) -> Array:
         """Where a frame's origin is in the world, in [m]: q (M, nq) -> (M, 3)."""
@@ -183,27 +180,23 @@ class Robot:
             raise InputError(
                 f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
             )
-        index, data = self.model.getFrameId(frame), self.model.createData()
-        positions = np.empty((len(q), 3))
-        for position, one in zip(positions, np.asarray(q, dtype=float), strict=True):
-            pin.forwardKinematics(self.model, data, one)
-            position[:] = pin.updateFramePlacement(self.model, data, index).translation
-        return positions
+        index = self.model.getFrameId(frame)
+        return configuration.frame_position(self.model, index, np.asarray(q, dtype=float))
 
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.
 
         name: what the argument is called, for the message. Raises InputError.
         """
-        checked = self._check_vector(q, name, self.nq, self._position_names())
+        checked = configuration.check_vector(q, name, configuration.entry_names(self.model, "nq"))
         if self.vector_joints:
             return checked
-        self._check_unit_norms(checked, name)
+        configuration.check_unit_norms(self.model, checked, name)
         return np.array(pin.normalize(self.model, checked), dtype=float)
 
     def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
         """`v` as a finite float array (nv,). Raises InputError naming the joint."""
-        return self._check_vector(v, name, self.nv, self.coordinate_names)
+        return configuration.check_vector(v, name, self.coordinate_names)
 
     def check_mass_matrix(self) -> None:
         """Raise ModelError if M(q) is singular to working precision (see robot_model)."""
@@ -235,55 +228,6 @@ class Robot:
         """What a worker process needs: the fields, without shapes that are loaded on demand."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def _each(self, function: Any, first: Any, second: Any, size: int) -> Array:
-        """Apply a function of two vectors over all (broadcast) leading axes."""
-        (x, nx), (y, ny) = first, second
-        x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        lead = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
-        rows_x = np.broadcast_to(x, (*lead, nx)).reshape(-1, nx)
-        rows_y = np.broadcast_to(y, (*lead, ny)).reshape(-1, ny)
-        result = np.empty((len(rows_x), size))
-        for row, one, other in zip(result, rows_x, rows_y, strict=True):
-            row[:] = function(self.model, one, other)
-        return result.reshape(*lead, size)
-
-    def _position_names(self) -> tuple[str, ...]:
-        """One name per entry of q, (nq,)."""
-        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
-        return tuple(
-            name if joint.nq == 1 else f"{name}[{i}]" for name, joint in pairs for i in range(joint.nq)
-        )
-
-    def _check_vector(
-        self, value: npt.ArrayLike, name: str, size: int, names: tuple[str, ...]
-    ) -> Array:
-        try:
-            vector = np.array(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{name} must be {size} numbers, not {value!r}.") from error
-        if vector.shape != (size,):
-            raise InputError(
-                f"{name} has shape {vector.shape}, expected ({size},): "
-                f"one number each for {', '.join(names)}."
-            )
-        for entry, joint in zip(vector, names, strict=True):
-            if not np.isfinite(entry):
-                raise InputError(f"{name} is {entry} at joint {joint!r}: give a finite number.")
-        return vector
-
-    def _check_unit_norms(self, q: Array, name: str) -> None:
-        for joint_name in self.manifold_joints:
-            joint = self.model.joints[self.model.getJointId(joint_name)]
-            part = slice(joint.idx_q, joint.idx_q + joint.nq)
-            alone = self.neutral()
-            alone[part] = q[part]
-            if not pin.isNormalized(self.model, alone, UNIT_TOLERANCE):
-                raise InputError(
-                    f"{name} is {q[part].tolist()} at joint {joint_name!r}, which is not of unit "
-                    f"norm: a joint with nq={joint.nq}, nv={joint.nv} holds a unit quaternion "
-                    "(x, y, z, w) or (cos, sin) of its angle; normalize it."
-                )
-
 
 def load_robot(
     x: str | Path | pin.Model,
@@ -309,59 +253,21 @@ def load_robot(
     if isinstance(x, pin.Model):
         return _from_model(x, x.name, names, (visual, collision))
     if not isinstance(x, str | Path):
-        raise ModelError(
-            f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}."
-        )
-    if isinstance(x, str) and not _is_path(x):
-        if x in BUILT_IN_CODE:
-            model, *shapes = build_in_code(x)
-            return _from_model(model, x, names, (shapes[0], shapes[1]))
-        source = _example_source(x, folders, free_flyer)
+        raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
+    if isinstance(x, Path) or is_path(x):
+        source = file_source(Path(x), folders, names, bool(free_flyer))
+    elif x in BUILT_IN_CODE:
+        model, *shapes = build_in_code(x)
+        return _from_model(model, x, names, (shapes[0], shapes[1]))
     else:
-        source = _file_source(Path(x), folders, bool(free_flyer))
-    source = replace(source, locked=names)
+        source = example_source(x, folders, names, free_flyer)
     model = robot_model.build_model(source)
-    return Robot(x if source.kind == "example" else model.name, model, source)  # type: ignore[arg-type]
-
-
-def _is_path(text: str) -> bool:
-    return text.lower().endswith((".urdf", ".xml")) or "/" in text or "\\" in text
+    return Robot(source.reference if source.kind == "example" else model.name, model, source)
 
 
 def _names(values: Iterable[Any]) -> tuple[Any, ...]:
     """Names as a tuple; a single one may come without brackets."""
     return (values,) if isinstance(values, str | Path) else tuple(values)
-
-
-def _file_source(path: Path, folders: tuple[str, ...], free_flyer: bool) -> RobotSource:
-    text = read_urdf(path)
-    check_urdf(text, path.name, (str(path.parent.absolute()), *folders))
-    return RobotSource(
-        kind="urdf",
-        reference=path.name,
-        urdf=text,
-        sha256=text_hash(text),
-        package_dirs=folders,
-        free_flyer=free_flyer,
-        folder=str(path.parent.absolute()),
-    )
-
-
-def _example_source(name: str, folders: tuple[str, ...], free_flyer: bool | None) -> RobotSource:
-    example = example_robot(name)
-    text = read_urdf(example.urdf)
-    source = RobotSource(
-        kind="example",
-        reference=name,
-        urdf=text,
-        sha256=text_hash(text),
-        package_dirs=folders,
-        free_flyer=example.free_flyer if free_flyer is None else free_flyer,
-    )
-    if example.srdf is None:
-        return source
-    full = robot_model.build_full_model(source)
-    return replace(source, armature=rotor_armature(full, example.srdf))
 
 
 def _from_model(

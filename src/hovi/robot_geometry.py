@@ -1,8 +1,8 @@
 """The shapes of a robot, loaded when somebody looks at them: planning never waits for a mesh.
 
 Mesh names come from strangers, so each must lie inside its own package folder (or, for plain
-paths, inside the URDF's folder or one of `package_dirs`). A shape whose mesh is missing or lies
-outside is left out and the reason is kept; the robot stays usable.
+paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`). A shape
+whose mesh is missing or lies outside is left out and the reason is kept; the robot stays usable.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hovi.robot_source import RobotSource
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """What could be loaded (None for nothing), and a sentence about what could not ("" for none)."""
+    """What could be loaded (None for nothing), and what could not, in a sentence or ""."""
 
     geometry: pin.GeometryModel | None
     problem: str
@@ -63,17 +63,25 @@ def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path
     """(folder that must contain the mesh, place of the mesh), in the order of search."""
     scheme, _, rest = filename.rpartition("://")
     if scheme in ("package", "model"):
+        rest = rest.lstrip("/")
         package = rest.split("/", 1)[0]
         for folder in _package_folders(package, source):
             yield folder, Path(os.path.normpath(folder.parent / rest))
         return
-    folders = [Path(folder) for folder in (source.folder, *source.package_dirs) if folder]
     path = Path(rest)
+    pairs = [(Path(folder), Path(folder)) for folder in source.package_dirs]
+    if source.folder:
+        pairs.insert(0, (_package_root(Path(source.folder)), Path(source.folder)))
     if path.is_absolute():
-        allowed = [folder for folder in folders if _inside(Path(os.path.normpath(path)), folder)]
-        folders = allowed or folders[:1]
-    for folder in folders:
-        yield folder.absolute(), Path(os.path.normpath(folder.absolute() / path))
+        inside = [pair for pair in pairs if _inside(Path(os.path.normpath(path)), pair[0])]
+        pairs = inside or pairs[:1]
+    for root, folder in pairs:
+        yield root.absolute(), Path(os.path.normpath(folder.absolute() / path))
+
+
+def _package_root(folder: Path) -> Path:
+    """The folder of the ROS package that a folder belongs to, or the folder itself."""
+    return next((p for p in (folder, *folder.parents) if (p / "package.xml").is_file()), folder)
 
 
 def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
@@ -99,18 +107,27 @@ def _package_dirs(source: RobotSource) -> list[Path]:
 
 def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     """The URDF with absolute mesh names, without the shapes whose mesh is unusable, and why."""
-    root = ElementTree.fromstring(source.urdf or "")
+    robot = ElementTree.fromstring(source.urdf or "")
     problems = []
-    for link in root.iter("link"):
+    for link in robot.iterfind("link"):
         for shape in link.findall(kind):
-            for mesh in shape.iter("mesh"):
-                try:
-                    mesh.set("filename", f"file://{find_mesh(mesh.get('filename', ''), source)}")
-                except ModelError as error:
-                    problems.append(f"link {link.get('name')!r}: {error}")
-                    link.remove(shape)
-                    break
-    return ElementTree.tostring(root, encoding="unicode"), problems
+            if problem := _find_files(shape, source):
+                problems.append(f"link {link.get('name')!r}: {problem}")
+                link.remove(shape)
+    for material in robot.iterfind("material"):
+        if _find_files(material, source):
+            robot.remove(material)
+    return ElementTree.tostring(robot, encoding="unicode"), problems
+
+
+def _find_files(element: ElementTree.Element, source: RobotSource) -> str:
+    """Replace the names of meshes and textures below an element by places; or say what is wrong."""
+    for file in (*element.iter("mesh"), *element.iter("texture")):
+        try:
+            file.set("filename", f"file://{find_mesh(file.get('filename', ''), source)}")
+        except ModelError as error:
+            return str(error)
+    return ""
 
 
 def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:

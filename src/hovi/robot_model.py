@@ -54,12 +54,12 @@ def reduce_with_geometry(
 
 
 def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
-    """Pinocchio's indices of joints. Raises ModelError with the nearest names for an unknown one."""
+    """Pinocchio's indices of joints. Raises ModelError for an unknown name."""
     movable = list(model.names)[1:]
     for name in names:
         if name not in movable:
             raise ModelError(
-                f"robot {model.name!r} has no joint {name!r} to lock: {nearest(name, movable)}"
+                f"robot {model.name!r} has no joint {name!r}: {nearest(name, movable)}"
             )
     return [model.getJointId(name) for name in names]
 
@@ -67,43 +67,53 @@ def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
 def check_mass_matrix(model: pin.Model) -> None:
     """Refuse a model whose mass matrix M(q) is singular to working precision.
 
-    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at the neutral and at three fixed
-    random configurations. Raises ModelError naming the joint that nothing resists.
+    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations (at
+    the neutral one a sound robot may be singular: a bob that hangs straight down resists no
+    turn about the vertical). Raises ModelError naming the joints that nothing resists.
     """
     data = model.createData()
-    for q in _sample_configurations(model):
+    for q in _sample_configurations(model) if model.nv else ():
         upper = np.triu(pin.crba(model, data, q))
         mass = upper + np.triu(upper, 1).T  # (nv, nv)
         values, vectors = np.linalg.eigh(mass)
-        if not values[0] > 10.0 * model.nv * np.finfo(float).eps * values[-1]:
-            raise ModelError(_singular_mass_sentence(model, vectors[:, 0]))
+        free = values <= 10.0 * model.nv * np.finfo(float).eps * values[-1]
+        if free.any():
+            share = np.sum(vectors[:, free] ** 2, axis=1)  # (nv,)
+            raise ModelError(_singular_mass_sentence(model, share))
 
 
 def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:
+    pairs = tuple(armature)
     values = np.array(model.armature, dtype=float)
-    for name, value in armature:
-        values[model.joints[model.getJointId(name)].idx_v] = value
+    for joint, (_, value) in zip(joint_ids(model, [n for n, _ in pairs]), pairs, strict=True):
+        values[model.joints[joint].idx_v] = value
     model.armature = values
     return model
 
 
 def _sample_configurations(model: pin.Model) -> Iterator[Array]:
-    neutral = pin.neutral(model)
-    yield neutral
     rng = np.random.default_rng(0)
-    for _ in range(3):
-        yield pin.integrate(model, neutral, rng.uniform(-1.0, 1.0, model.nv))
+    for _ in range(4):
+        yield pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, model.nv))
 
 
-def _singular_mass_sentence(model: pin.Model, direction: Array) -> str:
-    """Name the last joint that takes part in the direction (nv,) without inertia."""
-    strong = np.flatnonzero(np.abs(direction) > 0.5 * np.abs(direction).max())
-    last = int(strong[-1])
-    joint = max(j for j in range(1, model.njoints) if model.joints[j].idx_v <= last)
-    links = [f.name for f in model.frames if f.parentJoint == joint and f.type == pin.BODY]
-    carried = f" (link {links[0]!r})" if links else ""
+def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
+    """Name the joints with the largest shares (nv,) in the directions without inertia."""
+    joints = [
+        index
+        for index, joint in enumerate(model.joints[1:], start=1)
+        if share[joint.idx_v : joint.idx_v + joint.nv].max() >= 0.5 * share.max()
+    ]
+    names = [str(model.names[joint]) for joint in joints]
+    moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
+    more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
     return (
-        f"the mass matrix of robot {model.name!r} is singular to working precision: joint "
-        f"{model.names[joint]!r}{carried} moves almost no mass and no inertia; give its link a "
-        f"mass and an inertia, or lock the joint with locked=[{model.names[joint]!r}]."
+        f"the mass matrix of robot {model.name!r} is singular to working precision, as nothing "
+        f"resists joint {moved}{more}: give what it moves a mass and an inertia, or lock it with "
+        f"locked={names!r}."
     )
+
+
+def _link_of(model: pin.Model, joint: int) -> str:
+    frames = (f for f in model.frames if f.parentJoint == joint and f.type == pin.BODY)
+    return next((f" (link {frame.name!r})" for frame in frames), "")

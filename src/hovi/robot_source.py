@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -50,9 +51,7 @@ class RobotSource:
         }
 
     @classmethod
-    def from_dict(
-        cls, data: Mapping[str, Any], package_dirs: tuple[str, ...] = ()
-    ) -> RobotSource:
+    def from_dict(cls, data: Mapping[str, Any], package_dirs: tuple[str, ...] = ()) -> RobotSource:
         """The source that `to_dict` wrote. Raises ModelError when it is not whole."""
         kind = _entry(data, "kind", str)
         if kind not in get_args(SourceKind):
@@ -66,20 +65,27 @@ class RobotSource:
                 "sha256: the file was damaged or edited; load the robot again from its URDF."
             )
         return cls(
-            kind=kind,  # type: ignore[arg-type]
+            kind=kind,
             reference=_entry(data, "reference", str),
             urdf=urdf,
             sha256=sha256,
             package_dirs=package_dirs,
             locked=tuple(str(name) for name in _entry(data, "locked", list)),
             free_flyer=_entry(data, "free_flyer", bool),
-            armature=tuple((str(k), float(v)) for k, v in _entry(data, "armature", dict).items()),
+            armature=_armature(_entry(data, "armature", dict)),
         )
 
 
 def text_hash(text: str) -> str:
     """The sha256 of a text in UTF-8, in hexadecimal."""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _armature(stored: dict[str, Any]) -> tuple[tuple[str, float], ...]:
+    for joint, value in stored.items():
+        if not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+            raise ModelError(f"the armature of joint {joint!r} must be 0 or more, not {value!r}.")
+    return tuple((joint, float(value)) for joint, value in stored.items())
 
 
 def _entry(data: Mapping[str, Any], key: str, expected: type) -> Any:

@@ -8,17 +8,15 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-import numpy.typing as npt
 
 from hovi.errors import InputError
-from hovi.grid import DiscretePath, Grid
-from hovi.guess import Curve, named_curve, path_on_grid
+from hovi.grid import DiscretePath
+from hovi.guess import named_curve, path_on_grid, stretched
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.problem import TrajectoryProblem
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
 
-Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
 
 
@@ -124,18 +122,7 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
         raise InputError(
             f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."
         )
-    return path_on_grid(_resampled(guess, grid), grid, boundary, robot)
-
-
-def _resampled(trajectory: Trajectory, grid: Grid) -> Curve:
-    """A trajectory as a curve over the grid's duration."""
-    stretch = trajectory.duration / grid.duration
-
-    def curve(t: Array) -> tuple[Array, Array, Array]:
-        sample = trajectory.sample(np.clip(t * stretch, 0.0, trajectory.duration))
-        return sample.q, sample.v * stretch, sample.a * stretch**2
-
-    return curve
+    return path_on_grid(stretched(guess, grid.duration), grid, boundary, robot)
 
 
 def _certify(

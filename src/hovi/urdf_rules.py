@@ -40,6 +40,10 @@ _NUMBERS: dict[str, dict[str, int]] = {
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
     "dynamics": {"damping": 1, "friction": 1},
     "mimic": {"multiplier": 1, "offset": 1},
+    "calibration": {"rising": 1, "falling": 1},
+    "safety_controller": dict.fromkeys(
+        ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), 1
+    ),
     "box": {"size": 3},
     "cylinder": {"radius": 1, "length": 1},
     "capsule": {"radius": 1, "length": 1},
@@ -56,20 +60,31 @@ _REQUIRED: dict[str, tuple[str, ...]] = {
     "mimic": ("joint",),
     "parent": ("link",),
     "child": ("link",),
+    "limit": ("effort", "velocity"),
+    "safety_controller": ("k_velocity",),
 }
 
 
+def the_robot_is_named(robot: Element) -> Iterator[str]:
+    """The robot has a name."""
+    if not robot.get("name", "").strip():
+        yield "<robot> needs name=."
+
+
 def links_are_named(robot: Element) -> Iterator[str]:
+    """There is a link, and every link has a name of its own."""
     if robot.find("link") is None:
         yield "it has no <link>: a robot needs at least one."
     yield from _named(robot, "link")
 
 
 def joints_are_named(robot: Element) -> Iterator[str]:
+    """Every joint has a name of its own."""
     yield from _named(robot, "joint")
 
 
 def joints_have_a_type(robot: Element) -> Iterator[str]:
+    """The type of a joint is one that URDF knows."""
     for joint in robot.iterfind("joint"):
         kind = joint.get("type", "")
         if kind not in JOINT_TYPES:
@@ -77,6 +92,7 @@ def joints_have_a_type(robot: Element) -> Iterator[str]:
 
 
 def attributes_are_there(robot: Element) -> Iterator[str]:
+    """Attributes without a default are written."""
     for owner, element in _elements(robot):
         for attribute in _REQUIRED.get(element.tag, ()):
             if not element.get(attribute):
@@ -84,6 +100,7 @@ def attributes_are_there(robot: Element) -> Iterator[str]:
 
 
 def numbers_are_finite(robot: Element) -> Iterator[str]:
+    """Numbers are what C reads as finite numbers, of a sane size, and as many as expected."""
     for owner, element in _elements(robot):
         for attribute, count in _NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
@@ -93,6 +110,7 @@ def numbers_are_finite(robot: Element) -> Iterator[str]:
 
 
 def joints_connect_links(robot: Element) -> Iterator[str]:
+    """Both ends of a joint are links of this robot."""
     links = {link.get("name", "") for link in robot.iterfind("link")}
     for joint in robot.iterfind("joint"):
         for end in ("parent", "child"):
@@ -106,6 +124,7 @@ def joints_connect_links(robot: Element) -> Iterator[str]:
 
 
 def links_have_one_parent(robot: Element) -> Iterator[str]:
+    """A link is the child of one joint at most."""
     parents: dict[str, str] = {}
     for joint in robot.iterfind("joint"):
         child = _end(joint, "child")
@@ -118,11 +137,12 @@ def links_have_one_parent(robot: Element) -> Iterator[str]:
 
 
 def links_form_one_tree(robot: Element) -> Iterator[str]:
+    """There is no cycle, and one root."""
     parent = {_end(j, "child"): _end(j, "parent") for j in robot.iterfind("joint")}
     links = [link.get("name", "") for link in robot.iterfind("link")]
     grounded = set(links) - set(parent)
     for link in links:
-        walked = {}
+        walked: dict[str, None] = {}
         while link not in grounded and link not in walked:
             walked[link] = None
             link = parent[link]
@@ -139,6 +159,7 @@ def links_form_one_tree(robot: Element) -> Iterator[str]:
 
 
 def masses_are_not_negative(robot: Element) -> Iterator[str]:
+    """Masses are 0 or more."""
     for link in robot.iterfind("link"):
         for mass in link.iterfind("inertial/mass"):
             if float(mass.get("value", "0")) < 0.0:
@@ -146,6 +167,7 @@ def masses_are_not_negative(robot: Element) -> Iterator[str]:
 
 
 def inertias_are_complete(robot: Element) -> Iterator[str]:
+    """An inertial element holds both a mass and an inertia."""
     for link in robot.iterfind("link"):
         for inertial in link.iterfind("inertial"):
             for tag in ("mass", "inertia"):
@@ -154,6 +176,7 @@ def inertias_are_complete(robot: Element) -> Iterator[str]:
 
 
 def inertias_are_positive(robot: Element) -> Iterator[str]:
+    """Inertia tensors are positive semi-definite, up to the rounding of CAD exports."""
     for link in robot.iterfind("link"):
         for inertia in link.iterfind("inertial/inertia"):
             xx, xy, xz, yy, yz, zz = (float(inertia.get(key, "0")) for key in _INERTIA)
@@ -166,6 +189,7 @@ def inertias_are_positive(robot: Element) -> Iterator[str]:
 
 
 def shapes_have_a_size(robot: Element) -> Iterator[str]:
+    """Shapes are not inside out."""
     for owner, element in _elements(robot):
         for attribute in ("size", "radius", "length"):
             text = element.get(attribute) if element.tag in _NUMBERS else None
@@ -174,6 +198,7 @@ def shapes_have_a_size(robot: Element) -> Iterator[str]:
 
 
 def axes_are_not_zero(robot: Element) -> Iterator[str]:
+    """A joint that moves along or about an axis has one."""
     for joint in robot.iterfind("joint"):
         axis = joint.find("axis")
         if axis is None or joint.get("type") in ("fixed", "floating"):
@@ -183,6 +208,7 @@ def axes_are_not_zero(robot: Element) -> Iterator[str]:
 
 
 def limits_are_ordered(robot: Element) -> Iterator[str]:
+    """Limits are there where URDF demands them, ordered and not negative."""
     for joint in robot.iterfind("joint"):
         limit = joint.find("limit")
         if limit is None:
@@ -201,6 +227,7 @@ def limits_are_ordered(robot: Element) -> Iterator[str]:
 
 
 def joints_mimic_others(robot: Element) -> Iterator[str]:
+    """No joint mimics itself."""
     for joint in robot.iterfind("joint"):
         for mimic in joint.iterfind("mimic"):
             if mimic.get("joint") == joint.get("name"):
@@ -208,9 +235,11 @@ def joints_mimic_others(robot: Element) -> Iterator[str]:
 
 
 def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
+    """A package:// name does not climb out of its package."""
     for owner, element in _elements(robot):
         filename = element.get("filename", "") if element.tag in ("mesh", "texture") else ""
         scheme, separator, rest = filename.partition("://")
+        rest = rest.lstrip("/")
         package = rest.split("/", 1)[0]
         inside = posixpath.normpath(rest).startswith(f"{package}/")
         if separator and scheme != "file" and (package in ("", ".", "..") or not inside):
@@ -221,6 +250,7 @@ def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
 
 
 RULES: tuple[Rule, ...] = (
+    the_robot_is_named,
     links_are_named,
     joints_are_named,
     joints_have_a_type,
@@ -251,18 +281,19 @@ def _named(robot: Element, tag: str) -> Iterator[str]:
 
 
 def _elements(robot: Element) -> Iterator[tuple[Element, Element]]:
-    """(link or joint, element inside it) for everything that Pinocchio reads."""
+    """(link, joint or material, element inside it) for everything that Pinocchio reads."""
     for link in robot.iterfind("link"):
         for tag in ("inertial", "visual", "collision"):
             for part in link.iterfind(tag):
                 yield from ((link, element) for element in part.iter())
-    for joint in robot.iterfind("joint"):
-        yield from ((joint, element) for element in joint)
+    for tag in ("joint", "material"):
+        for owner in robot.iterfind(tag):
+            yield from ((owner, element) for element in owner)
 
 
 def _number_problem(text: str, count: int, tag: str) -> str:
     words = text.split()
-    largest = MAXIMUM_LIMIT if tag == "limit" else MAXIMUM_MAGNITUDE
+    largest = MAXIMUM_LIMIT if tag in ("limit", "safety_controller") else MAXIMUM_MAGNITUDE
     if len(words) != count:
         return "one number" if count == 1 else f"{count} numbers separated by spaces"
     if not all(_NUMBER.fullmatch(word) for word in words):

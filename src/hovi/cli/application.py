@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 from typing import Annotated
 
 import typer
 
+from hovi import __version__
 from hovi.cli import export_command, info_command, plan_command, plot_command, replay_command
 
 app = typer.Typer(
@@ -19,7 +19,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"hovi {importlib.metadata.version('hovi')}")
+        print(f"hovi {__version__}")
         raise typer.Exit
 
 

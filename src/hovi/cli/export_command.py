@@ -17,10 +17,9 @@ def export(
     rate: Annotated[float, typer.Option(help="Samples per second.")] = 1000.0,
 ) -> None:
     """Write t, q, v, a and tau of a motion as CSV."""
-    from hovi.export import write_csv
-
     from hovi.cli.files import check_output, load_trajectory
     from hovi.errors import InputError
+    from hovi.export import write_csv
 
     if not csv:
         raise InputError("say which format to export: --csv.")

@@ -36,22 +36,14 @@ class Peaks:
     v_limit: Array
     tau_limit: Array
 
-    def exceeded(self) -> list[str]:
-        """One phrase per limit that the motion does not keep."""
-        phrases = []
-        rows = (
-            ("q", "rad or m", -self.q_low, -self.lower, -1),
-            ("q", "rad or m", self.q_high, self.upper, 1),
-            ("|v|", "1/s", self.v, self.v_limit, 1),
-            ("|tau|", "N m or N", self.tau, self.tau_limit, 1),
-        )
-        for symbol, unit, value, limit, sign in rows:
-            for i in np.flatnonzero(value > limit * (1 + 1e-9 * np.sign(limit))):
-                reached, allowed = sign * value[i], sign * limit[i]
-                phrases.append(
-                    f"{self.names[i]}: {symbol} reaches {reached:.4g}, limit {allowed:.4g} {unit}"
-                )
-        return phrases
+    def beyond(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Which limits the motion does not keep: "q", "v" and "tau", each of shape (nv,)."""
+        above, below = _above(self.q_high, self.upper), _above(-self.q_low, -self.lower)
+        return {
+            "q": above | below,
+            "v": _above(self.v, self.v_limit),
+            "tau": _above(self.tau, self.tau_limit),
+        }
 
 
 def peaks(trajectory: Trajectory) -> Peaks:
@@ -94,3 +86,8 @@ def _stated(limit: Array) -> Array:
 def _known(limit: Array) -> Array:
     """A velocity or effort limit of zero says that nobody knew it."""
     return np.where(limit > 0, _stated(limit), np.inf)
+
+
+def _above(value: Array, limit: Array) -> npt.NDArray[np.bool_]:
+    """value > limit by more than rounding."""
+    return value > limit + 1e-9 * (1.0 + np.abs(limit))

@@ -79,10 +79,9 @@ def _plan(
     task: Task, guess: str | Trajectory, time_limit: float | None, out: Path | None, json: bool
 ) -> int:
     """Plan, write, print; returns the exit code."""
-    from hovi.plan import plan as plan_motion
-
     from hovi.cli.progress import progress
     from hovi.cli.report import as_json, print_report
+    from hovi.plan import plan as plan_motion
 
     with progress(quiet=json) as report:
         solution = plan_motion(

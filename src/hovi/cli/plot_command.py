@@ -16,9 +16,8 @@ def plot(
     ] = None,
 ) -> None:
     """Draw q, v and tau of a motion over time."""
-    from hovi.plotting import plot as draw
-
     from hovi.cli.files import check_output, load_trajectory
+    from hovi.plotting import plot as draw
 
     target = out or file.with_suffix(".png")
     if target.is_dir():

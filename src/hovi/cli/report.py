@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
-from hovi.plan import Solution
+from rich.box import SIMPLE
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from hovi.cli.peaks import Peaks, peaks
+from hovi.solver import Solution
 from hovi.task_file import Task
 
 
@@ -33,9 +34,8 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "solve_seconds": solution.solve_seconds,
         "starts": task.starts,
         "seed": task.seed,
-        "minima": [minimum.cost for minimum in solution.minima],
+        "minima": list(solution.minima),
         "peaks": None if extremes is None else _peaks_json(extremes),
-        "limits_exceeded": [] if extremes is None else extremes.exceeded(),
         "out": None if out is None else str(out),
     }
     return json.dumps(_finite(fields), allow_nan=False)
@@ -43,20 +43,18 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
 
 def print_report(solution: Solution, task: Task, out: Path | None) -> None:
     """A summary, the peaks of the motion, and where it was written, on stdout."""
-    console = Console(highlight=False)
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
     summary = Table(show_header=False, box=None, pad_edge=False)
     for label, text in _summary(solution, task):
         summary.add_row(label, text)
-    console.print(summary, markup=False)
+    console.print(summary)
     if solution.trajectory is not None:
         extremes = peaks(solution.trajectory)
-        console.print(_peaks_table(extremes), markup=False)
-        for phrase in extremes.exceeded():
-            console.print(f"note: {phrase}", markup=False, soft_wrap=True)
-        if extremes.exceeded():
-            console.print("note: limits are not enforced yet.", markup=False)
+        console.print(_peaks_table(extremes))
+        if any(each.any() for each in extremes.beyond().values()):
+            console.print("! beyond a limit of the URDF: limits are not enforced yet.")
     if out is not None:
-        console.print(f"wrote {out}", markup=False, soft_wrap=True)
+        console.print(f"wrote {out}", soft_wrap=True)
 
 
 def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
@@ -70,32 +68,41 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
     if len(solution.minima) > 1:
-        costs = [f"{minimum.cost:.6g}" for minimum in solution.minima]
+        costs = [f"{cost:.6g}" for cost in solution.minima]
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
         rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
     return rows
 
 
 def _peaks_table(extremes: Peaks) -> Table:
-    table = Table(title="peaks [limits of the URDF]", title_justify="left")
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("joint", overflow="fold")
-    for column in ("q", "|v|", "|tau|"):
+    for column in ("q", "limits", "|v|", "limit", "|tau|", "limit"):
         table.add_column(column, justify="right")
+    beyond = {
+        key: ["!" if each else "" for each in flags] for key, flags in extremes.beyond().items()
+    }
     for i, name in enumerate(extremes.names):
-        q = f"{_short(extremes.q_low[i])} .. {_short(extremes.q_high[i])}"
-        q_limit = f"{_short(extremes.lower[i])} .. {_short(extremes.upper[i])}"
-        v = f"{_short(extremes.v[i])} [{_short(extremes.v_limit[i])}]"
-        tau = f"{_short(extremes.tau[i])} [{_short(extremes.tau_limit[i])}]"
-        table.add_row(escape(name), escape(f"{q} [{q_limit}]"), escape(v), escape(tau))
+        table.add_row(
+            name,
+            beyond["q"][i] + _range(extremes.q_low[i], extremes.q_high[i]),
+            _range(extremes.lower[i], extremes.upper[i]),
+            beyond["v"][i] + _short(extremes.v[i]),
+            _short(extremes.v_limit[i]),
+            beyond["tau"][i] + _short(extremes.tau[i]),
+            _short(extremes.tau_limit[i]),
+        )
     return table
 
 
 def _peaks_json(extremes: Peaks) -> dict[str, dict[str, Any]]:
+    beyond = extremes.beyond()
     return {
         name: {
             "q": [float(extremes.q_low[i]), float(extremes.q_high[i])],
             "v": float(extremes.v[i]),
             "tau": float(extremes.tau[i]),
+            "beyond": [key for key, flags in beyond.items() if flags[i]],
         }
         for i, name in enumerate(extremes.names)
     }
@@ -112,7 +119,16 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def _short(number: float) -> str:
-    if math.isnan(number):
+def _range(low: float, high: float) -> str:
+    """A range in little room; nothing where neither end is known."""
+    if math.isinf(low) and math.isinf(high):
         return "-"
-    return "none" if math.isinf(number) else f"{number:.4g}"
+    if low == -high:
+        return f"±{_short(high)}"
+    return f"{_short(low)} .. {_short(high)}"
+
+
+def _short(number: float) -> str:
+    if not math.isfinite(number):
+        return "-"
+    return f"{number:.3g}" if abs(number) < 100 else f"{number:.4g}"

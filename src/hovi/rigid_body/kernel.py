@@ -89,6 +89,7 @@ class InverseDynamicsKernel:
         Returns tau (P, n) in [N m]. Raises InputError on a wrong shape.
         """
         q, v, a = self._points(q, v, a)
+        _check_threads(threads)
         tau = np.empty_like(q)
         self._core.torque(q, v, a, tau, threads)
         return tau
@@ -103,6 +104,7 @@ class InverseDynamicsKernel:
         wrong shape.
         """
         q, v, a = self._points(q, v, a)
+        _check_threads(threads)
         tau = np.empty_like(q)
         J = np.empty((*q.shape, 3 * self._n))
         self._core.linearize(q, v, a, tau, J, threads)
@@ -133,6 +135,7 @@ class InverseDynamicsKernel:
         weight = self._array("weight", weight, (self._n,))
         if curvature is not None:
             curvature = self._array("curvature", curvature, q.shape)
+        _check_threads(threads)
         tau = np.empty_like(q)
         J = np.empty((*q.shape, 3 * self._n))
         H = np.empty((len(q), 3 * self._n, 3 * self._n))
@@ -147,7 +150,7 @@ class InverseDynamicsKernel:
         return _core.time_pinocchio_calls(self._text, *self._points(q, v, a), repeats)
 
     def _points(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        q = self._array("q", q, (len(q), self._n))
+        q = self._array("q", q, (np.shape(q)[:1] or (1,)) + (self._n,))
         return q, self._array("v", v, q.shape), self._array("a", a, q.shape)
 
     def _array(self, name: str, x: Array, shape: tuple[int, ...]) -> Array:
@@ -155,3 +158,8 @@ class InverseDynamicsKernel:
         if x.shape != shape:
             raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
         return x
+
+
+def _check_threads(threads: int) -> None:
+    if threads < 1:
+        raise InputError(f"threads must be at least 1, got {threads}.")

@@ -64,8 +64,10 @@ def _validated(toml: TomlText) -> TaskTable:
         data = tomllib.loads(toml.text)
     except RecursionError:
         raise SceneError(f"{toml.path}: lists or tables are nested too deeply.") from None
-    except ValueError as invalid:
+    except tomllib.TOMLDecodeError as invalid:
         raise SceneError(_syntax_sentence(toml, str(invalid))) from None
+    except ValueError:
+        raise SceneError(f"{toml.path}: a number has too many digits.") from None
     try:
         return TaskTable.model_validate(data)
     except ValidationError as invalid:

@@ -22,6 +22,8 @@ _ELEMENTS = {
     "string_type": "a string",
     "list_type": "a list",
     "dict_type": "a table",
+    "too_long": "a shorter list",
+    "missing": "given as well",
 }
 _ENTRY = re.compile(r"^\s*([A-Za-z0-9_.\"'\- ]+?)\s*=")
 

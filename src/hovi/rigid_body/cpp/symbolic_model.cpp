@@ -1,8 +1,15 @@
-#include "symbolic_parts.hpp"
+#include <pinocchio/serialization.hpp>
 
 #include "archive.hpp"
+#include "symbolic_parts.hpp"
 
 namespace hovi {
+
+pinocchio::Model read_archive(const std::string& archive) {
+  pinocchio::Model model;
+  model.loadFromString(archive);
+  return model;
+}
 
 SymbolicModel::SymbolicModel(const std::string& archive) {
   const auto model = read_archive(archive).cast<SX>();

@@ -15,6 +15,10 @@ struct SymbolicModel::Parts {
   pinocchio::ModelTpl<SX> model;
   pinocchio::DataTpl<SX> data;
   SX q, v, a;
+
+  SX torque(const SX& velocity, const SX& acceleration);
+  SX inertial_torque(const SX& acceleration);
+  void place_joints();
 };
 
 inline SymbolicVector to_eigen(const SX& x) {

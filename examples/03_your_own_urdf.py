@@ -1,0 +1,86 @@
+"""
+Your own URDF
+=============
+
+Any URDF with ordinary joints can be planned on. A cart on a rail with a pole that hangs from
+it is written here as text; a file from a CAD program or a ROS package does as well.
+"""
+
+# %%
+# A link that moves needs a mass and an inertia; hovi refuses a model without a word of doubt
+# when one is missing, negative or not a number.
+
+import sys
+import tempfile
+from math import pi
+from pathlib import Path
+
+import hovi
+from hovi.errors import ModelError
+
+CART_POLE = """
+<robot name="cart_pole">
+  <link name="rail"/>
+  <link name="cart">
+    <inertial>
+      <mass value="1.0"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
+  <link name="pole">
+    <inertial>
+      <origin xyz="0 0 -0.5"/>
+      <mass value="0.2"/>
+      <inertia ixx="0.017" iyy="0.017" izz="0.001" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
+  <joint name="slide" type="prismatic">
+    <parent link="rail"/> <child link="cart"/>
+    <axis xyz="1 0 0"/>
+    <limit lower="-2" upper="2" effort="50" velocity="5"/>
+  </joint>
+  <joint name="hinge" type="revolute">
+    <parent link="cart"/> <child link="pole"/>
+    <axis xyz="0 1 0"/>
+    <limit lower="-7" upper="7" effort="10" velocity="20"/>
+    <dynamics damping="0.02"/>
+  </joint>
+</robot>
+"""
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+urdf = folder / "cart_pole.urdf"
+urdf.write_text(CART_POLE.strip())
+robot = hovi.load_robot(urdf)
+print(robot.describe())
+
+# %%
+# The URDF states a damping. Nothing is simulated that the scene does not name, so it is
+# listed among what is left out.
+
+scene = hovi.Scene(robot, effects=[hovi.effects.Gravity()])
+print(scene.describe())
+
+# %%
+# Lift the pole to upright in two seconds. Both joints are driven.
+
+solution = hovi.plan(scene, start=hovi.State([0.0, 0.0]), goal=hovi.State([0.5, pi]), duration=2.0)
+print(solution.message)
+assert solution.success
+
+# %%
+# What does it take? The limits of the URDF are printed, and not enforced yet.
+
+motion = solution.trajectory.sample(solution.trajectory.t)
+for i, name in enumerate(robot.coordinate_names):
+    force = abs(motion.tau[:, i]).max()
+    print(f"{name:6s} peak effort {force:6.2f}, limit {robot.effort_limit[i]:g}")
+
+# %%
+# A damaged model is refused before it is loaded.
+
+urdf.write_text(CART_POLE.replace('mass value="0.2"', 'mass value="0,2"').strip())
+try:
+    hovi.load_robot(urdf)
+except ModelError as refusal:
+    print(refusal)

@@ -1,0 +1,91 @@
+"""Configurations of any Pinocchio model: group operations over batches, and checks at the door."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import InputError
+
+Array = npt.NDArray[np.float64]
+
+UNIT_TOLERANCE = 1e-4
+"""How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
+
+
+def integrate(model: pin.Model, q: Array, dq: Array) -> Array:
+    """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
+    return _over_batch(lambda x, y: pin.integrate(model, x, y), q, dq, model.nq)
+
+
+def difference(model: pin.Model, q0: Array, q1: Array) -> Array:
+    """q1 (-) q0 for configurations (..., nq) -> tangent vectors (..., nv)."""
+    return _over_batch(lambda x, y: pin.difference(model, x, y), q0, q1, model.nv)
+
+
+def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
+    """Origin of a frame in the world, in [m]: q (M, nq) -> (M, 3)."""
+    data = model.createData()
+    positions = np.empty((len(q), 3))
+    for position, one in zip(positions, q, strict=True):
+        pin.forwardKinematics(model, data, one)
+        position[:] = pin.updateFramePlacement(model, data, frame).translation
+    return positions
+
+
+def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str]) -> Array:
+    """`value` as a finite float array with one number per name in `entries`.
+
+    name: what the argument is called, for the message. Raises InputError.
+    """
+    try:
+        vector = np.array(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be {len(entries)} numbers, not {value!r}.") from error
+    if vector.shape != (len(entries),):
+        raise InputError(
+            f"{name} has shape {vector.shape}, expected ({len(entries)},): "
+            f"one number each for {', '.join(entries)}."
+        )
+    for number, entry in zip(vector, entries, strict=True):
+        if not np.isfinite(number):
+            raise InputError(f"{name} is {number} at joint {entry!r}: give a finite number.")
+    return vector
+
+
+def check_unit_norms(model: pin.Model, q: Array, name: str) -> None:
+    """Raise InputError naming the first joint whose quaternion or (cos, sin) has no unit norm."""
+    for joint, joint_name in zip(model.joints[1:], model.names[1:], strict=True):
+        part = slice(joint.idx_q, joint.idx_q + joint.nq)
+        alone = pin.neutral(model)
+        alone[part] = q[part]
+        if not pin.isNormalized(model, alone, UNIT_TOLERANCE):
+            raise InputError(
+                f"{name} is {q[part].tolist()} at joint {joint_name!r}, which is not of unit norm: "
+                f"a joint with nq={joint.nq}, nv={joint.nv} holds a unit quaternion (x, y, z, w) "
+                "or (cos, sin) of its angle; normalize it."
+            )
+
+
+def entry_names(model: pin.Model, size: str) -> tuple[str, ...]:
+    """One name per entry of q (size "nq") or of v (size "nv"): joint, or joint[i] for several."""
+    names = []
+    for joint, name in zip(model.joints[1:], model.names[1:], strict=True):
+        count = getattr(joint, size)
+        names += [name] if count == 1 else [f"{name}[{i}]" for i in range(count)]
+    return tuple(names)
+
+
+def _over_batch(function: Callable[[Array, Array], Array], x: Array, y: Array, size: int) -> Array:
+    """Apply a function of two vectors over all leading axes, broadcast against each other."""
+    x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+    lead = np.broadcast_shapes(x.shape[:-1], y.shape[:-1])
+    rows_x = np.broadcast_to(x, (*lead, x.shape[-1])).reshape(-1, x.shape[-1])
+    rows_y = np.broadcast_to(y, (*lead, y.shape[-1])).reshape(-1, y.shape[-1])
+    result = np.empty((len(rows_x), size))
+    for row, one, other in zip(result, rows_x, rows_y, strict=True):
+        row[:] = function(one, other)
+    return result.reshape(*lead, size)

@@ -1,0 +1,161 @@
+"""Many starts on a coarse grid, in parallel processes: which minima are there?
+
+The least-torque landscape has dozens of minima, so more than one start is part of the answer.
+Each round perturbs the best minima found so far (basin hopping); the first ones the guess.
+[WalesDoye1997]
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from joblib import Parallel, delayed, parallel_config
+
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.grid import DiscretePath, Grid
+from hovi.guess import path_on_grid, stretched, with_bump
+from hovi.problem import TrajectoryProblem
+from hovi.scene import Scene
+from hovi.solver import Solution, Status, solve
+from hovi.state import State
+from hovi.trajectory import Trajectory
+
+ROUND = 16
+"""Starts of one round; the result does not depend on the number of processes."""
+ELITE = 4
+"""Minima that a round perturbs."""
+SAME_COST = 1e-6
+"""Relative difference in cost below which two minima count as one."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What a worker process needs to solve a problem: it builds its own functions.
+
+    weight: R of the effort, one number per joint.
+    """
+
+    scene: Scene
+    weight: tuple[float, ...]
+    grid: Grid
+    start: State
+    goal: State
+    max_iterations: int
+
+    def problem(self) -> TrajectoryProblem:
+        """The trajectory problem."""
+        lagrangian = self.scene.effort_lagrangian(self.weight)
+        return TrajectoryProblem(DiscreteLagrangian(lagrangian, self.grid), self.start, self.goal)
+
+
+@dataclass(eq=False)
+class Pool:
+    """Solves a job from many guesses, here or in worker processes."""
+
+    job: Job
+    processes: int
+    deadline: float | None = None
+    solved: list[Solution] = field(default_factory=list)
+
+    def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
+        """Solutions in the order of the guesses."""
+        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        count = min(self.processes, len(guesses))
+        if count <= 1:
+            return _solve_chunk(self.job, guesses, left)
+        chunks = [guesses[i::count] for i in range(count)]
+        with parallel_config(backend="loky", inner_max_num_threads=1):
+            parts = Parallel(n_jobs=count)(delayed(_solve_chunk)(self.job, c, left) for c in chunks)
+        solutions: list[Solution | None] = [None] * len(guesses)
+        for i, part in enumerate(parts):
+            solutions[i::count] = part
+        return [solution for solution in solutions if solution is not None]
+
+
+def _solve_chunk(
+    job: Job, guesses: Sequence[DiscretePath], time_limit: float | None
+) -> list[Solution]:
+    problem = job.problem()
+    ends = None if time_limit is None else time.monotonic() + time_limit
+    solutions = []
+    for guess in guesses:
+        left = None if ends is None else max(ends - time.monotonic(), 0.0)
+        solutions.append(
+            solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
+        )
+    return solutions
+
+
+def explore(
+    pool: Pool, first: DiscretePath, starts: int, seed: int, progress: Progress
+) -> list[Solution]:
+    """Distinct minima by ascending cost, then the rest; the first guess is the first start.
+
+    starts: number of solves. seed: of the random bumps.
+    KeyboardInterrupt and the pool's deadline end the search with what was found.
+    """
+    solutions: list[Solution] = []
+    try:
+        solutions += pool.solve_all([first])
+        while len(solutions) < starts and not _expired(pool):
+            guesses = _round(pool.job, distinct(solutions), first, len(solutions), starts, seed)
+            solutions += pool.solve_all(guesses)
+            best = min(solution.cost for solution in solutions)
+            progress(
+                f"{len(solutions)} of {starts} starts, least cost {best:.6g}",
+                len(solutions) / starts,
+            )
+    except KeyboardInterrupt:
+        if not solutions:
+            raise
+    return distinct(solutions)
+
+
+def _expired(pool: Pool) -> bool:
+    return pool.deadline is not None and time.monotonic() > pool.deadline
+
+
+def _round(
+    job: Job,
+    found: Sequence[Solution],
+    first: DiscretePath,
+    done: int,
+    starts: int,
+    seed: int,
+) -> list[DiscretePath]:
+    """Guesses of the next round: bumps on the best minima, in the first round on the guess."""
+    problem = job.problem()
+    T, robot, boundary = job.grid.duration, problem.robot, problem.boundary
+    origin = Trajectory(job.grid, first, problem.ld.momenta(first), job.scene)
+    bases = [origin]
+    if done > ROUND:
+        bases = [solution.trajectory for solution in found[:ELITE]] + [origin]
+    guesses = []
+    for i in range(done, min(done + ROUND, starts)):
+        base = stretched(bases[i % len(bases)], T)
+        curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
+        guesses.append(path_on_grid(curve, job.grid, boundary, robot))
+    return guesses
+
+
+def distinct(solutions: Sequence[Solution]) -> list[Solution]:
+    """Minima with different costs, ascending; where there are none, the best of the rest."""
+    minima = sorted((s for s in solutions if s.success), key=lambda s: s.cost)
+    if not minima:
+        usable = [s for s in solutions if s.status is not Status.DIVERGED] or list(solutions)
+        return [min(usable, key=lambda s: s.cost)]
+    kept = [minima[0]]
+    for solution in minima[1:]:
+        if solution.cost - kept[-1].cost > SAME_COST * abs(kept[-1].cost):
+            kept.append(solution)
+    return kept
+
+
+def default_processes() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

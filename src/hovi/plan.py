@@ -1,0 +1,144 @@
+"""plan: for people who want the motion and not the machinery."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy.typing as npt
+
+from hovi.errors import InputError
+from hovi.grid import Grid
+from hovi.multistart import Job, Pool, default_processes, distinct, explore
+from hovi.scene import Scene
+from hovi.schemes import Scheme, by_name, galerkin
+from hovi.solver import Solution, Status, guess_path
+from hovi.state import State
+from hovi.trajectory import Trajectory
+
+COARSE_INTERVALS = 60
+"""Grids with more than twice as many intervals are first solved on a grid of this many."""
+REFINED = 6
+"""Coarse minima that are refined and ranked on the grid that was asked for."""
+
+Progress = Callable[[str, float], None]
+
+
+def plan(
+    scene: Scene,
+    start: State | npt.ArrayLike,
+    goal: State | npt.ArrayLike,
+    duration: float,
+    *,
+    scheme: str | Scheme = "galerkin-2",
+    intervals: int = 16,
+    limits: str = "none",
+    starts: int = 1,
+    seed: int = 0,
+    guess: str | Trajectory = "cubic",
+    weight: npt.ArrayLike | None = None,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Solution:
+    """The motion of least 1/2 integral |tau|^2 between two states in a given time.
+
+    scene: what is simulated. start, goal: a State, or a configuration of shape (nq,) at rest.
+    duration: T in [s]. scheme, intervals: how the action is discretised.
+    limits: "none", the only choice so far.
+    starts: number of solves from seeded random perturbations; all minima found are refined on
+        the grid that was asked for and ranked after that. seed: of the perturbations.
+    guess: "cubic", "minimum-jerk" or a Trajectory.
+    weight: weight of each joint's torque in the cost, shape (nv,).
+    max_iterations: of one solve. time_limit: of everything, in [s]; returns the best so far.
+    processes: for the starts; all processors by default.
+    progress: called with a line of text and the fraction done.
+    Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
+    """
+    began = time.perf_counter()
+    _check(limits, starts, max_iterations, time_limit)
+    table = by_name(scheme) if isinstance(scheme, str) else scheme
+    fine = Job(
+        scene,
+        tuple(scene.effort_lagrangian(weight).weight),
+        Grid.uniform(duration, intervals, table),
+        _state(start),
+        _state(goal),
+        max_iterations,
+    )
+    ends = None if time_limit is None else time.monotonic() + time_limit
+    search = _Search(fine, processes or default_processes(), ends, progress or _silent)
+    fine.problem()  # bad input speaks before any work is done
+    started = time.perf_counter()
+    best, minima = search.run(guess, starts, seed)
+    return dataclasses.replace(
+        best,
+        minima=minima,
+        setup_seconds=started - began,
+        solve_seconds=time.perf_counter() - started,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Explore coarsely, refine the best, rank after refining."""
+
+    fine: Job
+    processes: int
+    deadline: float | None
+    progress: Progress
+
+    def run(self, guess: str | Trajectory, starts: int, seed: int) -> tuple[Solution, tuple[float, ...]]:
+        """The best solution, and the costs of all minima on the grid that was asked for."""
+        job = self._coarse()
+        pool = Pool(job, self.processes, self.deadline)
+        first = guess_path(job.problem(), guess)
+        found = explore(pool, first, starts, seed, self.progress)
+        if job is not self.fine:
+            found = self._refine(found)
+        minima = tuple(s.cost for s in found if s.success)
+        return found[0], minima
+
+    def _coarse(self) -> Job:
+        grid = self.fine.grid
+        if grid.intervals <= 2 * COARSE_INTERVALS:
+            return self.fine
+        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2))
+        return dataclasses.replace(self.fine, grid=coarse)
+
+    def _refine(self, found: list[Solution]) -> list[Solution]:
+        problem = self.fine.problem()
+        guesses = [guess_path(problem, s.trajectory) for s in found[:REFINED]]
+        self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
+        deadline = self.deadline
+        if deadline is not None:
+            deadline = max(deadline, time.monotonic() + 1e-3)
+        pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, deadline)
+        return distinct(pool.solve_all(guesses))
+
+
+def _state(state: State | npt.ArrayLike) -> State:
+    return state if isinstance(state, State) else State(state)
+
+
+def _silent(text: str, fraction: float) -> None:
+    """No progress."""
+
+
+def _check(limits: str, starts: int, max_iterations: int, time_limit: float | None) -> None:
+    if limits != "none":
+        raise InputError(
+            f"limits are not enforced yet, got limits={limits!r}; say limits='none' and compare the "
+            "motion with the robot's limits."
+        )
+    for name, count in (("starts", starts), ("max_iterations", max_iterations)):
+        if count != int(count) or count < 1:
+            raise InputError(f"{name} must be a whole number of 1 or more, got {count}.")
+    if time_limit is not None and not time_limit > 0:
+        raise InputError(f"time_limit must be positive, in seconds, got {time_limit}.")
+
+
+__all__ = ["Status", "plan"]

@@ -1,0 +1,53 @@
+"""From what the user names (a file or an example) to a source."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from hovi.example_robots import example_robot, rotor_armature
+from hovi.robot_model import build_full_model
+from hovi.robot_source import RobotSource, text_hash
+from hovi.urdf_check import read_urdf
+
+
+def is_path(text: str) -> bool:
+    """Whether a text means a file and not the name of an example."""
+    return text.lower().endswith((".urdf", ".xml", ".xacro")) or "/" in text or "\\" in text
+
+
+def file_source(
+    path: Path, package_dirs: tuple[str, ...], locked: tuple[str, ...], free_flyer: bool
+) -> RobotSource:
+    """The source of a URDF file. Raises ModelError when it cannot be read."""
+    text = read_urdf(path)
+    return RobotSource(
+        kind="urdf",
+        reference=path.name,
+        urdf=text,
+        sha256=text_hash(text),
+        package_dirs=package_dirs,
+        locked=locked,
+        free_flyer=free_flyer,
+        folder=str(path.parent.absolute()),
+    )
+
+
+def example_source(
+    name: str, package_dirs: tuple[str, ...], locked: tuple[str, ...], free_flyer: bool | None
+) -> RobotSource:
+    """The source of an example robot. Raises ModelError for an unknown name."""
+    example = example_robot(name)
+    text = read_urdf(example.urdf)
+    source = RobotSource(
+        kind="example",
+        reference=name,
+        urdf=text,
+        sha256=text_hash(text),
+        package_dirs=package_dirs,
+        locked=locked,
+        free_flyer=example.free_flyer if free_flyer is None else free_flyer,
+    )
+    if example.srdf is None:
+        return source
+    return replace(source, armature=rotor_armature(build_full_model(source), example.srdf))
