@@ -126,6 +126,7 @@ def headless_browser(profile: Path, size: tuple[int, int] = (800, 600)) -> Itera
 def _debugging_port(profile: Path, process: subprocess.Popen[bytes]) -> int:
     file, deadline = profile / "DevToolsActivePort", time.monotonic() + _SECONDS
     while not (file.exists() and file.read_text().strip()):
-        assert process.poll() is None and time.monotonic() < deadline, "Chromium did not start"
+        assert process.poll() is None, "Chromium ended at once"
+        assert time.monotonic() < deadline, "Chromium did not start"
         time.sleep(0.05)
     return int(file.read_text().split()[0])

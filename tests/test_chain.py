@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hovi.chain import chain, write_chain
+from hovi.chain_urdf import chain, write_chain
 from hovi.errors import InputError
 from hovi.robot import load_robot
 

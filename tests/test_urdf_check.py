@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from hovi.chain import chain
+from hovi.chain_urdf import chain
 from hovi.errors import ModelError
 from hovi.urdf_check import check_urdf, read_urdf
 from hovi.urdf_rules import RULES

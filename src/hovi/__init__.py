@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hovi import effects as effects
     from hovi import schemes as schemes
-    from hovi.chain import chain as chain
+    from hovi.chain_urdf import chain as chain
     from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
     from hovi.errors import HoviError as HoviError
     from hovi.export import write_csv as write_csv
     from hovi.grid import DiscretePath as DiscretePath
     from hovi.grid import Grid as Grid
     from hovi.model_files import example as example
-    from hovi.plan import plan as plan
+    from hovi.planner import plan as plan
     from hovi.playback import replay as replay
     from hovi.plotting import plot as plot
     from hovi.problem import TrajectoryProblem as TrajectoryProblem
@@ -49,11 +49,11 @@ _PLACES = {
     "Task": "hovi.task_file",
     "Trajectory": "hovi.trajectory",
     "TrajectoryProblem": "hovi.problem",
-    "chain": "hovi.chain",
+    "chain": "hovi.chain_urdf",
     "example": "hovi.model_files",
     "load_robot": "hovi.robot",
     "load_task": "hovi.task_file",
-    "plan": "hovi.plan",
+    "plan": "hovi.planner",
     "plot": "hovi.plotting",
     "replay": "hovi.playback",
     "solve": "hovi.solver",

@@ -235,15 +235,14 @@ def _contract_gradient(batch: _Batch, table: Array, gradient: Array) -> Array:
     """Gradient of L_d in the columns of the table, shape (B, m, n)."""
     B, (Q, _, m) = len(batch.h), table.shape
     weighted = gradient.reshape(B, Q, 3, -1) * batch.point_weights[..., None]
-    return np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1))
+    return np.asarray(np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1)))
 
 
 def _contract_hessian(batch: _Batch, table: Array, hessian: Array) -> Array:
     """Hessian of L_d in the columns of the table, shape (B, m, m, n, n)."""
     B, (Q, _, m) = len(batch.h), table.shape
-    n = hessian.size // (B * Q * 9)
-    n = int(round(np.sqrt(n)))
+    n = hessian.shape[-1] // 3 if hessian.ndim == 3 else hessian.shape[-1]
     blocks = hessian.reshape(B, Q, 3, n, 3, n).transpose(0, 1, 2, 4, 3, 5)
     weighted = (blocks * batch.pair_weights).reshape(B, Q * 9, n * n)
     pairs = np.einsum("qri,qsj->ijqrs", table, table).reshape(m * m, Q * 9)
-    return np.matmul(pairs, weighted).reshape(B, m, m, n, n)
+    return np.asarray(np.matmul(pairs, weighted).reshape(B, m, m, n, n))

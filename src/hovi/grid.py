@@ -59,7 +59,7 @@ class Grid:
     def t(self) -> Array:
         """Times of the nodes, shape (N + 1,), in [s]."""
         if np.ptp(self.steps) == 0:
-            return np.arange(self.intervals + 1) * self.steps[0]
+            return np.asarray(np.arange(self.intervals + 1) * self.steps[0])
         return np.concatenate([[0.0], np.cumsum(self.steps)])
 
     @property

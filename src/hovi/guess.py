@@ -27,7 +27,8 @@ BUMP_AMPLITUDES = (0.2, 1.5)
 class Curve(Protocol):
     """q, v and a at times t of shape (M,), as arrays of shape (M, n)."""
 
-    def __call__(self, t: Array) -> tuple[Array, Array, Array]: ...
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """The curve at t."""
 
 
 def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:

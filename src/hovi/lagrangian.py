@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from hovi.point_function import PointFunction
 from hovi.robot import Robot
+from hovi.torque_model import TorqueModel, times
 
 Array = npt.NDArray[np.float64]
 
@@ -61,34 +62,6 @@ class EffortScene(Protocol):
         """The robot."""
 
 
-class TorqueModel(Protocol):
-    """tau(q, v, a, t) with its derivatives in the tangent space."""
-
-    nv: int
-
-    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
-        """tau, shape (P, nv), in [N m] or [N]."""
-
-    def linearize(
-        self, q: Array, v: Array, a: Array, t: Array | None = None
-    ) -> tuple[Array, Array]:
-        """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
-
-    def expand(
-        self,
-        q: Array,
-        v: Array,
-        a: Array,
-        t: Array | None,
-        R: Array,
-        curvature: Array | None,
-    ) -> tuple[Array, Array, Array]:
-        """tau, J and J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv).
-
-        R: weight of each joint, shape (nv,). curvature: shape (P, nv); R * tau when None.
-        """
-
-
 @dataclass(frozen=True, eq=False)
 class EffortLagrangian(Lagrangian):
     """L~ = 1/2 tau^T diag(R) tau + V(q): the cost of control as a Lagrangian on T^(2)Q.
@@ -117,9 +90,7 @@ class EffortLagrangian(Lagrangian):
         """Degrees of freedom."""
         return self.scene.robot.nv
 
-    def torque(
-        self, q: Array, v: Array, a: Array, t: Array | None = None
-    ) -> tuple[Array, Array]:
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> tuple[Array, Array]:
         """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
         return self.torques.linearize(q, v, a, t)
 
@@ -184,51 +155,6 @@ class PotentialTerm:
         return value, gradient, hessian
 
 
-class CasadiTorque:
-    """A torque model from CasADi expressions: the definition, and the fallback of faster ones."""
-
-    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX) -> None:
-        q, v, a, t = symbols
-        x = ca.vertcat(q, v, a)
-        weight = ca.SX.sym("weight", tau.shape[0])
-        J = ca.jacobian(tau, x)
-        curvature = ca.hessian(ca.dot(weight, tau), x)[0]
-        self.nv = int(tau.shape[0])
-        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]))
-        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]))
-        self._curvature = PointFunction(ca.Function("ddtau", [q, v, a, t, weight], [curvature]))
-
-    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
-        """tau, shape (P, nv)."""
-        return self._torque(q, v, a, times(t, len(q)))[0].reshape(len(q), self.nv)
-
-    def linearize(
-        self, q: Array, v: Array, a: Array, t: Array | None = None
-    ) -> tuple[Array, Array]:
-        """tau and its Jacobian."""
-        tau, J = self._linearize(q, v, a, times(t, len(q)))
-        return tau.reshape(len(q), self.nv), J.reshape(len(q), self.nv, 3 * self.nv)
-
-    def curvature(self, q: Array, v: Array, a: Array, t: Array | None, weight: Array) -> Array:
-        """sum_i weight_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
-        return self._curvature(q, v, a, times(t, len(q)), weight)[0]
-
-    def expand(
-        self,
-        q: Array,
-        v: Array,
-        a: Array,
-        t: Array | None,
-        R: Array,
-        curvature: Array | None,
-    ) -> tuple[Array, Array, Array]:
-        """tau, J and the Hessian of TorqueModel.expand."""
-        tau, J = self.linearize(q, v, a, t)
-        weight = R * tau if curvature is None else curvature
-        hessian = np.matmul(J.transpose(0, 2, 1) * R, J) + self.curvature(q, v, a, t, weight)
-        return tau, J, hessian
-
-
 class CasadiLagrangian(Lagrangian):
     """A Lagrangian of any order k on a vector space from a CasADi expression.
 
@@ -262,8 +188,3 @@ class CasadiLagrangian(Lagrangian):
         value, gradient, hessian = self._expand(*jet)
         shape = (len(value), self.order + 1, self.nv)
         return value, gradient.reshape(shape), hessian.reshape(*shape, *shape[1:])
-
-
-def times(t: Array | None, points: int) -> Array:
-    """Times as a column, zeros where nothing depends on time, shape (P, 1)."""
-    return np.zeros((points, 1)) if t is None else np.asarray(t, dtype=np.float64).reshape(-1, 1)

@@ -88,6 +88,7 @@ class Page:
     """
 
     def __init__(self, title: str) -> None:
+        """An empty page."""
         self.title = title
         self.web_url = ""
         self._messages: dict[tuple[str, str, str], bytes] = {}

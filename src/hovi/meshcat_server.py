@@ -26,6 +26,7 @@ class ServedPage(Page):
     """
 
     def __init__(self, title: str, port: int = 0) -> None:
+        """An empty page that is served from now on."""
         super().__init__(title)
         try:
             sockets = tornado.netutil.bind_sockets(port, _HOST)

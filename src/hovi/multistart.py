@@ -85,9 +85,7 @@ def _solve_chunk(
     solutions = []
     for guess in guesses:
         left = None if ends is None else max(ends - time.monotonic(), 0.0)
-        solutions.append(
-            solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
-        )
+        solutions.append(solve(problem, guess, max_iterations=job.max_iterations, time_limit=left))
     return solutions
 
 

@@ -103,9 +103,11 @@ class Replay:
         return f'<iframe {source} style="width:100%;height:480px;border:none"></iframe>'
 
     def __enter__(self) -> Self:
+        """The replay itself; leaving the block closes it."""
         return self
 
     def __exit__(self, *exception: object) -> None:
+        """Stop serving."""
         self.close()
 
 

@@ -51,10 +51,10 @@ class PointFunction:
         buffer, trigger = self._mapped[points].buffer()
         for i, argument in enumerate(arguments):
             if argument.size:
-                buffer.set_arg(i, memoryview(argument.reshape(-1)))
+                buffer.set_arg(i, memoryview(argument.reshape(-1)))  # type: ignore[call-arg,arg-type]
         for i, result in enumerate(results):
             if result.size:
-                buffer.set_res(i, memoryview(result.reshape(-1)))
+                buffer.set_res(i, memoryview(result.reshape(-1)))  # type: ignore[call-arg,arg-type]
         trigger()
 
 

@@ -15,9 +15,10 @@ import pinocchio as pin
 
 from hovi.effects import REGISTRY, Effect, SceneSymbols
 from hovi.errors import SceneError, nearest
-from hovi.lagrangian import CasadiTorque, EffortLagrangian, PotentialTerm, TorqueModel
-from hovi.rigid_body import casadi_functions
+from hovi.lagrangian import EffortLagrangian, PotentialTerm
+from hovi.rigid_body import InverseDynamicsKernel, casadi_functions, joints_without_kernel
 from hovi.robot import Robot
+from hovi.torque_model import AnalyticTorque, CasadiTorque, TorqueModel
 
 Array = npt.NDArray[np.float64]
 
@@ -54,14 +55,22 @@ class Scene:
 
     @cached_property
     def torques(self) -> TorqueModel:
-        """tau(q, v, a, t): RNEA and what the effects add to it, with exact derivatives."""
+        """tau(q, v, a, t): RNEA and what the effects add to it, with exact derivatives.
+
+        Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
+        """
         symbols = self._symbols()
-        functions = casadi_functions(self.model)
-        tau = functions.inverse_dynamics(symbols.q, symbols.v, symbols.a)
-        for effect in self.effects:
-            added = effect.torque(self.robot, symbols)
-            tau = tau if added is None else tau + added
-        return CasadiTorque(symbols.columns(), tau)
+        added = self._added_torque(symbols)
+        if self.analytic:
+            more = None if added is None else CasadiTorque(symbols.columns(), added)
+            return AnalyticTorque(InverseDynamicsKernel(self.model), more)
+        tau = casadi_functions(self.model).inverse_dynamics(symbols.q, symbols.v, symbols.a)
+        return CasadiTorque(symbols.columns(), tau if added is None else tau + added)
+
+    @property
+    def analytic(self) -> bool:
+        """Whether RNEA's derivatives are Pinocchio's analytic ones."""
+        return not joints_without_kernel(self.model)
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V on T^(2)Q.
@@ -82,8 +91,8 @@ class Scene:
 
         q: shape (M, nq). v, a: shape (M, nv). t: shape (M,), in [s].
         """
-        jet = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
-        return self.torques.torque(*jet, None if t is None else np.asarray(t, dtype=np.float64))
+        q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
+        return self.torques.torque(q, v, a, None if t is None else np.asarray(t, dtype=np.float64))
 
     def describe(self) -> str:
         """What is simulated, and what the URDF holds but the scene leaves out."""
@@ -91,6 +100,7 @@ class Scene:
         lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
         lines.append("left out:")
         lines += [f"  {line}" for line in self._left_out()] or ["  nothing that the URDF holds"]
+        lines.append(self._derivatives())
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -118,6 +128,17 @@ class Scene:
         terms = [effect.potential(self.robot, symbols) for effect in self.effects]
         named = [term for term in terms if term is not None]
         return PotentialTerm(symbols.columns(), sum(named[1:], named[0])) if named else None
+
+    def _added_torque(self, symbols: SceneSymbols) -> ca.SX | None:
+        terms = [effect.torque(self.robot, symbols) for effect in self.effects]
+        named = [term for term in terms if term is not None]
+        return sum(named[1:], named[0]) if named else None
+
+    def _derivatives(self) -> str:
+        if self.analytic:
+            return "derivatives: Pinocchio's analytic ones (C++), since every joint has them"
+        joints = ", ".join(repr(joint) for joint in joints_without_kernel(self.model))
+        return f"derivatives: CasADi's, since {joints} have no analytic second derivatives"
 
     def _left_out(self) -> list[str]:
         robot, keys = self.robot, {effect.key for effect in self.effects}

@@ -117,7 +117,9 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
             )
         return guess
     if isinstance(guess, str):
-        return path_on_grid(named_curve(guess, robot, boundary, grid.duration), grid, boundary, robot)
+        return path_on_grid(
+            named_curve(guess, robot, boundary, grid.duration), grid, boundary, robot
+        )
     if guess.v.shape[1] != robot.nv:
         raise InputError(
             f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."

@@ -32,6 +32,7 @@ class StoredTorque:
     values: Array
 
     def __post_init__(self) -> None:
+        """Refuse what cannot be interpolated."""
         if self.values.ndim != 3 or self.values.shape[1] < 2:
             raise InputError(
                 f"stored torques need the shape (intervals, 2 or more points, nv), "

@@ -66,6 +66,7 @@ class Trajectory:
     torque: StoredTorque | None = None
 
     def __post_init__(self) -> None:
+        """Refuse arrays that do not fit the grid and the robot."""
         _check_shapes(self)
         if self.scene is None and self.torque is None:
             raise InputError("a trajectory needs a scene, or the torques themselves.")

@@ -26,10 +26,10 @@ def find_scene(scene: str) -> Path:
     )
 
 
-def check_output(path: Path, ending: str) -> Path:
+def check_output(path: Path, *endings: str) -> Path:
     """The path if a file can be written there. Raises InputError otherwise."""
-    if path.suffix != ending:
-        raise InputError(f"the output file must end in {ending}, not {path.name!r}.")
+    if path.suffix.lower() not in endings:
+        raise InputError(f"the output file must end in {' or '.join(endings)}, not {path.name!r}.")
     folder = path.parent
     if not folder.is_dir():
         raise InputError(f"the folder {str(folder)!r} of the output file does not exist.")

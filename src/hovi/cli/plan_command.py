@@ -81,7 +81,7 @@ def _plan(
     """Plan, write, print; returns the exit code."""
     from hovi.cli.progress import progress
     from hovi.cli.report import as_json, print_report
-    from hovi.plan import plan as plan_motion
+    from hovi.planner import plan as plan_motion
 
     with progress(quiet=json) as report:
         solution = plan_motion(

@@ -12,15 +12,16 @@ def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR|PNG", help="Where the picture goes; FILE.png when not given."),
+        typer.Option(metavar="DIR|PNG", help="Where the picture goes (or .pdf, .svg); FILE.png when not given."),
     ] = None,
 ) -> None:
-    """Draw q, v and tau of a motion over time."""
+    """Draw q, v, a and tau of a motion over time; for a planar two-link arm, its sweep too."""
     from hovi.cli.files import check_output, load_trajectory
-    from hovi.plotting import plot as draw
+    from hovi.plotting import plot_all
 
     target = out or file.with_suffix(".png")
     if target.is_dir():
         target = target / f"{file.stem}.png"
-    draw(load_trajectory(file), check_output(target, ".png"))
-    print(f"wrote {target}")
+    check_output(target, ".png", ".pdf", ".svg")
+    for picture in plot_all(load_trajectory(file), target):
+        print(f"wrote {picture}")

@@ -43,18 +43,16 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
 
 def print_report(solution: Solution, task: Task, out: Path | None) -> None:
     """A summary, the peaks of the motion, and where it was written, on stdout."""
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
-    summary = Table(show_header=False, box=None, pad_edge=False)
     for label, text in _summary(solution, task):
-        summary.add_row(label, text)
-    console.print(summary)
+        print(f"{label:9s}{text}")
     if solution.trajectory is not None:
         extremes = peaks(solution.trajectory)
+        console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
-            console.print("! beyond a limit of the URDF: limits are not enforced yet.")
+            print("! beyond a limit of the URDF: limits are not enforced yet.")
     if out is not None:
-        console.print(f"wrote {out}", soft_wrap=True)
+        print(f"wrote {out}")
 
 
 def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:

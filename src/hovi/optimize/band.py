@@ -34,7 +34,10 @@ class BandLayout:
 
     @classmethod
     def of(cls, unknowns: Index) -> BandLayout:
-        """The layout of given unknowns: entry (i, j), i >= j, stands at j (bandwidth + 1) + i - j."""
+        """The layout of given unknowns.
+
+        Entry (i, j), i >= j, stands at j (bandwidth + 1) + i - j.
+        """
         N = len(unknowns)
         flat = unknowns.reshape(N, -1)
         size = int(flat.max()) + 1
@@ -53,7 +56,7 @@ class BandLayout:
         """The band of a sum over intervals, shape (size, bandwidth + 1): column j at row j."""
         length = self.size * (self.bandwidth + 1)
         band = np.bincount(self.positions, hessian.reshape(-1)[self.entries], minlength=length)
-        return band.reshape(self.size, self.bandwidth + 1)
+        return np.asarray(band.reshape(self.size, self.bandwidth + 1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,7 @@ class BandModel(QuadraticModel):
         """Sum of the intervals' covectors per unknown, shape (size,)."""
         index = self.layout.unknowns.ravel()
         sums = np.bincount(index + 1, local.ravel(), minlength=self.layout.size + 1)
-        return sums[1:]
+        return np.asarray(sums[1:], dtype=np.float64)
 
     def gather(self, s: Array) -> Array:
         """Columns of every interval, zero where they are fixed."""

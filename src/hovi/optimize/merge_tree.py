@@ -47,7 +47,8 @@ class MergeLevel:
         n = children.shape[-1]
         P = self.pairs
         total = np.zeros((P, 36, n * n))
-        for T, child in ((self.left, children[0 : 2 * P : 2]), (self.right, children[1 : 2 * P : 2])):
+        for T, first in ((self.left, 0), (self.right, 1)):
+            child = children[first : 2 * P : 2]
             pairs = np.einsum("pxi,pyj->pijxy", T, T).reshape(P, 36, 16)
             total += np.matmul(pairs, child.reshape(P, 16, n * n))
         return total.reshape(P, 6, 6, n, n)
@@ -241,7 +242,7 @@ def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimina
         np.linalg.cholesky(block)
     else:
         negative = int(np.sum(np.linalg.eigvalsh(block) < 0))
-    inverse = np.linalg.inv(block)
+    inverse = np.asarray(np.linalg.inv(block), dtype=np.float64)
     solved = np.matmul(inverse, coupling)
     S = flat[:, : 4 * n, : 4 * n] - np.matmul(coupling.transpose(0, 2, 1), solved)
     S = (S + S.transpose(0, 2, 1)) / 2

@@ -37,7 +37,7 @@ class IntervalSum:
 
 
 class QuadraticModel(ABC):
-    """The model in the coordinates of a solver, vectors s of any shape with `np.vdot` as pairing."""
+    """The model in the coordinates of a solver; `np.vdot` pairs vectors and covectors."""
 
     def __init__(self, intervals: IntervalSum) -> None:
         self.intervals = intervals

@@ -7,6 +7,7 @@ step, relative to the data. [ConnGouldToint2000, chapter 7; MoreSorensen1983]
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -233,7 +234,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
         shift = search.after_step(shift, trial, slope)
         if attempt == PASS_SHIFTS - 1:
             return trial
-    raise ArithmeticError("H + shift D stays indefinite: the model holds numbers that are not finite")
+    raise ArithmeticError("H + shift D stays indefinite: the model has numbers that are not finite")
 
 
 class _ShiftSearch:
@@ -251,7 +252,7 @@ class _ShiftSearch:
         self.indefinite = True
         self.low = max(self.low, shift)
         if np.isfinite(self.high):
-            return max(np.sqrt(self.low * self.high), 0.1 * self.high)
+            return max(math.sqrt(self.low * self.high), 0.1 * self.high)
         scale = self.model.curvature_scale()
         return max(guess if shift == 0.0 else 0.0, 10.0 * shift, 1e-6 * scale)
 
@@ -280,7 +281,7 @@ class _ShiftSearch:
             return newton
         if not np.isfinite(self.high):
             return max(10 * shift, 1e-6 * self.model.curvature_scale())
-        return max(np.sqrt(self.low * self.high), 1e-3 * self.high)
+        return max(math.sqrt(self.low * self.high), 1e-3 * self.high)
 
     def is_hard_case(self, shift: float) -> bool:
         """Whether the step stays short down to the edge of definiteness."""

@@ -6,8 +6,6 @@ The fast sibling of `RigidBodyFunctions.inverse_dynamics`: Pinocchio's own deriv
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin

@@ -12,13 +12,17 @@ import numpy as np
 from hovi.schemes.polynomials import interval_rows
 from hovi.schemes.scheme import Scheme
 
-_FIRST = [0, 0, 0], [1, 0, 0]
-_LAST = [1, 1, 0], [1, 0, 1]
-_MIDDLE = [0.5, 0.5, 0], [1, 0, 0.5]
-_TAYLOR_FIRST, _TAYLOR_LAST, _DIFFERENCE = [0, 2, 0], [0, -2, 2], [0, 0, 1]
+Row = tuple[float, float, float]
+
+_FIRST: tuple[Row, Row] = (0, 0, 0), (1, 0, 0)
+_LAST: tuple[Row, Row] = (1, 1, 0), (1, 0, 1)
+_MIDDLE: tuple[Row, Row] = (0.5, 0.5, 0), (1, 0, 0.5)
+_TAYLOR_FIRST: Row = (0, 2, 0)
+_TAYLOR_LAST: Row = (0, -2, 2)
+_DIFFERENCE: Row = (0, 0, 1)
 
 
-def _scheme(name: str, order: int, points: list[float], rows: list[list[list[float]]]) -> Scheme:
+def _scheme(name: str, order: int, points: list[float], rows: list[list[Row]]) -> Scheme:
     """Equal weights; a table from nested lists."""
     weights = np.full(len(points), 1 / len(points))
     return Scheme(name, order, np.array(points), weights, np.array(rows, dtype=np.float64))
@@ -38,7 +42,7 @@ def taylor_trapezoid() -> Scheme:
 
 def mean_difference() -> Scheme:
     """h L((q0+q1)/2, (q1-q0)/h, (v1-v0)/h): in the paper, but not regular."""
-    return _scheme("mean-difference", 0, [0.5], [[_MIDDLE[0], [1, 1, 0], _DIFFERENCE]])
+    return _scheme("mean-difference", 0, [0.5], [[_MIDDLE[0], (1, 1, 0), _DIFFERENCE]])
 
 
 def trapezoid_difference() -> Scheme:

@@ -45,7 +45,7 @@ class Scheme:
     @property
     def inner_modes(self) -> int:
         """Number r of inner modes of an interval."""
-        return self.table.shape[2] - 3
+        return int(self.table.shape[2]) - 3
 
     @property
     def regular_table(self) -> Array:

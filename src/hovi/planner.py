@@ -91,7 +91,9 @@ class _Search:
     deadline: float | None
     progress: Progress
 
-    def run(self, guess: str | Trajectory, starts: int, seed: int) -> tuple[Solution, tuple[float, ...]]:
+    def run(
+        self, guess: str | Trajectory, starts: int, seed: int
+    ) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the grid that was asked for."""
         job = self._coarse()
         pool = Pool(job, self.processes, self.deadline)
@@ -131,8 +133,8 @@ def _silent(text: str, fraction: float) -> None:
 def _check(limits: str, starts: int, max_iterations: int, time_limit: float | None) -> None:
     if limits != "none":
         raise InputError(
-            f"limits are not enforced yet, got limits={limits!r}; say limits='none' and compare the "
-            "motion with the robot's limits."
+            f"limits are not enforced yet, got limits={limits!r}; say limits='none' and compare "
+            "the motion with the robot's limits."
         )
     for name, count in (("starts", starts), ("max_iterations", max_iterations)):
         if count != int(count) or count < 1:

@@ -1,0 +1,302 @@
+"""Pictures of a motion, drawn by Matplotlib without its global state.
+
+The torque is drawn interval by interval, so that a jump at a node is a gap and not a steep line.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+from hovi.errors import DisplayError
+from hovi.robot import Robot
+from hovi.trajectory import Sample, Trajectory
+from hovi.whole_file import reason, whole_file
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")
+"""The colors of Okabe and Ito, which people with any color vision tell apart."""
+_STYLES = ("-", "--", ":", "-.")
+_DPI = 150
+_POINTS = 2_000
+_MOST_MARKS = 150
+_SURFACE_TIMES = 300
+_SECTIONS = 13
+_STRIPS = 6
+_METADATA: dict[str, dict[str, str | None]] = {
+    ".png": {"Software": None},
+    ".pdf": {"CreationDate": None},
+    ".svg": {"Date": None},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class _Curve:
+    """A motion sampled interval by interval, its ends included: m points in each of N."""
+
+    t: Array  # (N, m)
+    motion: Sample  # arrays (N, m, n)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """What one panel shows, and how angular and linear coordinates are scaled and labelled."""
+
+    angular: tuple[str, float]
+    linear: tuple[str, float]
+
+
+_POSITION = _Panel(("angle [deg]", np.degrees(1.0)), ("position [m]", 1.0))
+_VELOCITY = _Panel(("velocity [deg/s]", np.degrees(1.0)), ("velocity [m/s]", 1.0))
+_EFFORT = _Panel(("torque [N m]", 1.0), ("force [N]", 1.0))
+
+
+def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+    """Positions, velocities and efforts over time, one line per coordinate, nodes as marks.
+
+    path: a PNG, PDF or SVG by its suffix, written whole or not at all. Raises DisplayError.
+    """
+    curve = _sampled(trajectory)
+    figure = Figure(figsize=(8.0, 7.5), layout="constrained")
+    axes = figure.subplots(3, sharex=True)
+    q = _coordinates(trajectory.robot, curve.motion.q)
+    values = (q, curve.motion.v, curve.motion.tau)
+    for ax, panel, y in zip(axes, (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
+        _draw(ax, trajectory, panel, curve.t, y)
+    axes[-1].set_xlabel("time [s]")
+    _legend(figure, axes[0])
+    _write(figure, path)
+
+
+def plot_angles(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+    """The configuration over time [ColomboFerraroMartin2016, section 5, first result].
+
+    path: as in `plot`.
+    """
+    curve = _sampled(trajectory)
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    ax = figure.subplots()
+    _draw(ax, trajectory, _POSITION, curve.t, _coordinates(trajectory.robot, curve.motion.q))
+    ax.set_xlabel("time [s]")
+    _legend(figure, ax)
+    _write(figure, path)
+
+
+def plot_swept_surface(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    window: tuple[float, float] | None = None,
+) -> None:
+    """The surface that the chain from base to tip sweeps, over time and the plane it moves in.
+
+    A section at a fixed time shows the links as they stand then
+    [ColomboFerraroMartin2016, section 5, second result].
+
+    path: as in `plot`.
+    window: times between which it is drawn, in [s]; 0.3 T to 0.6 T when not given.
+    """
+    start, end = window or (0.3 * trajectory.duration, 0.6 * trajectory.duration)
+    if not 0 <= start < end <= trajectory.duration:
+        raise DisplayError(
+            f"the window {start:g} to {end:g} s must lie within 0 and {trajectory.duration:g} s."
+        )
+    t = np.linspace(start, end, _SURFACE_TIMES)
+    points = _chain(_robot(trajectory), trajectory.configurations(t))  # (links + 1, M, 3)
+    plane = np.sort(np.argsort(np.ptp(points, axis=(0, 1)))[1:])  # the axis that varies least goes
+    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
+    ax = figure.add_subplot(projection="3d")
+    assert isinstance(ax, Axes3D)
+    _sweep(ax, t, points[:, :, plane])
+    across, up = ("xyz"[axis] for axis in plane)
+    _dress_surface(ax, across, up, np.ptp(points[:, :, plane], axis=(0, 1)))
+    _write(figure, path)
+
+
+def plot_all(trajectory: Trajectory, path: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """`plot`, and for a planar two-link arm the paper's two pictures beside it.
+
+    path: of the first picture; the others add `_angles` and `_surface` to its stem.
+    Returns the files written.
+    """
+    first = Path(path)
+    plot(trajectory, first)
+    if trajectory.robot is None or not is_planar_two_link(trajectory.robot):
+        return (first,)
+    angles, surface = (
+        first.with_name(f"{first.stem}_{name}{first.suffix}") for name in ("angles", "surface")
+    )
+    plot_angles(trajectory, angles)
+    plot_swept_surface(trajectory, surface)
+    return first, angles, surface
+
+
+def is_planar_two_link(robot: Robot) -> bool:
+    """Whether a robot is two revolute joints, one carrying the other, with parallel axes."""
+    if (robot.nq, robot.nv) != (2, 2) or list(robot.model.parents)[2] != 1:
+        return False
+    first, second = _axes_in_world(robot).T
+    return bool(_is_angular(robot).all() and abs(first @ second) > 1 - 1e-9)
+
+
+def _robot(trajectory: Trajectory) -> Robot:
+    if trajectory.robot is None:
+        raise DisplayError(
+            "this motion was saved without its robot, which was a bare Pinocchio model: its links "
+            "cannot be drawn."
+        )
+    return trajectory.robot
+
+
+def _axes_in_world(robot: Robot) -> Array:
+    """Angular part of each coordinate's motion at the neutral configuration, shape (3, nv)."""
+    data = robot.model.createData()
+    axes: Array = pin.computeJointJacobians(robot.model, data, robot.neutral())[3:]
+    return axes
+
+
+def _is_angular(robot: Robot) -> Mask:
+    angular: Mask = np.linalg.norm(_axes_in_world(robot), axis=0) > 0.5
+    return angular
+
+
+def _coordinates(robot: Robot | None, q: Array) -> Array:
+    """A configuration as nv numbers: q itself, or where nq != nv its distance from neutral."""
+    if robot is None or robot.vector_joints:
+        return q
+    return robot.difference(np.broadcast_to(robot.neutral(), q.shape), q)
+
+
+def _chain(robot: Robot, q: Array) -> Array:
+    """Origins of the joints that carry the tip, and the tip, shape (links + 1, M, 3), in [m]."""
+    model = robot.model
+    tip = model.frames[model.getFrameId(robot.tip_frame)]
+    joints = [joint for joint in model.supports[tip.parentJoint] if joint != 0]
+    data, points = model.createData(), np.empty((len(joints) + 1, len(q), 3))
+    for i, configuration in enumerate(q):
+        pin.forwardKinematics(model, data, configuration)
+        points[:-1, i] = [data.oMi[joint].translation for joint in joints]
+        points[-1, i] = (data.oMi[tip.parentJoint] * tip.placement).translation
+    return points
+
+
+def _sampled(trajectory: Trajectory) -> _Curve:
+    N = trajectory.grid.intervals
+    s = np.linspace(0.0, 1.0, max(3, -(-_POINTS // N) + 1))
+    motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    t = trajectory.t[:-1, None] + trajectory.grid.steps[:, None] * s
+    return _Curve(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)))
+
+
+def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, t: Array, y: Array) -> None:
+    """One line per coordinate; linear ones on an axis of their own, at the right if need be."""
+    robot = trajectory.robot
+    if robot is None:  # nobody knows which coordinates are angles: no conversion
+        label = f"{panel.angular[0].split(' [')[0]} [SI]".replace("angle", "position")
+        _lines(ax, trajectory, t, y, np.arange(y.shape[-1]))
+        _dress(ax, label)
+        return
+    angular, side = _is_angular(robot), ax
+    for mask, (label, scale) in ((angular, panel.angular), (~angular, panel.linear)):
+        if mask.any():
+            side = ax.twinx() if side.lines else ax
+            _lines(side, trajectory, t, scale * y, np.flatnonzero(mask))
+            _dress(side, label)
+            if side is not ax:
+                side.grid(False)
+
+
+def _lines(
+    ax: Axes, trajectory: Trajectory, t: Array, y: Array, members: npt.NDArray[np.intp]
+) -> None:
+    looks = [(c, style) for style, c in itertools.product(_STYLES, _COLORS)]
+    gap = np.full((len(t), 1), np.nan)
+    broken = np.hstack([t, gap]).ravel()
+    for i in members:
+        color, style = looks[i % len(looks)]
+        name = trajectory.coordinate_names[i]
+        line = np.hstack([y[:, :, i], gap]).ravel()
+        ax.plot(broken, line, style, color=color, linewidth=1.4, label=name)
+        if len(t) <= _MOST_MARKS:
+            ends = np.s_[:, [0, -1]]
+            ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)
+    ax.set_xlim(0.0, trajectory.duration)
+
+
+def _dress(ax: Axes, label: str) -> None:
+    ax.set_ylabel(label)
+    ax.grid(color="0.88", linewidth=0.6)
+    ax.spines["top"].set_visible(False)
+
+
+def _legend(figure: Figure, ax: Axes) -> None:
+    """One legend above the figure, for the lines of all axes that share the first panel."""
+    shared: Iterable[Axes] = [a for a in figure.axes if a.bbox.bounds == ax.bbox.bounds]
+    pairs = [pair for a in shared for pair in zip(*a.get_legend_handles_labels(), strict=True)]
+    handles, labels = zip(*pairs, strict=True)
+    columns = min(len(labels), 4)
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
+
+
+def _sweep(ax: Axes3D, t: Array, points: Array) -> None:
+    """A ruled surface per link, in patches that are sorted by depth together.
+
+    Some columns of patches are dark: the links at those times.
+    """
+    u = np.linspace(0.0, 1.0, _STRIPS + 1)[:, None, None]
+    dark = np.zeros(len(t) - 1, dtype=bool)
+    dark[np.linspace(0, len(t) - 2, _SECTIONS).astype(int)] = True
+    patches, colors = [], []
+    for link, (p0, p1) in enumerate(itertools.pairwise(points)):
+        plane = (1 - u) * p0 + u * p1  # (strips + 1, M, 2)
+        times = np.broadcast_to(t[:, None], (*plane.shape[:2], 1))
+        mesh = np.concatenate([times, plane], axis=2)
+        corners = [mesh[:-1, :-1], mesh[:-1, 1:], mesh[1:, 1:], mesh[1:, :-1]]
+        patches.append(np.stack(corners, axis=2).reshape(-1, 4, 3))
+        light = 0.75 * np.array(to_rgb(_COLORS[link % len(_COLORS)])) + 0.25
+        colors.append(np.tile(np.where(dark[:, None], 0.35 * light, light), (_STRIPS, 1)))
+    faces = np.concatenate(colors)
+    ax.add_collection3d(
+        Poly3DCollection(np.concatenate(patches), facecolors=faces, edgecolors=faces, shade=True)
+    )
+    across, up = points.reshape(-1, 2).T
+    ax.auto_scale_xyz(t, across, up)
+
+
+def _dress_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
+    """Labels, and lengths of the two space axes in proportion."""
+    ax.set_xlabel("time [s]", labelpad=12)
+    ax.set_ylabel(f"{across} [m]", labelpad=6)
+    ax.set_zlabel(f"{up} [m]")
+    for axis in (ax.yaxis, ax.zaxis):
+        axis.set_major_locator(MaxNLocator(5))
+    ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.05)
+    ax.view_init(elev=22, azim=-58)
+
+
+def _write(figure: Figure, path: str | os.PathLike[str]) -> None:
+    suffix = Path(path).suffix.lower()
+    if suffix not in _METADATA:
+        raise DisplayError(
+            f"cannot tell what picture {Path(path).name!r} is to be; "
+            f"let its name end in {', '.join(_METADATA)}."
+        )
+    try:
+        with whole_file(path) as stream:
+            figure.savefig(stream, format=suffix[1:], dpi=_DPI, metadata=_METADATA[suffix])
+    except OSError as error:
+        raise DisplayError(f"cannot write the picture {str(path)!r}: {reason(error)}.") from error

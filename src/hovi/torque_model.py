@@ -1,0 +1,139 @@
+"""Joint torques tau(q, v, a, t) at batches of points, with their exact derivatives."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.point_function import PointFunction
+from hovi.rigid_body import InverseDynamicsKernel
+
+Array = npt.NDArray[np.float64]
+
+
+class TorqueModel(Protocol):
+    """tau(q, v, a, t) with its derivatives in the tangent space."""
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv), in [N m] or [N]."""
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv).
+
+        R: weight of each joint, shape (nv,). curvature: shape (P, nv); R * tau when None.
+        """
+
+
+class CasadiTorque:
+    """A torque model from CasADi expressions: the definition, and the fallback of faster ones."""
+
+    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX) -> None:
+        q, v, a, t = symbols
+        x = ca.vertcat(q, v, a)
+        weight = ca.SX.sym("weight", tau.shape[0])
+        J = ca.jacobian(tau, x)
+        curvature = ca.hessian(ca.dot(weight, tau), x)[0]
+        self.nv = int(tau.shape[0])
+        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]))
+        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]))
+        self._curvature = PointFunction(ca.Function("ddtau", [q, v, a, t, weight], [curvature]))
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv)."""
+        return self._torque(q, v, a, times(t, len(q)))[0].reshape(len(q), self.nv)
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau and its Jacobian."""
+        tau, J = self._linearize(q, v, a, times(t, len(q)))
+        return tau.reshape(len(q), self.nv), J.reshape(len(q), self.nv, 3 * self.nv)
+
+    def curvature(self, q: Array, v: Array, a: Array, t: Array | None, weight: Array) -> Array:
+        """sum_i weight_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        return self._curvature(q, v, a, times(t, len(q)), weight)[0]
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and the Hessian of TorqueModel.expand."""
+        tau, J = self.linearize(q, v, a, t)
+        weight = R * tau if curvature is None else curvature
+        hessian = np.matmul(J.transpose(0, 2, 1) * R, J) + self.curvature(q, v, a, t, weight)
+        return tau, J, hessian
+
+
+class AnalyticTorque:
+    """RNEA with Pinocchio's analytic derivatives, and what effects add from CasADi, if anything.
+
+    kernel: RNEA of the scene's model. added: the effects' torques, or None.
+    """
+
+    def __init__(self, kernel: InverseDynamicsKernel, added: CasadiTorque | None = None) -> None:
+        self.kernel = kernel
+        self.added = added
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv)."""
+        tau = self.kernel.torque(q, v, a)
+        return tau if self.added is None else tau + self.added.torque(q, v, a, t)
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau and its Jacobian."""
+        tau, J = self.kernel.linearize(q, v, a)
+        if self.added is not None:
+            more, dmore = self.added.linearize(q, v, a, t)
+            tau, J = tau + more, J + dmore
+        return tau, J
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and the Hessian of TorqueModel.expand."""
+        if self.added is None:
+            return self.kernel.expand(q, v, a, R, curvature)
+        more, dmore = self.added.linearize(q, v, a, t)
+        if curvature is None:
+            curvature = R * (self.kernel.torque(q, v, a) + more)
+        tau, J, hessian = self.kernel.expand(q, v, a, R, curvature)
+        RdJ = R[:, None] * dmore
+        cross = np.matmul(J.transpose(0, 2, 1), RdJ)
+        hessian += cross + cross.transpose(0, 2, 1)
+        hessian += np.matmul(dmore.transpose(0, 2, 1), RdJ)
+        hessian += self.added.curvature(q, v, a, t, curvature)
+        return tau + more, J + dmore, hessian
+
+
+def times(t: Array | None, points: int) -> Array:
+    """Times as a column, zeros where nothing depends on time, shape (P, 1)."""
+    return np.zeros((points, 1)) if t is None else np.asarray(t, dtype=np.float64).reshape(-1, 1)
