@@ -113,10 +113,13 @@ def headless_browser(profile: Path, size: tuple[int, int] = (800, 600)) -> Itera
         async def join() -> Any:
             return await connect(url, max_message_size=2**28)
 
+        async def leave(socket: Any) -> None:
+            socket.close()
+            await asyncio.sleep(0.1)
+
         socket = loop.run_until_complete(join())
         yield Tab(socket, loop)
-        socket.close()
-        loop.run_until_complete(asyncio.sleep(0.1))
+        loop.run_until_complete(leave(socket))
     finally:
         process.terminate()
         process.wait(timeout=20)

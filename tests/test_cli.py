@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+import urllib.request
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -174,7 +176,9 @@ def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> Non
 
 
 def test_a_motion_becomes_a_picture(run: Run, motion: Path, tmp_path: Path) -> None:
-    assert run("plot", motion, "--out", tmp_path)[0] == 0
+    code, out, _ = run("plot", motion, "--out", tmp_path)
+    assert code == 0
+    assert f"wrote {tmp_path / 'reach.png'}" in out
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -182,6 +186,27 @@ def test_a_motion_becomes_a_page(run: Run, motion: Path, tmp_path: Path) -> None
     page = tmp_path / "reach.html"
     assert run("replay", motion, "--html", page)[0] == 0
     assert "<html" in page.read_text()[:1000].lower()
+
+
+def test_a_live_replay_serves_its_page_until_it_is_interrupted(motion: Path) -> None:
+    command = [sys.executable, "-m", "hovi", "replay", str(motion), "--no-browser"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        assert process.stdout is not None
+        address = re.search(r"http://\S+?(?=;)", process.stdout.readline())
+        assert address is not None
+        with urllib.request.urlopen(address[0], timeout=10) as page:
+            assert page.status == 200
+        time.sleep(1.5)  # longer than the motion
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "Traceback" not in err
 
 
 # Bad input

@@ -6,6 +6,7 @@ import dataclasses
 import math
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -239,7 +240,7 @@ def test_an_effect_takes_its_own_defaults(folder: Path) -> None:
         ({"limits": "urdf"}, SceneError),
     ],
 )
-def test_a_task_is_valid_once_built(change: dict[str, object], error: type[HoviError]) -> None:
+def test_a_task_is_valid_once_built(change: dict[str, Any], error: type[HoviError]) -> None:
     with pytest.raises(error):
         dataclasses.replace(load_task(example("two_link_reach")), **change)
 

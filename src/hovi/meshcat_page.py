@@ -41,7 +41,7 @@ body {{ margin: 0; font: 13px system-ui, sans-serif; }}
 </head>
 <body>
 <div id="meshcat-pane"></div>
-<div id="caption">{title}</div>
+<div id="caption">{title}<br>{note}</div>
 {meshcat}
 <script>
 const drawObject = MeshCat.Viewer.prototype.set_object;
@@ -85,11 +85,12 @@ class Page:
     Messages that a later one overrides are dropped, so the page stays as small as its content.
 
     title: of the browser's window, and a line in the page's corner.
+    note: a second line there, such as a sentence about meshes that were not found.
     """
 
-    def __init__(self, title: str) -> None:
+    def __init__(self, title: str, note: str = "") -> None:
         """An empty page."""
-        self.title = title
+        self.title, self.note = title, note
         self.web_url = ""
         self._messages: dict[tuple[str, str, str], bytes] = {}
         self._uuids: dict[bytes, bytes] = {}
@@ -129,8 +130,8 @@ class Page:
         return self._fill("", '<script src="main.min.js"></script>', "viewer.connect();")
 
     def _fill(self, policy: str, meshcat: str, start: str) -> str:
-        title = html.escape(self.title)
-        return _PAGE.format(policy=policy, title=title, meshcat=meshcat, start=start)
+        title, note = html.escape(self.title), html.escape(self.note)
+        return _PAGE.format(policy=policy, title=title, note=note, meshcat=meshcat, start=start)
 
     def _forget(self, path: str) -> None:
         inside = path.rstrip("/") + "/"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import threading
-from typing import Any
 
 import tornado.httpserver
-import tornado.netutil
 import tornado.web
 import tornado.websocket
 
@@ -20,26 +19,29 @@ _HOST = "127.0.0.1"
 class ServedPage(Page):
     """A page that browsers see change while it changes.
 
-    title: of the page.
+    title, note: as in Page.
     port: port on the loopback interface; 0 for any free one.
     Raises DisplayError when the port cannot be had.
     """
 
-    def __init__(self, title: str, port: int = 0) -> None:
+    def __init__(self, title: str, note: str = "", port: int = 0) -> None:
         """An empty page that is served from now on."""
-        super().__init__(title)
+        super().__init__(title, note)
+        if not 0 <= port < 2**16:
+            raise DisplayError(f"a port is a number from 0 to 65535, not {port}.")
         try:
-            sockets = tornado.netutil.bind_sockets(port, _HOST)
-        except (OSError, OverflowError) as error:
+            listener = socket.create_server((_HOST, port), backlog=128)
+        except OSError as error:
             raise DisplayError(
                 f"cannot serve a page on port {port} of {_HOST}: {error}; "
                 "another program may hold it: choose another port, or 0 for any free one."
             ) from error
-        self.web_url = f"http://{_HOST}:{sockets[0].getsockname()[1]}/view/"
+        listener.setblocking(False)
+        self.web_url = f"http://{_HOST}:{listener.getsockname()[1]}/view/"
         self._browsers: set[_Browser] = set()
         self._connected = threading.Event()
         self._loop = asyncio.new_event_loop()
-        self._loop.call_soon(self._listen, sockets)
+        self._loop.call_soon(self._listen, listener)
         self._thread = threading.Thread(target=self._run, name="hovi-viewer", daemon=True)
         self._thread.start()
 
@@ -71,7 +73,7 @@ class ServedPage(Page):
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
             self._loop.close()
 
-    def _listen(self, sockets: list[Any]) -> None:
+    def _listen(self, listener: socket.socket) -> None:
         application = tornado.web.Application(
             [
                 tornado.web.url(r"/view/", _LivePage, {"page": self}),
@@ -81,7 +83,7 @@ class ServedPage(Page):
             log_function=lambda handler: None,
         )
         self._server = tornado.httpserver.HTTPServer(application)
-        self._server.add_sockets(sockets)
+        self._server.add_socket(listener)
 
     def _broadcast(self, packed: bytes) -> None:
         for browser in list(self._browsers):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from joblib import Parallel, delayed, parallel_config
 
@@ -60,7 +60,6 @@ class Pool:
     job: Job
     processes: int
     deadline: float | None = None
-    solved: list[Solution] = field(default_factory=list)
 
     def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
         """Solutions in the order of the guesses."""
@@ -73,7 +72,7 @@ class Pool:
             parts = Parallel(n_jobs=count)(delayed(_solve_chunk)(self.job, c, left) for c in chunks)
         solutions: list[Solution | None] = [None] * len(guesses)
         for i, part in enumerate(parts):
-            solutions[i::count] = part
+            solutions[i : i + count * len(part) : count] = part
         return [solution for solution in solutions if solution is not None]
 
 
@@ -85,22 +84,39 @@ def _solve_chunk(
     solutions = []
     for guess in guesses:
         left = None if ends is None else max(ends - time.monotonic(), 0.0)
-        solutions.append(solve(problem, guess, max_iterations=job.max_iterations, time_limit=left))
+        solution = solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
+        solutions.append(solution)
+        if solution.status is Status.INTERRUPTED:
+            break
     return solutions
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What a search from many starts found.
+
+    minima: distinct minima by ascending cost; the best of the rest where there are none.
+    done: how many of the starts were solved. interrupted: whether a person ended the search.
+    """
+
+    minima: list[Solution]
+    done: int
+    interrupted: bool
 
 
 def explore(
     pool: Pool, first: DiscretePath, starts: int, seed: int, progress: Progress
-) -> list[Solution]:
-    """Distinct minima by ascending cost, then the rest; the first guess is the first start.
+) -> Exploration:
+    """Solve from many starts, of which the first guess is the first.
 
     starts: number of solves. seed: of the random bumps.
     KeyboardInterrupt and the pool's deadline end the search with what was found.
     """
+    interrupted = False
     solutions: list[Solution] = []
     try:
         solutions += pool.solve_all([first])
-        while len(solutions) < starts and not _expired(pool):
+        while len(solutions) < starts and not _ended(pool, solutions):
             guesses = _round(pool.job, distinct(solutions), first, len(solutions), starts, seed)
             solutions += pool.solve_all(guesses)
             best = min(solution.cost for solution in solutions)
@@ -111,10 +127,15 @@ def explore(
     except KeyboardInterrupt:
         if not solutions:
             raise
-    return distinct(solutions)
+        interrupted = True
+    interrupted = interrupted or any(s.status is Status.INTERRUPTED for s in solutions)
+    return Exploration(distinct(solutions), len(solutions), interrupted)
 
 
-def _expired(pool: Pool) -> bool:
+def _ended(pool: Pool, solutions: Sequence[Solution]) -> bool:
+    """Whether time is up, or a person asked for an end."""
+    if any(solution.status is Status.INTERRUPTED for solution in solutions):
+        return True
     return pool.deadline is not None and time.monotonic() > pool.deadline
 
 

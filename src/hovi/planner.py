@@ -23,6 +23,9 @@ COARSE_INTERVALS = 60
 REFINED = 6
 """Coarse minima that are refined and ranked on the grid that was asked for."""
 
+EXPLORING = 0.7
+"""Share of a time limit that the search may take when its minima are refined afterwards."""
+
 Progress = Callable[[str, float], None]
 
 
@@ -96,13 +99,24 @@ class _Search:
     ) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the grid that was asked for."""
         job = self._coarse()
-        pool = Pool(job, self.processes, self.deadline)
+        pool = Pool(job, self.processes, self._explore_until(job))
         first = guess_path(job.problem(), guess)
-        found = explore(pool, first, starts, seed, self.progress)
+        search = explore(pool, first, starts, seed, self.progress)
+        found = search.minima
         if job is not self.fine:
-            found = self._refine(found)
-        minima = tuple(s.cost for s in found if s.success)
-        return found[0], minima
+            found = _on_coarse_grid(found[:1]) if search.interrupted else self._refine(found)
+        best = found[0]
+        if search.done < starts:
+            ended = f"{best.message} The search ended after {search.done} of {starts} starts."
+            best = dataclasses.replace(best, message=ended)
+        return best, tuple(s.cost for s in found if s.success)
+
+    def _explore_until(self, job: Job) -> float | None:
+        """The search's deadline, which leaves time for refining."""
+        if self.deadline is None or job is self.fine:
+            return self.deadline
+        now = time.monotonic()
+        return now + EXPLORING * (self.deadline - now)
 
     def _coarse(self) -> Job:
         grid = self.fine.grid
@@ -115,11 +129,19 @@ class _Search:
         problem = self.fine.problem()
         guesses = [guess_path(problem, s.trajectory) for s in found[:REFINED]]
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
-        deadline = self.deadline
-        if deadline is not None:
-            deadline = max(deadline, time.monotonic() + 1e-3)
-        pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, deadline)
+        pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, self.deadline)
         return distinct(pool.solve_all(guesses))
+
+
+def _on_coarse_grid(found: list[Solution]) -> list[Solution]:
+    """The best so far when a person ends the search before the grid that was asked for."""
+    (best,) = found
+    message = (
+        "interrupted before the grid that was asked for was reached; the motion is the best so far, "
+        f"on {best.trajectory.grid.intervals} intervals: {best.message}"
+    )
+    status = Status.INTERRUPTED
+    return [dataclasses.replace(best, success=False, status=status, message=message)]
 
 
 def _state(state: State | npt.ArrayLike) -> State:

@@ -141,7 +141,7 @@ def replay(
     if html is not None:
         return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
     robot = _robot(trajectory)
-    page = ServedPage(_title(trajectory, robot), port)
+    page = ServedPage(_title(trajectory, robot), robot.visual_problem, port)
     try:
         shown = Replay(trajectory, _draw(trajectory, robot, page, trace), page.web_url, page)
         announce(page.web_url)
@@ -170,7 +170,7 @@ def write_html(
     """
     _check_positive("speed", speed)
     robot = _robot(trajectory)
-    page = Page(_title(trajectory, robot))
+    page = Page(_title(trajectory, robot), robot.visual_problem)
     visualizer = _draw(trajectory, robot, page, trace)
     page.keep(_animation(trajectory, visualizer, loop))
     text = page.offline_html(speed)

@@ -67,10 +67,29 @@ _EFFORT = _Panel(("torque [N m]", 1.0), ("force [N]", 1.0))
 
 
 def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
-    """Positions, velocities and efforts over time, one line per coordinate, nodes as marks.
+    """Write `motion_figure` to a file.
 
     path: a PNG, PDF or SVG by its suffix, written whole or not at all. Raises DisplayError.
     """
+    _write(motion_figure(trajectory), path)
+
+
+def plot_angles(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+    """Write `angles_figure` to a file, as `plot` does."""
+    _write(angles_figure(trajectory), path)
+
+
+def plot_swept_surface(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    window: tuple[float, float] | None = None,
+) -> None:
+    """Write `surface_figure` to a file, as `plot` does."""
+    _write(surface_figure(trajectory, window), path)
+
+
+def motion_figure(trajectory: Trajectory) -> Figure:
+    """Positions, velocities and efforts over time, one line per coordinate, nodes as marks."""
     curve = _sampled(trajectory)
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     axes = figure.subplots(3, sharex=True)
@@ -80,35 +99,28 @@ def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
         _draw(ax, trajectory, panel, curve.t, y)
     axes[-1].set_xlabel("time [s]")
     _legend(figure, axes[0])
-    _write(figure, path)
+    return figure
 
 
-def plot_angles(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
-    """The configuration over time [ColomboFerraroMartin2016, section 5, first result].
-
-    path: as in `plot`.
-    """
+def angles_figure(trajectory: Trajectory) -> Figure:
+    """The configuration over time [ColomboFerraroMartin2016, section 5, first result]."""
     curve = _sampled(trajectory)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     ax = figure.subplots()
     _draw(ax, trajectory, _POSITION, curve.t, _coordinates(trajectory.robot, curve.motion.q))
     ax.set_xlabel("time [s]")
     _legend(figure, ax)
-    _write(figure, path)
+    return figure
 
 
-def plot_swept_surface(
-    trajectory: Trajectory,
-    path: str | os.PathLike[str],
-    window: tuple[float, float] | None = None,
-) -> None:
+def surface_figure(trajectory: Trajectory, window: tuple[float, float] | None = None) -> Figure:
     """The surface that the chain from base to tip sweeps, over time and the plane it moves in.
 
     A section at a fixed time shows the links as they stand then
     [ColomboFerraroMartin2016, section 5, second result].
 
-    path: as in `plot`.
     window: times between which it is drawn, in [s]; 0.3 T to 0.6 T when not given.
+    Raises DisplayError when the window lies outside the motion, or the robot is not known.
     """
     start, end = window or (0.3 * trajectory.duration, 0.6 * trajectory.duration)
     if not 0 <= start < end <= trajectory.duration:
@@ -124,7 +136,7 @@ def plot_swept_surface(
     _sweep(ax, t, points[:, :, plane])
     across, up = ("xyz"[axis] for axis in plane)
     _dress_surface(ax, across, up, np.ptp(points[:, :, plane], axis=(0, 1)))
-    _write(figure, path)
+    return figure
 
 
 def plot_all(trajectory: Trajectory, path: str | os.PathLike[str]) -> tuple[Path, ...]:

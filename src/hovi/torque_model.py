@@ -120,11 +120,11 @@ class AnalyticTorque:
         curvature: Array | None,
     ) -> tuple[Array, Array, Array]:
         """tau, J and the Hessian of TorqueModel.expand."""
+        if curvature is None:
+            curvature = R * self.torque(q, v, a, t)
         if self.added is None:
             return self.kernel.expand(q, v, a, R, curvature)
         more, dmore = self.added.linearize(q, v, a, t)
-        if curvature is None:
-            curvature = R * (self.kernel.torque(q, v, a) + more)
         tau, J, hessian = self.kernel.expand(q, v, a, R, curvature)
         RdJ = R[:, None] * dmore
         cross = np.matmul(J.transpose(0, 2, 1), RdJ)

@@ -123,6 +123,7 @@ class Trajectory:
         k: numbers of intervals, shape (M,). s: places in [0, 1] of the interval, shape (M,).
         """
         k, s = np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64)
+        _check_flat_joints(self.robot)
         q, v, a = self._interpolate(k, s)
         if self.torque is not None:
             return Sample(q, v, a, self.torque(k, s))
@@ -268,6 +269,18 @@ def _check_shapes(trajectory: Trajectory) -> None:
         )
     if trajectory.scene is None and nq != nv:
         raise InputError(f"without a scene nq must equal nv, and nq is {nq}, nv is {nv}.")
+
+
+def _check_flat_joints(robot: Robot | None) -> None:
+    """Refuse joints on whose charts the rates of the coordinates are not velocities."""
+    if robot is None:
+        return
+    for joint in list(robot.model.joints)[1:]:
+        if joint.nq != joint.nv and joint.nv > 1:
+            raise InputError(
+                f"joint {robot.model.names[joint.id]!r} has nq={joint.nq}, nv={joint.nv}: "
+                "velocities between the nodes are not available for it; use configurations(t)."
+            )
 
 
 def _check_name(scheme: Scheme) -> None:

@@ -133,7 +133,7 @@ def test_functions_survive_pickling(load_model) -> None:
 
 def test_an_unknown_frame_is_refused_with_near_names(load_model) -> None:
     functions = rigid_body.casadi_functions(load_model("ur5"))
-    with pytest.raises(ModelError, match="'tool'.*'tool0'"):
+    with pytest.raises(ModelError, match=r"'tool'.*'tool0'"):
         functions.frame_placement("tool")
 
 

@@ -198,7 +198,7 @@ def test_an_empty_batch_gives_empty_arrays(load_model) -> None:
 
 def test_strided_and_integer_arrays_are_accepted(load_model) -> None:
     kernel = InverseDynamicsKernel(load_model("ur5"))
-    q, v, a, _ = random_points(6, 8)
+    q, _, a, _ = random_points(6, 8)
     zeros = np.zeros((4, 6), dtype=int)
     strided = kernel.torque(q[::2], zeros, a[::2])
     plain = kernel.torque(q[::2].copy(), zeros.astype(float), a[::2].copy())

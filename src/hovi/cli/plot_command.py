@@ -12,7 +12,10 @@ def plot(
     file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR|PNG", help="Where the picture goes (or .pdf, .svg); FILE.png when not given."),
+        typer.Option(
+            metavar="DIR|PNG",
+            help="Where the picture goes (or .pdf, .svg); FILE.png when not given.",
+        ),
     ] = None,
 ) -> None:
     """Draw q, v, a and tau of a motion over time; for a planar two-link arm, its sweep too."""

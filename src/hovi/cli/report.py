@@ -122,7 +122,7 @@ def _range(low: float, high: float) -> str:
     if math.isinf(low) and math.isinf(high):
         return "-"
     if low == -high:
-        return f"±{_short(high)}"
+        return f"+-{_short(high)}"
     return f"{_short(low)} .. {_short(high)}"
 
 

@@ -205,12 +205,12 @@ def _ratio(actual: float, predicted: float, noise: float) -> float:
 
 
 def _next_radius(radius: float, trial: Trial, ratio: float) -> float:
-    if ratio < 0.1:
-        return 0.25 * min(radius, trial.norm)
+    """Where the model failed, the minimum of a parabola along the step, within bounds."""
     if ratio < 0.25:
-        return 0.5 * min(radius, trial.norm)
-    if ratio > 0.75 and trial.norm > 0.8 * radius:
-        return 2.5 * radius
+        share = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
+        return max(0.25, share) * min(radius, trial.norm)
+    if ratio > 0.75 and trial.norm > 0.7 * radius:
+        return (2.0 if ratio > 0.9 else 1.4) * radius
     return radius
 
 
@@ -220,11 +220,11 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
     guess: the shift of the last subproblem, a first value for this one.
     """
     search = _ShiftSearch(model, radius)
-    shift = 0.0
+    shift = guess
     for attempt in range(PASS_SHIFTS):
         factor = model.factor(shift)
         if factor is None:
-            shift = search.after_failure(shift, guess)
+            shift = search.after_failure(shift)
             continue
         trial, slope = search.step_at(factor, shift)
         if trial.norm <= 1.25 * radius and (shift == 0.0 or trial.norm >= 0.75 * radius):
@@ -247,14 +247,13 @@ class _ShiftSearch:
         self.high = np.inf
         self.indefinite = False
 
-    def after_failure(self, shift: float, guess: float) -> float:
+    def after_failure(self, shift: float) -> float:
         """The next shift where H + shift D is not positive definite."""
         self.indefinite = True
         self.low = max(self.low, shift)
         if np.isfinite(self.high):
             return max(math.sqrt(self.low * self.high), 0.1 * self.high)
-        scale = self.model.curvature_scale()
-        return max(guess if shift == 0.0 else 0.0, 10.0 * shift, 1e-6 * scale)
+        return max(4.0 * shift, 1e-6 * self.model.curvature_scale())
 
     def step_at(self, factor: Factor, shift: float) -> tuple[Trial, float]:
         """The step of a shift, and the slope s.D (H + shift D)^-1 D s."""
@@ -279,6 +278,8 @@ class _ShiftSearch:
             newton = shift + trial.norm**2 / slope * (trial.norm - self.radius) / self.radius
         if self.low < newton < self.high:
             return newton
+        if newton <= 0.0 and not self.indefinite and self.low == 0.0:
+            return 0.0
         if not np.isfinite(self.high):
             return max(10 * shift, 1e-6 * self.model.curvature_scale())
         return max(math.sqrt(self.low * self.high), 1e-3 * self.high)

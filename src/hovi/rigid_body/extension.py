@@ -6,7 +6,9 @@ found by name once they are in the process.
 
 from __future__ import annotations
 
-import casadi
+from importlib.metadata import version
+
+import casadi  # noqa: F401  (loads libcasadi)
 import pinocchio as pin
 
 from hovi.errors import HoviError
@@ -21,7 +23,7 @@ try:
 except ImportError as error:
     raise BuildMismatchError(
         f"hovi's compiled extension does not load beside pin {pin.__version__} and casadi "
-        f"{casadi.__version__} ({error}); reinstall it with `pip install --force-reinstall hovi`."
+        f"{version('casadi')} ({error}): reinstall hovi so that it is compiled again."
     ) from error
 
 __all__ = ["BuildMismatchError", "archive"]

@@ -40,7 +40,7 @@ class InverseDynamicsKernel:
 
     Points come as q, v, a of shape (P, n) in [rad], [rad/s], [rad/s^2] (metres for sliding joints).
     The points are shared out over `threads` threads; their number does not change a bit of the
-    result. Pinocchio's GIL is released and nothing is allocated per point. One call at a time runs
+    result. The GIL is released and nothing is allocated per point. One call at a time runs
     on a kernel: calls from several Python threads wait for each other.
     """
 

@@ -21,8 +21,13 @@ Index padded(Index size) { return (size + tile - 1) / tile * tile; }
 // c[j + n k] = sum_i curvature_i T(i, j, k)
 void contract(const Tensor& T, const Eigen::VectorXd& curvature, Eigen::VectorXd& c) {
   const Index n = curvature.size();
-  c.noalias() =
-      Eigen::Map<const Eigen::MatrixXd>(T.data(), n, n * n).transpose() * curvature;
+  c.noalias() = Eigen::Map<const Eigen::MatrixXd>(T.data(), n, n * n).transpose() * curvature;
+}
+
+// More threads than points or cores would only cost memory.
+std::size_t useful_threads(std::size_t asked, std::size_t points) {
+  const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
+  return std::max<std::size_t>(1, std::min({asked, points, cores}));
 }
 
 void gather_jacobian(Worker& w) {
@@ -112,7 +117,7 @@ struct InverseDynamicsKernel::Parts {
   void for_each_point(const Points& points, int threads, const Work& work) {
     const std::lock_guard<std::mutex> lock(busy);
     const std::size_t n = model.nv;
-    const std::size_t chunks = std::clamp<std::size_t>(threads, 1, std::max<std::size_t>(points.count, 1));
+    const std::size_t chunks = useful_threads(threads, points.count);
     while (workers.size() < chunks) workers.push_back(std::make_unique<Worker>(model));
     const auto run = [&](std::size_t chunk) {
       Worker& worker = *workers[chunk];

@@ -1,0 +1,66 @@
+"""The package is a tower: a module imports only from the floors below its own."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import hovi
+
+SOURCE = Path(hovi.__file__).parent
+
+# From the ground up. A package stands here as one module, and may import within itself.
+FLOORS = [
+    {"errors", "whole_file", "point_function", "skeleton", "meshcat_page"},
+    {"schemes", "optimize", "configuration", "urdf_rules", "robot_source", "example_robots"},
+    {"rigid_body", "urdf_check", "grid", "model_files", "meshcat_server"},
+    {"stored_torque", "trajectory_file", "torque_model"},
+    {"chain_urdf", "robot_model", "robot_report"},
+    {"robot_geometry", "robot_reading"},
+    {"robot"},
+    {"state", "lagrangian", "effects"},
+    {"scene"},
+    {"discrete_lagrangian"},
+    {"trajectory"},
+    {"guess"},
+    {"problem"},
+    {"trajectory_objective"},
+    {"solver", "task_file"},
+    {"multistart"},
+    {"planner"},
+    {"playback", "plotting", "export"},
+    {"cli"},
+    {"__main__"},
+]
+FLOOR_OF = {module: floor for floor, modules in enumerate(FLOORS) for module in modules}
+FILES = sorted(path for path in SOURCE.rglob("*.py") if path != SOURCE / "__init__.py")
+
+
+def module_of(path: Path) -> str:
+    return path.relative_to(SOURCE).with_suffix("").parts[0]
+
+
+def imported_modules(tree: ast.Module) -> set[str]:
+    """The parts of hovi that are named in imports, wherever in the file they stand."""
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"line {node.lineno}: relative import"
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return {name.split(".")[1] for name in names if name.startswith("hovi.")}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
+def test_a_module_imports_only_from_lower_floors(path: Path) -> None:
+    module = module_of(path)
+    assert module in FLOOR_OF, f"{module} has no floor: give it one in {Path(__file__).name}"
+    for imported in imported_modules(ast.parse(path.read_text())) - {module, "__version__"}:
+        assert FLOOR_OF[imported] < FLOOR_OF[module], f"{module} imports {imported} from above"
+
+
+def test_the_tower_has_no_floor_without_a_module() -> None:
+    assert set(FLOOR_OF) - {module_of(path) for path in FILES} == set()
