@@ -137,8 +137,8 @@ def _on_coarse_grid(found: list[Solution]) -> list[Solution]:
     """The best so far when a person ends the search before the grid that was asked for."""
     (best,) = found
     message = (
-        "interrupted before the grid that was asked for was reached; the motion is the best so far, "
-        f"on {best.trajectory.grid.intervals} intervals: {best.message}"
+        "interrupted before the grid that was asked for was reached; the motion is the best so "
+        f"far, on {best.trajectory.grid.intervals} intervals: {best.message}"
     )
     status = Status.INTERRUPTED
     return [dataclasses.replace(best, success=False, status=status, message=message)]

@@ -35,9 +35,9 @@ _STYLES = ("-", "--", ":", "-.")
 _DPI = 150
 _POINTS = 2_000
 _MOST_MARKS = 150
-_SURFACE_TIMES = 300
-_SECTIONS = 13
-_STRIPS = 6
+_SURFACE_TIMES = 180
+_SECTIONS = 25
+_STRIPS = 20
 _METADATA: dict[str, dict[str, str | None]] = {
     ".png": {"Software": None},
     ".pdf": {"CreationDate": None},
@@ -127,13 +127,13 @@ def surface_figure(trajectory: Trajectory, window: tuple[float, float] | None = 
         raise DisplayError(
             f"the window {start:g} to {end:g} s must lie within 0 and {trajectory.duration:g} s."
         )
-    t = np.linspace(start, end, _SURFACE_TIMES)
+    t, dark = _surface_times(start, end)
     points = _chain(_robot(trajectory), trajectory.configurations(t))  # (links + 1, M, 3)
     plane = np.sort(np.argsort(np.ptp(points, axis=(0, 1)))[1:])  # the axis that varies least goes
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     ax = figure.add_subplot(projection="3d")
     assert isinstance(ax, Axes3D)
-    _sweep(ax, t, points[:, :, plane])
+    _sweep(ax, t, points[:, :, plane], dark)
     across, up = ("xyz"[axis] for axis in plane)
     _dress_surface(ax, across, up, np.ptp(points[:, :, plane], axis=(0, 1)))
     return figure
@@ -264,14 +264,23 @@ def _legend(figure: Figure, ax: Axes) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
 
 
-def _sweep(ax: Axes3D, t: Array, points: Array) -> None:
+def _surface_times(start: float, end: float) -> tuple[Array, Mask]:
+    """Times (M,) of a surface's mesh, and which of its M - 1 columns are thin, dark sections."""
+    thin = (end - start) / 500
+    sections = np.linspace(start, end - thin, _SECTIONS)
+    even = np.linspace(start, end, _SURFACE_TIMES)
+    t = np.unique(np.concatenate([even, sections, sections + thin]))
+    middles = 0.5 * (t[1:] + t[:-1])
+    dark: Mask = (np.abs(middles[:, None] - sections - thin / 2) < thin / 2).any(axis=1)
+    return t, dark
+
+
+def _sweep(ax: Axes3D, t: Array, points: Array, dark: Mask) -> None:
     """A ruled surface per link, in patches that are sorted by depth together.
 
-    Some columns of patches are dark: the links at those times.
+    The dark columns of patches show the links at those times.
     """
     u = np.linspace(0.0, 1.0, _STRIPS + 1)[:, None, None]
-    dark = np.zeros(len(t) - 1, dtype=bool)
-    dark[np.linspace(0, len(t) - 2, _SECTIONS).astype(int)] = True
     patches, colors = [], []
     for link, (p0, p1) in enumerate(itertools.pairwise(points)):
         plane = (1 - u) * p0 + u * p1  # (strips + 1, M, 2)

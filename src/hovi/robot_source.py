@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 from hovi.errors import ModelError
@@ -30,7 +30,7 @@ class RobotSource:
 
     kind: SourceKind
     reference: str
-    urdf: str | None = None
+    urdf: str | None = field(default=None, repr=False)
     sha256: str | None = None
     package_dirs: tuple[str, ...] = ()
     locked: tuple[str, ...] = ()
