@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from hovi.effects import Gravity
 from hovi.robot import Robot, load_robot
+from hovi.scene import Scene
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 
@@ -27,3 +29,21 @@ def two_link() -> Robot:
 def panda() -> Robot:
     """The Panda arm, fingers locked: seven vector joints."""
     return load_robot("panda", locked=["panda_finger_joint1", "panda_finger_joint2"])
+
+
+@pytest.fixture(scope="session")
+def ur5() -> Robot:
+    """The UR5 arm: six vector joints."""
+    return load_robot("ur5")
+
+
+@pytest.fixture(scope="session")
+def pendulum() -> Robot:
+    """One joint under a bob of one kilogram."""
+    return load_robot(MODELS / "pendulum.urdf")
+
+
+@pytest.fixture(scope="session")
+def arm_scene(two_link: Robot) -> Scene:
+    """The two-link arm under the paper's gravity of 9.8 m/s^2."""
+    return Scene(two_link, [Gravity(9.8)])

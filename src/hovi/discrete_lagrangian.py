@@ -21,6 +21,7 @@ from hovi.schemes import Scheme
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Coordinates = Literal["nodal", "regular"]
+COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
 
 CHUNK = 4096
 """Intervals that are evaluated at a time, so that memory stays bounded."""
@@ -65,11 +66,20 @@ class _Batch:
         return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
 
     @cached_property
-    def pair_weights(self) -> Array:
-        """Weights of the second derivatives, (B, Q, 3, 3, 1, 1)."""
-        powers = self.h[:, None] ** -np.arange(3)
-        pair = self.point_weights[..., None] * powers[:, None, None, :]
-        return pair[..., None, None]
+    def pairs(self) -> dict[Coordinates, Array]:
+        """What second derivatives count for pairs of columns, (B or 1, m * m, Q * 9)."""
+        uniform = bool(np.ptp(self.h) == 0)
+        h = self.h[:1] if uniform else self.h
+        powers = h[:, None] ** -np.arange(3)
+        pair = h[:, None, None] * powers[:, :, None] * powers[:, None, :]  # (B or 1, 3, 3)
+        weights = pair[:, None] * self.scheme.weights[:, None, None]  # (B or 1, Q, 3, 3)
+        tables = {name: _table(self.scheme, name) for name in COORDINATES}
+        return {
+            name: np.einsum("qri,qsj,bqrs->bijqrs", table, table, weights).reshape(
+                len(h), table.shape[2] ** 2, -1
+            )
+            for name, table in tables.items()
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +133,7 @@ class DiscreteLagrangian:
             k = table.shape[2]
             values[batch.index] = value
             gradient[batch.index, :k] = _contract_gradient(batch, table, point_gradient)
-            hessian[batch.index, :k, :k] = _contract_hessian(batch, table, point_hessian)
+            hessian[batch.index, :k, :k] = _contract_hessian(batch, coordinates, point_hessian)
         return Expansion(values, gradient, hessian, torque)
 
     def predict(
@@ -163,7 +173,7 @@ class DiscreteLagrangian:
         N, n = self.grid.intervals, self.lagrangian.nv
         g = np.empty((N, 4, n))
         for batch in self._batches:
-            _, gradient, _ = self.lagrangian.evaluate(*_jet(batch, path), t=batch.t)
+            gradient = self.lagrangian.gradient(*_jet(batch, path), t=batch.t)
             regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
             g[batch.index] = regular[:, :4]
         h = self.grid.steps[:, None]
@@ -238,11 +248,10 @@ def _contract_gradient(batch: _Batch, table: Array, gradient: Array) -> Array:
     return np.asarray(np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1)))
 
 
-def _contract_hessian(batch: _Batch, table: Array, hessian: Array) -> Array:
-    """Hessian of L_d in the columns of the table, shape (B, m, m, n, n)."""
-    B, (Q, _, m) = len(batch.h), table.shape
+def _contract_hessian(batch: _Batch, coordinates: Coordinates, hessian: Array) -> Array:
+    """Hessian of L_d in the columns of the coordinates, shape (B, m, m, n, n)."""
+    B, Q, m = len(batch.h), len(batch.scheme.weights), 4 + batch.scheme.inner_modes
     n = hessian.shape[-1] // 3 if hessian.ndim == 3 else hessian.shape[-1]
     blocks = hessian.reshape(B, Q, 3, n, 3, n).transpose(0, 1, 2, 4, 3, 5)
-    weighted = (blocks * batch.pair_weights).reshape(B, Q * 9, n * n)
-    pairs = np.einsum("qri,qsj->ijqrs", table, table).reshape(m * m, Q * 9)
-    return np.asarray(np.matmul(pairs, weighted).reshape(B, m, m, n, n))
+    pairs = batch.pairs[coordinates]
+    return np.asarray(np.matmul(pairs, blocks.reshape(B, Q * 9, n * n)).reshape(B, m, m, n, n))

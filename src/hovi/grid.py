@@ -46,7 +46,7 @@ class Grid:
         """
         if not (np.isfinite(duration) and duration > 0):
             raise InputError(f"the duration must be positive and finite, got {duration} s.")
-        if intervals != int(intervals) or intervals < 1:
+        if not (np.isfinite(intervals) and intervals == int(intervals) and intervals >= 1):
             raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
         return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
 
@@ -75,12 +75,14 @@ class Grid:
 
 def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.intp]], ...]:
     """The intervals of each scheme, so that work can be done in batches."""
-    members: dict[str, list[int]] = {}
-    by_name: dict[str, Scheme] = {}
+    members: dict[bytes, list[int]] = {}
+    tables: dict[bytes, Scheme] = {}
+    keys: dict[int, bytes] = {}
     for i, scheme in enumerate(schemes):
-        members.setdefault(scheme.name, []).append(i)
-        by_name.setdefault(scheme.name, scheme)
-    return tuple((by_name[name], np.array(index)) for name, index in members.items())
+        key = keys.setdefault(id(scheme), scheme.key)
+        members.setdefault(key, []).append(i)
+        tables.setdefault(key, scheme)
+    return tuple((tables[key], np.array(index)) for key, index in members.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -131,6 +131,31 @@ def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> 
     return DiscretePath(q, v, regularised(robot, grid, q, v), _inner_modes(curve, grid, v.shape[1]))
 
 
+def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+    """A path plus the cubic that carries its ends to other boundary data."""
+    q0, v0, q1, v1 = boundary
+    ends = np.stack(
+        [
+            robot.difference(path.q[0], q0),
+            v0 - path.v[0],
+            robot.difference(path.q[-1], q1),
+            v1 - path.v[-1],
+        ]
+    )  # (4, n)
+    T, s = grid.duration, grid.t / grid.duration
+    local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
+    dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each
+    h = (grid.steps / T)[:, None]
+    # of a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
+    jerk = np.diff(TTda, axis=0) / h
+    z = np.stack([TTda[:-1] / 2 + h * jerk / 6, TTda[:-1] + h * jerk / 2], axis=1) / T**2
+    q = robot.integrate(path.q, ends[0] + dq)
+    q[0], q[-1] = q0, q1
+    v = path.v + Tdv / T
+    v[0], v[-1] = v0, v1
+    return DiscretePath(q, v, path.z + z, path.inner)
+
+
 def regularised(robot: Robot, grid: Grid, q: Array, v: Array) -> Array:
     """z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h of every interval, shape (N, 2, nv)."""
     h = grid.steps[:, None]

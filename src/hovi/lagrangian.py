@@ -53,6 +53,10 @@ class Lagrangian(ABC):
         Returns value (P,), gradient (P, k+1, nv), hessian (P, k+1, nv, k+1, nv).
         """
 
+    def gradient(self, *jet: Array, t: Array | None = None) -> Array:
+        """The gradient alone, shape (P, k+1, nv)."""
+        return self.evaluate(*jet, t=t)[1]
+
 
 class EffortScene(Protocol):
     """Where an effort Lagrangian comes from: the robot whose torques it squares."""
@@ -107,6 +111,15 @@ class EffortLagrangian(Lagrangian):
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
         return np.asarray(value)
+
+    def gradient(self, *jet: Array, t: Array | None = None) -> Array:
+        """The gradient J^T R tau + dV, shape (P, 3, nv)."""
+        q, v, a = jet
+        tau, J = self.torques.linearize(q, v, a, t)
+        gradient = np.matmul((self.weight * tau)[:, None], J)[:, 0]
+        if self.potential is not None:
+            gradient = gradient + self.potential.expand(q, v, a, t=t)[1]
+        return np.asarray(gradient.reshape(len(tau), 3, self.nv))
 
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
         """Value, gradient and Hessian: see Lagrangian.evaluate."""

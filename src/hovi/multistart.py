@@ -7,6 +7,7 @@ Each round perturbs the best minima found so far (basin hopping); the first ones
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -85,7 +86,7 @@ def _solve_chunk(
     for guess in guesses:
         left = None if ends is None else max(ends - time.monotonic(), 0.0)
         solution = solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
-        solutions.append(solution)
+        solutions.append(dataclasses.replace(solution, problem=None))
         if solution.status is Status.INTERRUPTED:
             break
     return solutions

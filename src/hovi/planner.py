@@ -15,7 +15,7 @@ from hovi.multistart import Job, Pool, default_processes, distinct, explore
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
 from hovi.solver import Solution, Status, guess_path
-from hovi.state import State
+from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
 
 COARSE_INTERVALS = 60
@@ -68,17 +68,18 @@ def plan(
         scene,
         tuple(scene.effort_lagrangian(weight).weight),
         Grid.uniform(duration, intervals, table),
-        _state(start),
-        _state(goal),
+        as_state(start),
+        as_state(goal),
         max_iterations,
     )
     ends = None if time_limit is None else time.monotonic() + time_limit
     search = _Search(fine, processes or default_processes(), ends, progress or _silent)
-    fine.problem()  # bad input speaks before any work is done
+    problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
     return dataclasses.replace(
         best,
+        problem=problem,
         minima=minima,
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
@@ -142,10 +143,6 @@ def _on_coarse_grid(found: list[Solution]) -> list[Solution]:
     )
     status = Status.INTERRUPTED
     return [dataclasses.replace(best, success=False, status=status, message=message)]
-
-
-def _state(state: State | npt.ArrayLike) -> State:
-    return state if isinstance(state, State) else State(state)
 
 
 def _silent(text: str, fraction: float) -> None:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, ModelError
 from hovi.grid import Grid
 from hovi.guess import Boundary
 from hovi.lagrangian import EffortLagrangian
 from hovi.robot import Robot
+from hovi.robot_model import check_mass_matrix
 from hovi.scene import Scene
 from hovi.schemes import require_regular
 from hovi.state import State
@@ -41,9 +44,20 @@ class TrajectoryProblem:
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
-        require_plannable(self.robot)
+        require_plannable(self.scene)
         start, goal = self.start.on(self.robot, "start"), self.goal.on(self.robot, "goal")
         object.__setattr__(self, "boundary", (*start, *goal))
+
+    @cached_property
+    def structure(self) -> ActionStructure:
+        """What the action's Hessian looks like on this grid."""
+        return ActionStructure(self.grid, self.robot.nv)
+
+    def between(self, start: State, goal: State) -> TrajectoryProblem:
+        """The same problem between other states, with everything that was built for this one."""
+        problem = TrajectoryProblem(self.ld, start, goal)
+        object.__setattr__(problem, "structure", self.structure)
+        return problem
 
     @property
     def grid(self) -> Grid:
@@ -64,8 +78,10 @@ class TrajectoryProblem:
         return self.scene.robot
 
 
-def require_plannable(robot: Robot) -> None:
+@lru_cache(maxsize=64)
+def require_plannable(scene: Scene) -> None:
     """Raise ModelError for a robot on which motions cannot be planned."""
+    robot = scene.robot
     if not robot.vector_joints:
         joints = ", ".join(repr(joint) for joint in robot.manifold_joints)
         raise ModelError(
@@ -74,4 +90,4 @@ def require_plannable(robot: Robot) -> None:
         )
     if robot.nv == 0:
         raise ModelError(f"robot {robot.name!r} has no joint that moves; nothing can be planned.")
-    robot.check_mass_matrix()
+    check_mass_matrix(scene.model)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.errors import InputError
 from hovi.grid import DiscretePath
 from hovi.guess import named_curve, path_on_grid, stretched
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.problem import TrajectoryProblem
+from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
-from hovi.trajectory_objective import ActionObjective
+from hovi.trajectory_objective import ActionObjective, follow
 
 Report = Callable[[int, float], None]
 
@@ -45,6 +49,7 @@ class Solution:
     minima: costs of all minima that a multi-start found, ascending.
     history: what each step did.
     setup_seconds, solve_seconds: wall time before and during the solve.
+    problem: what was solved; `replan` starts from it.
     """
 
     success: bool
@@ -54,11 +59,39 @@ class Solution:
     cost: float
     nit: int
     n_neg: int
+    problem: TrajectoryProblem | None = field(default=None, repr=False)
     error_estimate: float | None = None
     minima: tuple[float, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), repr=False)
     setup_seconds: float = 0.0
     solve_seconds: float = 0.0
+
+    def replan(
+        self,
+        start: State | npt.ArrayLike | None = None,
+        goal: State | npt.ArrayLike | None = None,
+        guess: Solution | None = None,
+        **options: Any,
+    ) -> Solution:
+        """The motion between other states, from this one or another as the guess.
+
+        Everything that was built is used again, so that this can run in a loop. The guess is
+        where the earlier motion goes to first order, which counts as one of the steps.
+        start, goal: a State or a configuration at rest; as before when None.
+        guess: an earlier answer on the same grid; this one when None.
+        options: as for `solve`.
+        Raises InputError when this solution does not know its problem.
+        """
+        if self.problem is None:
+            raise InputError("this solution does not know its problem; plan again instead.")
+        old = self.problem
+        problem = old.between(
+            old.start if start is None else as_state(start),
+            old.goal if goal is None else as_state(goal),
+        )
+        origin = self if guess is None else guess
+        solution = solve(problem, follow(origin.trajectory.path, problem), **options)
+        return dataclasses.replace(solution, nit=solution.nit + 1)
 
 
 def solve(
@@ -81,13 +114,13 @@ def solve(
     """
     began = time.perf_counter()
     path = guess_path(problem, guess)
-    objective = ActionObjective(problem)
+    objective = ActionObjective(problem, structure=problem.structure)
     options = Options(
         max_iterations=max_iterations, time_limit=time_limit, escape_saddles=escape_saddles
     )
     started = time.perf_counter()
     outcome = minimize(objective, path, options, report)
-    n_neg, outcome = _certify(problem, outcome)
+    n_neg, outcome = _certify(objective, outcome)
     solved = time.perf_counter()
     status, message = _verdict(outcome, n_neg)
     trajectory = _trajectory(problem, outcome, status, n_neg)
@@ -101,6 +134,7 @@ def solve(
         n_neg=n_neg,
         minima=(outcome.value,) if status is Status.MINIMUM else (),
         history=tuple(outcome.history),
+        problem=problem,
         setup_seconds=started - began,
         solve_seconds=solved - started,
     )
@@ -128,16 +162,15 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
 
 
 def _certify(
-    problem: TrajectoryProblem, outcome: Outcome[DiscretePath]
+    objective: ActionObjective, outcome: Outcome[DiscretePath]
 ) -> tuple[int, Outcome[DiscretePath]]:
     """n_neg from the exact Hessian, and one more Newton step where a minimum was found."""
     if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
         return -1, outcome
-    objective = ActionObjective(problem, algebra="tree")
-    model = objective.merge_model(outcome.x)
+    model = objective.model(outcome.x, None, None)
     factor = model.factor(0.0)
     if factor is None:
-        return model.negative_eigenvalues(), outcome
+        return objective.merge_model(outcome.x).negative_eigenvalues(), outcome
     if outcome.stop is Stop.STATIONARY:
         path = objective.retract(outcome.x, factor.solve(-model.gradient), model)
         value = objective.value(path)

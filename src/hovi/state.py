@@ -32,3 +32,8 @@ class State:
         q = robot.check_configuration(self.q, name)
         v = np.zeros(robot.nv) if self.v is None else self.v
         return q, robot.check_velocity(v, name)
+
+
+def as_state(state: State | npt.ArrayLike) -> State:
+    """A configuration at rest as a State; a State as it is."""
+    return state if isinstance(state, State) else State(state)

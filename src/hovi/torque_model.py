@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Protocol
 
 import casadi as ca
@@ -94,6 +95,7 @@ class AnalyticTorque:
     def __init__(self, kernel: InverseDynamicsKernel, added: CasadiTorque | None = None) -> None:
         self.kernel = kernel
         self.added = added
+        self._threads = default_threads()
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
@@ -123,15 +125,21 @@ class AnalyticTorque:
         if curvature is None:
             curvature = R * self.torque(q, v, a, t)
         if self.added is None:
-            return self.kernel.expand(q, v, a, R, curvature)
+            return self.kernel.expand(q, v, a, R, curvature, self._threads)
         more, dmore = self.added.linearize(q, v, a, t)
-        tau, J, hessian = self.kernel.expand(q, v, a, R, curvature)
+        tau, J, hessian = self.kernel.expand(q, v, a, R, curvature, self._threads)
         RdJ = R[:, None] * dmore
         cross = np.matmul(J.transpose(0, 2, 1), RdJ)
         hessian += cross + cross.transpose(0, 2, 1)
         hessian += np.matmul(dmore.transpose(0, 2, 1), RdJ)
         hessian += self.added.curvature(q, v, a, t, curvature)
         return tau + more, J + dmore, hessian
+
+
+def default_threads() -> int:
+    """OMP_NUM_THREADS where it is set, as worker processes do, else the processors at hand."""
+    wanted = os.environ.get("OMP_NUM_THREADS", "")
+    return int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1
 
 
 def times(t: Array | None, points: int) -> Array:

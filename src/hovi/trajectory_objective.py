@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import Coordinates, Expansion
-from hovi.grid import DiscretePath, Grid
-from hovi.optimize.band import BandLayout, BandModel
-from hovi.optimize.merge_tree import MergeTree, MergeTreeModel, merge_levels
+from hovi.grid import DiscretePath
+from hovi.guess import moved
+from hovi.optimize.band import BandModel
+from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
 from hovi.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.intp]
 LinearAlgebra = Literal["band", "tree"]
 
 BAND_INTERVALS = 1000
@@ -28,13 +28,20 @@ class ActionObjective(Objective[DiscretePath]):
     """The discrete action between fixed ends, in nodal or in regularised coordinates.
 
     problem: what to minimise.
+    structure: what depends on the grid alone, from an earlier objective on the same grid.
     algebra: "band" (LAPACK's banded Cholesky in nodal coordinates, the faster one) or "tree"
         (merging intervals in regularised coordinates, right at every step length).
     """
 
-    def __init__(self, problem: TrajectoryProblem, algebra: LinearAlgebra | None = None) -> None:
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        algebra: LinearAlgebra | None = None,
+        structure: ActionStructure | None = None,
+    ) -> None:
         self.problem = problem
         self.ld = problem.ld
+        self.structure = structure or ActionStructure(problem.grid, problem.robot.nv)
         small = problem.grid.intervals <= BAND_INTERVALS
         self.algebra: LinearAlgebra = algebra or ("band" if small else "tree")
         self._expansion: Expansion | None = None
@@ -57,16 +64,21 @@ class ActionObjective(Objective[DiscretePath]):
             local = previous.gather(step)
             multipliers = self.ld.predict(self._expansion, local, self.coordinates)
         self._expansion = self.ld.expand(x, self.coordinates, multipliers)
-        intervals = IntervalSum(self._expansion.gradient, self._expansion.hessian, self._metric)
+        intervals = IntervalSum(
+            self._expansion.gradient,
+            self._expansion.hessian,
+            self.structure.metric[self.coordinates],
+        )
         if self.algebra == "band":
-            return BandModel(intervals, self._layout, self._metric_band)
-        return MergeTreeModel(intervals, self._tree)
+            return BandModel(intervals, self.structure.layout, self.structure.metric_band)
+        return MergeTreeModel(intervals, self.structure.tree)
 
     def merge_model(self, x: DiscretePath) -> MergeTreeModel:
         """The exact model at x in regularised coordinates, for the inertia."""
         expansion = self.ld.expand(x, "regular")
-        intervals = IntervalSum(expansion.gradient, expansion.hessian, self._metric)
-        return MergeTreeModel(intervals, self._tree)
+        metric = self.structure.metric["regular"]
+        intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
+        return MergeTreeModel(intervals, self.structure.tree)
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
@@ -94,55 +106,27 @@ class ActionObjective(Objective[DiscretePath]):
     def _h(self) -> Array:
         return self.problem.grid.steps[:, None]
 
-    @cached_property
-    def _metric(self) -> Array:
-        """T^3 times the integral of |da|^2 over each interval, (N, m, m)."""
-        grid = self.problem.grid
-        metric = np.zeros((grid.intervals, 4 + grid.inner_modes, 4 + grid.inner_modes))
-        for scheme, index in grid.groups:
-            table = scheme.nodal_table if self.algebra == "band" else scheme.regular_table
-            rows = table[:, 2]
-            k = rows.shape[1]
-            scale = (grid.duration / grid.steps[index]) ** 3
-            metric[index, :k, :k] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
-        return metric
 
-    @cached_property
-    def _layout(self) -> BandLayout:
-        return BandLayout.of(unknowns(self.problem.grid, self.problem.robot.nv))
+def follow(solved: DiscretePath, problem: TrajectoryProblem) -> DiscretePath:
+    """Where a stationary path goes, to first order, when its boundary data move.
 
-    @cached_property
-    def _metric_band(self) -> Array:
-        eye = np.eye(self.problem.robot.nv)
-        return self._layout.assemble(self._metric[..., None, None] * eye)
+    dx = cubic - H^-1 H cubic, with the cubic that carries the old ends to the new ones and H the
+    action's Hessian at the old path: one Newton step of the equations linearised there. Just the
+    cubic where H is not positive definite.
 
-    @cached_property
-    def _tree(self) -> MergeTree:
-        grid = self.problem.grid
-        present = np.zeros((grid.intervals, grid.inner_modes), dtype=bool)
-        for scheme, index in grid.groups:
-            present[index, : scheme.inner_modes] = True
-        levels = merge_levels(grid.steps)
-        n = self.problem.robot.nv
-        return MergeTree(levels, grid.intervals, grid.inner_modes, n, present)
-
-
-def unknowns(grid: Grid, n: int) -> Index:
-    """Numbers of the unknowns of every interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
-
-    Nodes and inner modes alternate along the motion; both ends are fixed. Shape (N, m, n).
+    solved: a stationary path on the problem's grid, between other ends.
     """
-    N, r = grid.intervals, grid.inner_modes
-    modes = np.zeros(N, dtype=np.intp)
-    for scheme, index in grid.groups:
-        modes[index] = scheme.inner_modes
-    node_sizes = np.full(N + 1, 2 * n)
-    node_sizes[[0, -1]] = 0
-    sizes = np.zeros(2 * N + 1, dtype=np.intp)
-    sizes[0::2], sizes[1::2] = node_sizes, modes * n
-    first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    nodes = first[0::2, None] + np.arange(2 * n)
-    nodes[[0, -1]] = -1
-    inner = first[1::2, None] + np.arange(r * n)
-    inner[np.arange(r * n) >= (modes * n)[:, None]] = -1
-    return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1).reshape(N, 4 + r, n)
+    path = moved(solved, problem.grid, problem.boundary, problem.robot)
+    objective = ActionObjective(problem, "tree", problem.structure)
+    model = objective.model(solved, None, None)
+    factor = model.factor(0.0)
+    if factor is None:
+        return path
+    h = problem.grid.steps[:, None]
+    shift = np.zeros_like(model.intervals.gradient)
+    shift[:, 0] = problem.robot.difference(solved.q, path.q)[:-1]
+    shift[:, 1] = h * (path.v - solved.v)[:-1]
+    shift[:, 2:4] = h[:, None] ** 2 * (path.z - solved.z)
+    residual = np.einsum("kijab,kjb->kia", model.intervals.hessian, shift)
+    step = factor.solve(-model.scatter(residual) - model.gradient)
+    return objective.retract(path, step, model)

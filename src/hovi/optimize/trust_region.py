@@ -61,12 +61,13 @@ class Objective(ABC, Generic[X]):
 class Options:
     """Tolerances and budgets.
 
-    decrease: stop when a Newton step predicts less than this, relative to the value.
+    decrease: stop with a Newton step that predicts less than this, relative to the value; what is
+        left after it is of the square of that.
     step: stop when a Newton step changes less than this, relative to the data.
     radius: first radius of the trust region, in the metric's norm.
     """
 
-    decrease: float = 1e-15
+    decrease: float = 1e-11
     step: float = 1e-13
     max_iterations: int = 500
     time_limit: float | None = None
@@ -170,7 +171,8 @@ def _iterate(
         if stationary and trial.newton:
             outcome.stop = Stop.STATIONARY
             return
-        shift = trial.shift
+        # the shift falls a little faster than the radius grows
+        shift = trial.shift * (trial.norm / radius) ** 1.2
         if accepted:
             model = objective.model(outcome.x, model, trial.step)
         elif radius < 1e-14 * options.radius:
@@ -219,7 +221,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
 
     guess: the shift of the last subproblem, a first value for this one.
     """
-    search = _ShiftSearch(model, radius)
+    search = _ShiftSearch(model, radius, guess)
     shift = guess
     for attempt in range(PASS_SHIFTS):
         factor = model.factor(shift)
@@ -240,12 +242,13 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
 class _ShiftSearch:
     """Bracket and safeguarded Newton iteration on 1/|s(shift)| = 1/radius."""
 
-    def __init__(self, model: QuadraticModel, radius: float) -> None:
+    def __init__(self, model: QuadraticModel, radius: float, guess: float) -> None:
         self.model = model
         self.radius = radius
         self.low = 0.0
         self.high = np.inf
         self.indefinite = False
+        self.reached = guess > 0.0
 
     def after_failure(self, shift: float) -> float:
         """The next shift where H + shift D is not positive definite."""
@@ -253,7 +256,8 @@ class _ShiftSearch:
         self.low = max(self.low, shift)
         if np.isfinite(self.high):
             return max(math.sqrt(self.low * self.high), 0.1 * self.high)
-        return max(4.0 * shift, 1e-6 * self.model.curvature_scale())
+        growth = 4.0 if self.reached else 16.0
+        return max(growth * shift, 1e-5 * self.model.curvature_scale())
 
     def step_at(self, factor: Factor, shift: float) -> tuple[Trial, float]:
         """The step of a shift, and the slope s.D (H + shift D)^-1 D s."""

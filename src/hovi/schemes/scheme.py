@@ -48,6 +48,11 @@ class Scheme:
         return int(self.table.shape[2]) - 3
 
     @property
+    def key(self) -> bytes:
+        """What makes two schemes the same: their numbers."""
+        return b"".join(x.tobytes() for x in (self.points, self.weights, self.table))
+
+    @property
     def regular_table(self) -> Array:
         """The table for (q0, h v0, Z0, Z1, c), the configuration's base point included.
 

@@ -1,0 +1,85 @@
+"""What the action's Hessian looks like on a grid, whatever the robot's motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete_lagrangian import COORDINATES, Coordinates
+from hovi.grid import Grid
+from hovi.optimize.band import BandLayout
+from hovi.optimize.merge_tree import MergeTree, merge_levels
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class ActionStructure:
+    """Unknowns, metric and elimination order of a grid, each worked out when first asked for.
+
+    grid: the intervals. dof: n, the degrees of freedom.
+    """
+
+    grid: Grid
+    dof: int
+
+    @cached_property
+    def metric(self) -> dict[Coordinates, Array]:
+        """The trust region's metric in both kinds of columns, (N, m, m)."""
+        return {name: action_metric(self.grid, name) for name in COORDINATES}
+
+    @cached_property
+    def layout(self) -> BandLayout:
+        """The places of nodes and inner modes in a banded matrix."""
+        return BandLayout.of(unknowns(self.grid, self.dof))
+
+    @cached_property
+    def metric_band(self) -> Array:
+        """The metric as a banded matrix."""
+        return self.layout.assemble(self.metric["nodal"][..., None, None] * np.eye(self.dof))
+
+    @cached_property
+    def tree(self) -> MergeTree:
+        """The order in which intervals are merged."""
+        grid = self.grid
+        present = np.zeros((grid.intervals, grid.inner_modes), dtype=bool)
+        for scheme, index in grid.groups:
+            present[index, : scheme.inner_modes] = True
+        levels = merge_levels(grid.steps)
+        return MergeTree(levels, grid.intervals, grid.inner_modes, self.dof, present)
+
+
+def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
+    """The trust region's metric: T^3 times the integral of |da|^2 over each interval, (N, m, m)."""
+    metric = np.zeros((grid.intervals, 4 + grid.inner_modes, 4 + grid.inner_modes))
+    for scheme, index in grid.groups:
+        rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 2]
+        k = rows.shape[1]
+        scale = (grid.duration / grid.steps[index]) ** 3
+        metric[index, :k, :k] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
+    return metric
+
+
+def unknowns(grid: Grid, n: int) -> Index:
+    """Numbers of the unknowns of every interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
+
+    Nodes and inner modes alternate along the motion; both ends are fixed. Shape (N, m, n).
+    """
+    N, r = grid.intervals, grid.inner_modes
+    modes = np.zeros(N, dtype=np.intp)
+    for scheme, index in grid.groups:
+        modes[index] = scheme.inner_modes
+    node_sizes = np.full(N + 1, 2 * n)
+    node_sizes[[0, -1]] = 0
+    sizes = np.zeros(2 * N + 1, dtype=np.intp)
+    sizes[0::2], sizes[1::2] = node_sizes, modes * n
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    nodes = first[0::2, None] + np.arange(2 * n)
+    nodes[[0, -1]] = -1
+    inner = first[1::2, None] + np.arange(r * n)
+    inner[np.arange(r * n) >= (modes * n)[:, None]] = -1
+    return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1).reshape(N, 4 + r, n)

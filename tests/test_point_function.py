@@ -1,0 +1,67 @@
+"""A function at many points is the function at each of them."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi.point_function import CHUNK, PointFunction
+
+Array = npt.NDArray[np.float64]
+
+
+def sparse_function() -> ca.Function:
+    """A number, a column, and a 2 x 3 matrix with structural zeros that is not symmetric."""
+    x, t = ca.SX.sym("x", 2), ca.SX.sym("t")
+    matrix = ca.SX(2, 3)
+    matrix[0, 1], matrix[1, 0], matrix[1, 2] = x[0] * x[1], ca.sin(x[1]), t
+    return ca.Function("f", [x, t], [ca.sumsqr(x), ca.vertcat(x[1], t * x[0], 3), matrix])
+
+
+def by_hand(x: Array, t: Array) -> tuple[Array, Array, Array]:
+    a, b = x.T
+    number, column = a**2 + b**2, np.stack([b, t * a, np.full_like(t, 3.0)], axis=1)
+    matrix = np.zeros((len(t), 2, 3))
+    matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 2] = a * b, np.sin(b), t
+    return number, column, matrix
+
+
+@pytest.mark.parametrize("points", [0, 1, 2, 7, CHUNK, CHUNK + 1, 2 * CHUNK + 5])
+def test_batches_of_any_size_give_the_function_at_every_point(points: int) -> None:
+    random = np.random.default_rng(points)
+    x, t = random.normal(size=(points, 2)), random.normal(size=(points, 1))
+    found = PointFunction(sparse_function())(x, t)
+    for result, expected in zip(found, by_hand(x, t[:, 0]), strict=True):
+        assert result.shape == expected.shape
+        np.testing.assert_allclose(result, expected, rtol=1e-14, atol=0)
+
+
+def test_any_memory_layout_is_accepted() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(20, 2)), np.arange(20)[:, None]
+    for view in (np.asfortranarray(x), np.repeat(x, 2, axis=0)[::2], x.astype(np.float32)):
+        for result, expected in zip(
+            function(view, t), by_hand(view.astype(float), t[:, 0] * 1.0), strict=True
+        ):
+            np.testing.assert_allclose(result, expected, rtol=1e-6)
+
+
+def test_results_of_an_earlier_call_are_left_alone() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(2, 6, 2)), np.ones((6, 1))
+    first = function(x[0], t)
+    kept = [result.copy() for result in first]
+    function(x[1], t)
+    for result, before in zip(first, kept, strict=True):
+        np.testing.assert_array_equal(result, before)
+
+
+def test_many_batch_sizes_in_turn_give_the_same_results() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(30, 2)), np.ones((30, 1))
+    whole = function(x, t)
+    for points in [*range(1, 20), *range(1, 20)]:
+        for part, expected in zip(function(x[:points], t[:points]), whole, strict=True):
+            np.testing.assert_array_equal(part, expected[:points])
