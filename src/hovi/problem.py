@@ -16,7 +16,7 @@ from hovi.guess import Boundary
 from hovi.lagrangian import EffortLagrangian
 from hovi.robot import Robot
 from hovi.robot_model import check_mass_matrix
-from hovi.scene import Scene
+from hovi.scene import Scene, require_vector_joints
 from hovi.schemes import require_regular
 from hovi.state import State
 
@@ -82,12 +82,7 @@ class TrajectoryProblem:
 def require_plannable(scene: Scene) -> None:
     """Raise ModelError for a robot on which motions cannot be planned."""
     robot = scene.robot
-    if not robot.vector_joints:
-        joints = ", ".join(repr(joint) for joint in robot.manifold_joints)
-        raise ModelError(
-            f"robot {robot.name!r} cannot be planned on yet: configurations of {joints} are not "
-            "vectors (nq differs from nv); lock these joints with load_robot(..., locked=[...])."
-        )
+    require_vector_joints(robot)
     if robot.nv == 0:
         raise ModelError(f"robot {robot.name!r} has no joint that moves; nothing can be planned.")
     check_mass_matrix(scene.model)

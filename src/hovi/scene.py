@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.effects import REGISTRY, Effect, SceneSymbols
-from hovi.errors import SceneError, nearest
+from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
 from hovi.rigid_body import InverseDynamicsKernel, casadi_functions, joints_without_kernel
 from hovi.robot import Robot
@@ -76,7 +76,9 @@ class Scene:
         """L~ = 1/2 tau^T diag(R) tau + V on T^(2)Q.
 
         weight: R, shape (nv,), all ones when not given. [ColomboFerraroMartin2016, section 5]
+        Raises ModelError for joints whose configurations are not vectors.
         """
+        require_vector_joints(self.robot)
         R = np.ones(self.robot.nv) if weight is None else np.asarray(weight, dtype=np.float64)
         if R.shape != (self.robot.nv,) or not (np.isfinite(R).all() and (R > 0).all()):
             raise SceneError(
@@ -138,7 +140,7 @@ class Scene:
         if self.analytic:
             return "derivatives: Pinocchio's analytic ones (C++), since every joint has them"
         joints = ", ".join(repr(joint) for joint in joints_without_kernel(self.model))
-        return f"derivatives: CasADi's, since {joints} have no analytic second derivatives"
+        return f"derivatives: CasADi's, since there are no analytic second ones for {joints}"
 
     def _left_out(self) -> list[str]:
         robot, keys = self.robot, {effect.key for effect in self.effects}
@@ -157,3 +159,13 @@ class Scene:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             object.__setattr__(self, name, value)
+
+
+def require_vector_joints(robot: Robot) -> None:
+    """Raise ModelError for a robot with joints on which nothing can be planned yet."""
+    if not robot.vector_joints:
+        joints = ", ".join(repr(joint) for joint in robot.manifold_joints)
+        raise ModelError(
+            f"robot {robot.name!r} cannot be planned on yet: configurations of {joints} are not "
+            "vectors (nq differs from nv); lock these joints with load_robot(..., locked=[...])."
+        )

@@ -43,10 +43,10 @@ class JointLimitPotential(Effect):
                     f"got {value}."
                 )
         for joint, (lower, upper) in self.ranges.items():
-            if joint not in robot.coordinate_names:
+            if joint not in _simple_joints(robot):
                 raise SceneError(
                     f"effect 'joint_limit_potential': robot {robot.name!r} has no joint "
-                    f"{joint!r} with one coordinate: {nearest(joint, robot.coordinate_names)}"
+                    f"{joint!r} with one coordinate: {nearest(joint, _simple_joints(robot))}"
                 )
             if not lower < upper:
                 raise SceneError(
@@ -58,7 +58,7 @@ class JointLimitPotential(Effect):
         """V as a CasADi expression."""
         terms = []
         for joint, (lower, upper) in self.ranges.items():
-            x = symbols.q[robot.coordinate_names.index(joint)]
+            x = symbols.q[_simple_joints(robot)[joint]]
             terms += [smooth_ramp(lower - x, self.width), smooth_ramp(x - upper, self.width)]
         return self.slope * ca.sum1(ca.vertcat(*terms))
 
@@ -69,6 +69,13 @@ class JointLimitPotential(Effect):
             f"joint_limit_potential: {ranges}; slope {self.slope:g} per rad or m, "
             f"smoothed over {self.width:g}"
         )
+
+
+def _simple_joints(robot: Robot) -> dict[str, int]:
+    """Place in q of every joint whose configuration is one number."""
+    model = robot.model
+    joints = list(zip(model.names, model.joints, strict=True))[1:]
+    return {name: joint.idx_q for name, joint in joints if joint.nq == joint.nv == 1}
 
 
 def smooth_ramp(x: ca.SX, width: float) -> ca.SX:

@@ -18,9 +18,9 @@ def galerkin(inner_modes: int = 2) -> Scheme:
 
     inner_modes: r, from 0 to 40. Raises SchemeError outside.
     """
-    if not 0 <= inner_modes <= MAX_INNER_MODES:
+    if not (isinstance(inner_modes, int) and 0 <= inner_modes <= MAX_INNER_MODES):
         raise SchemeError(
-            f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes}; "
+            f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes!r}; "
             "for more accuracy use more intervals."
         )
     x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
