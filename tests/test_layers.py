@@ -23,6 +23,7 @@ FLOORS = [
     {"state", "lagrangian", "effects"},
     {"scene"},
     {"discrete_lagrangian"},
+    {"action_structure"},
     {"trajectory"},
     {"guess"},
     {"problem"},

@@ -14,6 +14,7 @@ from hovi.schemes.classic import (
     trapezoid_difference,
 )
 from hovi.schemes.galerkin_table import galerkin
+from hovi.schemes.jets import end_basis, gamma, inverse_gamma
 from hovi.schemes.regularity import is_regular, regularity_matrix, require_regular
 from hovi.schemes.scheme import Scheme
 
@@ -29,13 +30,14 @@ CLASSIC: dict[str, Callable[[], Scheme]] = {
 def by_name(name: str) -> Scheme:
     """The scheme that a file or the command line calls `name`.
 
-    name: one of CLASSIC, or `galerkin-R` with R inner modes. Raises SchemeError otherwise.
+    name: one of CLASSIC, or `galerkin-R` with R inner modes, `galerkin-R-kK` for Lagrangians of
+        order K. Raises SchemeError otherwise.
     """
     if name in CLASSIC:
         return CLASSIC[name]()
-    match = re.fullmatch(r"galerkin-(\d{1,4})", name)
+    match = re.fullmatch(r"galerkin-(\d{1,4})(?:-k([134]))?", name)
     if match:
-        return galerkin(int(match.group(1)))
+        return galerkin(int(match.group(1)), int(match.group(2) or 2))
     known = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-3"]
     raise SchemeError(f"there is no scheme {name!r}: {nearest(name, known)}")
 
@@ -44,8 +46,11 @@ __all__ = [
     "CLASSIC",
     "Scheme",
     "by_name",
+    "end_basis",
     "galerkin",
+    "gamma",
     "hermite_simpson",
+    "inverse_gamma",
     "is_regular",
     "mean_difference",
     "regularity_matrix",

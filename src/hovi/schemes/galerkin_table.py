@@ -1,29 +1,41 @@
-"""The Galerkin family: a table for every number of inner modes."""
+"""The Galerkin family: a table for every number of inner modes, and every order of Lagrangian."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from hovi.errors import SchemeError
+from hovi.schemes.jets import jet_rows
 from hovi.schemes.polynomials import interval_rows
 from hovi.schemes.scheme import Scheme
 
 MAX_INNER_MODES = 40
+MAX_DERIVATIVES = 4
 
 
-def galerkin(inner_modes: int = 2) -> Scheme:
-    """Polynomial acceleration with r inner modes, integrated with r + 2 Gauss points.
+def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
+    """A polynomial k-th derivative with r inner modes, integrated with r + k Gauss points.
 
-    The order of the nodes is 2 (r + 2): 4, 6, 8, 10, ...
+    The order of the nodes is 2 (r + k): 4, 6, 8, 10, ... for k = 2.
 
-    inner_modes: r, from 0 to 40. Raises SchemeError outside.
+    inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian: 1 for mechanics, 2
+        for torques and accelerations, 3 for jerk. Raises SchemeError outside.
     """
-    if not (isinstance(inner_modes, int) and 0 <= inner_modes <= MAX_INNER_MODES):
+    if not 0 <= inner_modes <= MAX_INNER_MODES:
         raise SchemeError(
-            f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes!r}; "
+            f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes}; "
             "for more accuracy use more intervals."
         )
-    x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
+    if not 1 <= derivatives <= MAX_DERIVATIVES:
+        raise SchemeError(
+            f"a Galerkin scheme is for Lagrangians of order 1 to {MAX_DERIVATIVES}, "
+            f"got {derivatives}."
+        )
+    x, w = np.polynomial.legendre.leggauss(inner_modes + derivatives)
     points, weights = (x + 1) / 2, w / 2
-    table = interval_rows(points, inner_modes)
-    return Scheme(f"galerkin-{inner_modes}", 2 * (inner_modes + 2), points, weights, table)
+    order = 2 * (inner_modes + derivatives)
+    if derivatives == 2:
+        table = interval_rows(points, inner_modes)
+        return Scheme(f"galerkin-{inner_modes}", order, points, weights, table)
+    table = jet_rows(points, derivatives, inner_modes)
+    return Scheme(f"galerkin-{inner_modes}-k{derivatives}", order, points, weights, table)

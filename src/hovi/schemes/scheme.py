@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.schemes.jets import jet_rows
 from hovi.schemes.polynomials import interval_rows
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +46,15 @@ class Scheme:
     @property
     def inner_modes(self) -> int:
         """Number r of inner modes of an interval."""
-        return int(self.table.shape[2]) - 3
+        return int(self.table.shape[2]) - 2 * int(self.table.shape[1]) + 3
+
+    @property
+    def derivatives(self) -> int:
+        """Order k of the Lagrangians that the table discretises: 2 but for what jets.py makes.
+
+        The table of any k has shape (Q, k + 1, 2 k - 1 + r), with the columns of `jet_rows`.
+        """
+        return int(self.table.shape[1]) - 1
 
     @property
     def key(self) -> bytes:
@@ -56,7 +65,7 @@ class Scheme:
     def regular_table(self) -> Array:
         """The table for (q0, h v0, Z0, Z1, c), the configuration's base point included.
 
-        Shape (Q, 3, 4 + r).
+        Shape (Q, 3, 4 + r), for any k (Q, k + 1, 2 k + r).
         """
         base = np.zeros((*self.table.shape[:2], 1))
         base[:, 0] = 1.0
@@ -72,6 +81,8 @@ class Scheme:
 
         s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite where r = 0.
         """
+        if self.derivatives != 2:
+            return jet_rows(s, self.derivatives, self.inner_modes)
         return interval_rows(s, self.inner_modes)
 
     def __reduce__(self) -> tuple[type[Scheme], tuple[object, ...]]:

@@ -1,0 +1,80 @@
+"""What the benchmarks share: a process per measurement, the best of several runs, a table."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from importlib.metadata import version
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_info
+
+
+def alone(function: Callable[..., Any], *arguments: Any, threads: int = 1) -> Any:
+    """function(*arguments) in a fresh process, so that nothing is warm and its memory is its own.
+
+    threads: of BLAS and of the kernel, which both follow OMP_NUM_THREADS.
+    """
+    os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = str(threads)
+    print(f"{function.__name__}{arguments}, {threads} thread(s)", file=sys.stderr, flush=True)
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(function, *arguments).result()
+
+
+def best_time(work: Callable[[], Any], seconds: float = 0.5, least: int = 3) -> float:
+    """The shortest of many runs, in [s]: what the machine does when nobody else uses it."""
+    times: list[float] = []
+    while len(times) < least or sum(times) < seconds:
+        began = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - began)
+    return min(times)
+
+
+def peak_memory() -> float:
+    """The most memory that this process has held, in [MB].
+
+    From /proc, since the ru_maxrss of a child starts at what its parent held.
+    """
+    status = Path("/proc/self/status").read_text()
+    line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
+    return int(line.split()[1]) / 1024
+
+
+def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
+    """p of values ~ sizes^p, by least squares in logarithms."""
+    return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
+
+
+def blas_threads() -> int:
+    """Threads that NumPy's BLAS uses in this process."""
+    return max((pool["num_threads"] for pool in threadpool_info()), default=1)
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """A Markdown table on stdout; the first column is text, the others are numbers."""
+    print("| " + " | ".join(columns) + " |")
+    print("|---|" + "---:|" * (len(columns) - 1))
+    for row in rows:
+        print("| " + " | ".join(str(cell) for cell in row) + " |")
+    print()
+
+
+def print_machine(threads: int | None = None) -> None:
+    """One line on what the numbers above were measured with."""
+    processor = platform.processor() or platform.machine()
+    cpu = Path("/proc/cpuinfo")
+    if cpu.exists():
+        names = [line for line in cpu.read_text().splitlines() if line.startswith("model name")]
+        processor = names[0].split(":")[1].strip() if names else processor
+    cores = len(os.sched_getaffinity(0))
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "pin", "casadi"))
+    said = "" if threads is None else f", {threads} thread{'s' if threads > 1 else ''}"
+    print(f"*{processor}, {cores} cores{said}; Python {platform.python_version()}, {packages}.*\n")

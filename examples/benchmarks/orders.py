@@ -1,0 +1,83 @@
+"""Observed orders: how fast errors fall with the step, by least squares, on the two-link reach."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import hovi
+from hovi.schemes import by_name
+from measuring import exponent, print_table
+
+REFERENCE = ("galerkin-6", 192)
+COMMON = (24, 32, 48, 64, 96)
+GRIDS = {
+    "taylor-midpoint": COMMON,
+    "taylor-trapezoid": COMMON,
+    "hermite-simpson": COMMON,
+    "galerkin-0": COMMON,
+    "galerkin-1": COMMON,
+    "galerkin-2": COMMON,
+    "galerkin-3": (12, 16, 24, 32),
+}
+"""Numbers of intervals that divide the reference's, so that nodes meet."""
+BETWEEN = np.array([0.2, 0.37, 0.5, 0.71, 0.9])
+FLOOR = 3e-12
+"""Relative errors below it are round-off and are left out."""
+
+
+def motion(scheme: str, intervals: int, guess: object = "cubic") -> hovi.Solution:
+    """The minimum of cost 20.2 on a grid."""
+    task = hovi.load_task(hovi.example("two_link_reach"))
+    grid = hovi.Grid.uniform(task.duration, intervals, by_name(scheme))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    solution = hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal), guess)
+    assert solution.success, solution.message
+    return solution
+
+
+def errors(solution: hovi.Solution, exact: hovi.Solution) -> dict[str, float]:
+    """Largest errors at the nodes and between them, relative to the largest value."""
+    mine, true = solution.trajectory, exact.trajectory
+    stride = true.grid.intervals // mine.grid.intervals
+    pairs = {"q": (mine.q, true.q[::stride]), "v": (mine.v, true.v[::stride])}
+    pairs["p, p~"] = (mine.momenta, true.momenta[::stride])
+    pairs["cost"] = (np.array([solution.cost]), np.array([exact.cost]))
+    t = (mine.t[:-1, None] + mine.grid.steps[:, None] * BETWEEN).ravel()
+    between = zip(mine.sample(t)._asdict().items(), true.sample(t), strict=True)
+    pairs |= {f"{name} between": (x, y) for (name, x), y in between}
+    return {name: float(np.max(abs(x - y)) / np.max(abs(y))) for name, (x, y) in pairs.items()}
+
+
+def slope(sizes: tuple[int, ...], values: list[float]) -> str:
+    """The observed order, from errors above round-off."""
+    kept = [(n, e) for n, e in zip(sizes, values, strict=True) if e > FLOOR]
+    if len(kept) < 3:
+        return "round-off"
+    return f"{-exponent(*zip(*kept, strict=True)):.2f}"
+
+
+def main() -> None:
+    exact = motion(*REFERENCE)
+    print(
+        f"The two-link reach against `{REFERENCE[0]}` on {REFERENCE[1]} intervals, cost "
+        f"{exact.cost:.10f}: observed orders at the nodes and, in the four last columns, at five "
+        "places inside every interval.\n"
+    )
+    rows = []
+    columns: list[str] = []
+    for name, sizes in GRIDS.items():
+        found = [errors(motion(name, N, exact.trajectory), exact) for N in sizes]
+        columns = list(found[0])
+        observed = [slope(sizes, [each[key] for each in found]) for key in columns]
+        rows.append([f"`{name}`", by_name(name).order, f"{sizes[0]} to {sizes[-1]}", *observed])
+    print_table(["scheme", "order", "intervals", *columns], rows)
+    last = errors(motion("galerkin-3", 32, exact.trajectory), exact)
+    print(
+        "`galerkin-3` on 32 intervals: relative errors "
+        + ", ".join(f"{name} {value:.0e}" for name, value in last.items())
+        + ".\n"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,112 @@
+"""The curve of an interval for Lagrangians of any order k: basis b^[k], matrix gamma^[k], rows.
+
+[ColomboFerraroMartin2016, section 2]. With Q^[k](s) = h^k q^(k) the k-th derivative on [0, 1], the
+end data fix its moments w_j = <b_j, Q^[k]>, j < k, and nothing else: what is left of the curve
+lies in the orthogonal complement and is written in the next Legendre polynomials, the inner
+modes (the paper's E and E-perp).
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.schemes.polynomials import legendre
+
+Array = npt.NDArray[np.float64]
+
+
+def end_degrees(k: int) -> list[int]:
+    """Degrees of b^[k]_0 .. b^[k]_{k-1}: they fall, as those of a^[k]_j do."""
+    return [k - 1 - j for j in range(k)]
+
+
+def end_basis(s: Array, k: int) -> Array:
+    """The paper's b^[k]_j(s) = sqrt(2 m + 1) P_m(1 - 2 s), m = k - 1 - j, shape (k, M).
+
+    Orthonormal on [0, 1]; b^[2] = (sqrt(3) (1 - 2 s), 1).
+    """
+    P = legendre(1 - 2 * np.asarray(s, dtype=np.float64), max(k - 1, 1))
+    return np.array([np.sqrt(2 * m + 1) * P[m] for m in end_degrees(k)])
+
+
+def end_weights(s: Array, k: int) -> Array:
+    """The paper's a^[k]_j(s) = (1 - s)^(k-j-1) / (k-j-1)!, shape (k, M), with z_j = <a_j, Q^[k]>."""
+    s = np.asarray(s, dtype=np.float64)
+    return np.array([(1 - s) ** m / factorial(m) for m in end_degrees(k)])
+
+
+def gamma(k: int) -> Array:
+    """gamma[j, i] of a^[k]_j = sum_i gamma[j, i] b^[k]_i, so that z = gamma w, shape (k, k).
+
+    With d = k - 1 - j and m = k - 1 - i it is sqrt(2 m + 1) d! / ((d - m)! (d + m + 1)!), and 0
+    where m > d. gamma^[2] = [[1 / (2 sqrt(3)), 1/2], [0, 1]].
+    """
+    matrix = np.zeros((k, k))
+    for j, d in enumerate(end_degrees(k)):
+        for i, m in enumerate(end_degrees(k)):
+            if m <= d:
+                scale = factorial(d) / (factorial(d - m) * factorial(d + m + 1))
+                matrix[j, i] = np.sqrt(2 * m + 1) * scale
+    return matrix
+
+
+def inverse_gamma(k: int) -> Array:
+    """The matrix of w = gamma^-1 z, shape (k, k); for k = 2: w0 = 2 sqrt(3) (z0 - z1/2), w1 = z1."""
+    return np.asarray(np.linalg.inv(gamma(k)))
+
+
+def repeated_integral(coefficients: Array, times: int) -> Array:
+    """Legendre coefficients of the m-fold integral from 0, in x = 2 s - 1, of a Legendre series.
+
+    The integral of P_j is (P_{j+1} - P_{j-1}) / (2 (2 j + 1)), that of P_0 is (P_0 + P_1) / 2:
+    exact to rounding, where monomials would cancel.
+    coefficients: shape (degree + 1,). Returns shape (degree + 1 + times,).
+    """
+    for _ in range(times):
+        integral = np.zeros(len(coefficients) + 1)
+        for j, c in enumerate(coefficients):
+            integral[j + 1] += c / (2 * (2 * j + 1))
+            integral[max(j - 1, 0)] += c / 2 if j == 0 else -c / (2 * (2 * j + 1))
+        coefficients = integral
+    return coefficients
+
+
+def jet_rows(s: Array, k: int, inner_modes: int) -> Array:
+    """(q - q0, h q', ..., h^k q^(k)) at s over (h q0', ..., h^(k-1) q0^(k-1), Z, c).
+
+    Z_j = h^k z_j, j < k, are the regularised end data and c the inner modes.
+    s: shape (M,). Returns shape (M, k + 1, 2 k - 1 + r).
+    """
+    s = np.asarray(s, dtype=np.float64)
+    taylor = [_taylor_column(s, k, i) for i in range(1, k)]
+    signs = [(-1.0) ** m for m in end_degrees(k)]
+    basis = [x * _mode_column(s, k, m) for x, m in zip(signs, end_degrees(k), strict=True)]
+    ends = np.stack(basis, axis=2) @ inverse_gamma(k)
+    modes = [_mode_column(s, k, m) for m in range(k, k + inner_modes)]
+    return np.concatenate([_stacked(taylor, s, k), ends, _stacked(modes, s, k)], axis=2)
+
+
+def _stacked(columns: list[Array], s: Array, k: int) -> Array:
+    return np.stack(columns, axis=2) if columns else np.zeros((len(s), k + 1, 0))
+
+
+def _taylor_column(s: Array, k: int, i: int) -> Array:
+    """What h^i q0^(i) adds to each derivative: s^(i-j) / (i-j)!, shape (M, k + 1)."""
+    column = np.zeros((len(s), k + 1))
+    for j in range(i + 1):
+        column[:, j] = s ** (i - j) / factorial(i - j)
+    return column
+
+
+def _mode_column(s: Array, k: int, degree: int) -> Array:
+    """sqrt(2 m + 1) P_m(2 s - 1) and its k integrals, as rows from the last, shape (M, k + 1)."""
+    series = np.zeros(degree + 1)
+    series[degree] = np.sqrt(2 * degree + 1)
+    column = np.zeros((len(s), k + 1))
+    for j in range(k + 1):
+        integral = repeated_integral(series, k - j)
+        column[:, j] = integral @ legendre(2 * s - 1, max(len(integral) - 1, 1))[: len(integral)]
+    return column

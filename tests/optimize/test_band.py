@@ -1,0 +1,99 @@
+"""The banded model is the dense one: its sums, its solves and its verdict on definiteness."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi.optimize.band import BandLayout, BandModel
+from interval_problems import SIZES, IntervalProblem, random_problem
+
+Array = npt.NDArray[np.float64]
+
+DEFINITE, INDEFINITE = 40.0, 0.0
+
+
+def build(
+    n: int, modes: tuple[int, ...], curvature: float, seed: int = 0
+) -> tuple[IntervalProblem, BandModel]:
+    problem = random_problem(n, modes, np.ones(len(modes)), curvature, seed)
+    layout = BandLayout.of(problem.unknowns)
+    metric = layout.assemble(problem.nodal.metric[..., None, None] * np.eye(n))
+    return problem, BandModel(problem.nodal, layout, metric)
+
+
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_the_band_holds_the_lower_half_of_the_dense_matrix(n: int, modes: tuple[int, ...]) -> None:
+    problem, model = build(n, modes, INDEFINITE)
+    size, width = model.layout.size, model.layout.bandwidth
+    band = model.layout.assemble(problem.nodal.hessian)
+    dense = np.zeros((size, size))
+    for j in range(size):
+        length = min(width + 1, size - j)
+        dense[j : j + length, j] = band[j, :length]
+    np.testing.assert_allclose(dense, np.tril(problem.hessian), rtol=0, atol=1e-13)
+    assert width <= (4 + max(modes)) * n - 1
+
+
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_scatter_and_gather_are_transposes(n: int, modes: tuple[int, ...]) -> None:
+    problem, model = build(n, modes, INDEFINITE)
+    random = np.random.default_rng(0)
+    s, local = random.normal(size=problem.gradient.shape), random.normal(size=problem.nodal.gradient.shape)
+    np.testing.assert_allclose(model.gradient, problem.gradient, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(model.gather(s), problem.nodal_map @ s, rtol=0, atol=1e-15)
+    assert np.vdot(model.scatter(local), s) == pytest.approx(np.vdot(local, model.gather(s)))
+
+
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> None:
+    problem, model = build(n, modes, INDEFINITE)
+    s = np.random.default_rng(1).normal(size=problem.gradient.shape)
+    expected = problem.metric @ s
+    np.testing.assert_allclose(model.metric_product(s), expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.7, 30.0])
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float) -> None:
+    problem, model = build(n, modes, DEFINITE)
+    factor = model.factor(shift)
+    assert factor is not None
+    expected = problem.newton_step(shift)
+    step = factor.solve(-model.gradient)
+    np.testing.assert_allclose(step, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    again = model.factor(shift)
+    assert again is not None
+    np.testing.assert_array_equal(again.solve(-model.gradient), step)
+
+
+@pytest.mark.parametrize("curvature", [DEFINITE, INDEFINITE])
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_a_factor_is_missing_just_where_the_matrix_is_not_positive_definite(
+    n: int, modes: tuple[int, ...], curvature: float
+) -> None:
+    for seed in range(5):
+        problem, model = build(n, modes, curvature, seed)
+        edge = -problem.eigenvalues()[0]
+        for shift in (0.0, edge - 1e-6 * abs(edge), edge + 1e-6 * abs(edge), edge + 1.0):
+            if shift >= 0:
+                assert (model.factor(shift) is not None) == (shift > edge)
+
+
+def test_ends_and_missing_modes_are_no_unknowns() -> None:
+    problem, model = build(2, (1, 0, 2), DEFINITE)
+    assert model.layout.size == 2 * (2 * 2) + 2 * (1 + 0 + 2)
+    local = model.gather(np.ones(model.layout.size))
+    assert not local[0, :2].any()
+    assert not local[-1, 2:4].any()
+    for k, r in enumerate(problem.modes):
+        assert local[k, 4 : 4 + r].all()
+        assert not local[k, 4 + r :].any()
+
+
+def test_a_random_vector_is_reproducible() -> None:
+    _, model = build(2, (1, 0, 2), DEFINITE)
+    np.testing.assert_array_equal(model.random_vector(3), model.random_vector(3))
+    assert model.random_vector(3).shape == model.gradient.shape
+    assert (model.random_vector(3) != model.random_vector(4)).any()
