@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.effects import REGISTRY, Effect, Gravity, JointLimitPotential
+from hovi.effects import REGISTRY, Effect, Gravity, JointLimitPotential, SceneSymbols
 from hovi.effects.joint_limit_potential import smooth_ramp
 from hovi.errors import SceneError
 from hovi.lagrangian import PotentialTerm
@@ -137,15 +137,14 @@ def test_a_range_may_be_open_on_one_side(two_link: Robot) -> None:
 def test_the_right_joint_is_kept_in_range_behind_one_that_turns_without_end() -> None:
     model = pin.Model()
     model.name = "wheel and elbow"
-    body = pin.Inertia.FromSphere(1.0, 0.1)
     wheel = model.addJoint(0, pin.JointModelRUBY(), pin.SE3.Identity(), "wheel")  # nq = 2, nv = 1
-    elbow = model.addJoint(wheel, pin.JointModelRY(), pin.SE3.Identity(), "elbow")
-    for joint in (wheel, elbow):
-        model.appendBodyToJoint(joint, body, pin.SE3.Identity())
-    V = potential_of(load_robot(model), JointLimitPotential({"elbow": (0.0, 1.0)}))
-    zero = np.zeros((2, 2))
-    q = np.array([[0.6, 0.8, 0.5], [0.6, 0.8, 3.0]])  # cos, sin, elbow
-    np.testing.assert_allclose(V.value(q, zero, zero), [0.0, 2000.0])
+    model.addJoint(wheel, pin.JointModelRY(), pin.SE3.Identity(), "elbow")
+    robot, effect = load_robot(model), JointLimitPotential({"elbow": (0.0, 1.0)})
+    effect.check(robot)
+    q, v, a, t = ca.SX.sym("q", 3), ca.SX.sym("v", 2), ca.SX.sym("a", 2), ca.SX.sym("t")
+    V = ca.Function("V", [q], [effect.potential(robot, SceneSymbols(q, v, a, t))])
+    for elbow, expected in ((0.5, 0.0), (3.0, 2000.0)):
+        assert float(V([0.6, 0.8, elbow])) == pytest.approx(expected)  # cos, sin, elbow
 
 
 def test_no_range_is_no_potential(two_link: Robot) -> None:
@@ -180,10 +179,11 @@ def test_numbers_that_make_no_ramp_are_refused(
         Scene(two_link, [JointLimitPotential(**values)])
 
 
-def test_a_joint_with_several_coordinates_has_no_range() -> None:
+@pytest.mark.parametrize("joint", ["root_joint", "root_joint[3]"])
+def test_a_joint_with_several_coordinates_has_no_range(joint: str) -> None:
     robot = load_robot("simple_humanoid")  # its base floats
-    with pytest.raises(SceneError, match="no joint 'root_joint' with one coordinate"):
-        Scene(robot, [JointLimitPotential({"root_joint": RANGE})])
+    with pytest.raises(SceneError, match="no joint 'root_joint.*' with one coordinate"):
+        Scene(robot, [JointLimitPotential({joint: RANGE})])
 
 
 @pytest.mark.parametrize("acceleration", [np.nan, np.inf, -np.inf])

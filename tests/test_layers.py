@@ -13,9 +13,10 @@ SOURCE = Path(hovi.__file__).parent
 
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
-    {"errors", "whole_file", "point_function", "skeleton", "meshcat_page"},
-    {"schemes", "optimize", "configuration", "urdf_rules", "robot_source", "example_robots"},
-    {"rigid_body", "urdf_check", "grid", "model_files", "meshcat_server"},
+    {"errors", "whole_file", "skeleton", "meshcat_page"},
+    {"schemes", "optimize", "configuration", "urdf_rules", "robot_source", "example_robots"}
+    | {"compiled"},
+    {"point_function", "rigid_body", "urdf_check", "grid", "model_files", "meshcat_server"},
     {"stored_torque", "trajectory_file", "torque_model"},
     {"chain_urdf", "robot_model", "robot_report"},
     {"robot_geometry", "robot_reading"},

@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 
 from hovi.effects import Effect, Gravity, JointLimitPotential
-from hovi.errors import SceneError
+from hovi.errors import ModelError, SceneError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 
@@ -116,6 +116,11 @@ def test_the_effort_weighs_every_joint_alike_unless_told(two_link: Robot) -> Non
 def test_a_weight_that_is_none_is_refused(two_link: Robot, weight: Any) -> None:
     with pytest.raises(SceneError, match="weight needs 2 positive numbers"):
         Scene(two_link).effort_lagrangian(weight)
+
+
+def test_a_robot_whose_joints_are_no_vectors_has_no_effort_yet() -> None:
+    with pytest.raises(ModelError, match=r"'j2s6s200_joint_1'.*locked="):
+        Scene(load_robot("kinova"), [Gravity()]).effort_lagrangian()
 
 
 # What a scene is

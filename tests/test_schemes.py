@@ -5,6 +5,8 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from fractions import Fraction
+from math import factorial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ from hovi.schemes import (
     regularity_matrix,
     require_regular,
 )
+from hovi.schemes.jets import end_basis, end_weights, gamma, inverse_gamma, jet_rows
 from hovi.schemes.polynomials import interval_rows
 from paper_arm import effort
 
@@ -59,7 +62,7 @@ def shifted_legendre(degree: int) -> Polynomial:
     return p
 
 
-def jet_rows(acceleration: Polynomial) -> Array:
+def exact_jet(acceleration: Polynomial) -> Array:
     """(q, h v, h^2 a) of a curve that starts at zero with velocity zero, (M, 3)."""
     velocity = integral(acceleration)
     return np.stack([values(p) for p in (integral(velocity), velocity, acceleration)], axis=1)
@@ -68,15 +71,15 @@ def jet_rows(acceleration: Polynomial) -> Array:
 @pytest.mark.parametrize("j", [2, 3, 4, 7, 10, 20, 40])
 def test_an_inner_mode_is_the_exact_double_integral_of_its_legendre_polynomial(j: int) -> None:
     mode = galerkin(j - 1).rows(PLACES)[:, :, j + 1]
-    exact = np.sqrt(2 * j + 1) * jet_rows(shifted_legendre(j))
+    exact = np.sqrt(2 * j + 1) * exact_jet(shifted_legendre(j))
     np.testing.assert_allclose(mode, exact, rtol=0, atol=2e-14)
 
 
 def test_the_first_three_columns_are_the_cubic_of_the_end_data() -> None:
     one, slope = [Fraction(1)], [Fraction(6), Fraction(-12)]  # 6 (1 - 2 s)
-    Z1 = jet_rows([Fraction(1) - slope[0] / 2, -slope[1] / 2])
+    Z1 = exact_jet([Fraction(1) - slope[0] / 2, -slope[1] / 2])
     expected = [np.stack([values(integral(one)), values(one), 0 * PLACES], axis=1)]
-    expected += [jet_rows(slope), Z1]
+    expected += [exact_jet(slope), Z1]
     for r in (0, 3):
         rows = galerkin(r).rows(PLACES)[:, :, :3]
         np.testing.assert_allclose(rows, np.stack(expected, axis=2), rtol=0, atol=1e-14)
@@ -114,6 +117,67 @@ def test_a_galerkin_table_holds_the_rows_at_its_points(r: int) -> None:
     scheme = galerkin(r)
     np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
     assert (len(scheme.points), scheme.inner_modes, scheme.order) == (r + 2, r, 2 * (r + 2))
+
+
+# Lagrangians of other orders
+
+
+def test_gamma_2_is_the_one_printed() -> None:
+    expected = [[1 / (2 * np.sqrt(3)), 0.5], [0.0, 1.0]]
+    np.testing.assert_allclose(gamma(2), expected, rtol=1e-15)
+    expected = [[2 * np.sqrt(3), -np.sqrt(3)], [0.0, 1.0]]  # w0 = 2 sqrt(3) (z0 - z1 / 2)
+    np.testing.assert_allclose(inverse_gamma(2), expected, rtol=1e-15, atol=1e-15)
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 7])
+def test_gamma_takes_the_orthonormal_basis_to_the_weights_of_the_end_data(k: int) -> None:
+    x, w = np.polynomial.legendre.leggauss(k + 1)
+    s, w = (x + 1) / 2, w / 2
+    a, b = end_weights(s, k), end_basis(s, k)
+    np.testing.assert_allclose((b * w) @ b.T, np.eye(k), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(gamma(k), (a * w) @ b.T, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(gamma(k) @ b, a, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("r", [0, 1, 5])
+def test_jets_of_order_two_are_the_rows_of_an_interval(r: int) -> None:
+    np.testing.assert_allclose(
+        jet_rows(PLACES, 2, r), interval_rows(PLACES, r), rtol=0, atol=5e-15
+    )
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+@pytest.mark.parametrize("r", [0, 1, 4])
+def test_jets_of_any_order_meet_the_end_data_and_are_exact_on_polynomials(k: int, r: int) -> None:
+    scheme = galerkin(r, k)
+    assert (scheme.derivatives, scheme.inner_modes, scheme.order) == (k, r, 2 * (r + k))
+    random = np.random.default_rng(10 * k + r)
+    p = np.polynomial.Polynomial(random.normal(size=2 * k))  # as many numbers as end data
+    jets = np.stack([p.deriv(j)(PLACES) if j else p(PLACES) for j in range(k + 1)], axis=1)
+    jets[:, 0] -= p(0)
+    start, end = ([p.deriv(j)(s) if j else p(s) for j in range(k)] for s in (0.0, 1.0))
+    # Z_j: what Taylor's polynomial of the start misses of the end, one derivative after another
+    taylor = [
+        sum(start[i] / factorial(i - j) for i in range(j, k)) for j in range(k)
+    ]
+    Z = np.array(end) - taylor
+    columns = np.concatenate([start[1:], Z, np.zeros(r)])
+    scale = np.abs(jets).max()
+    np.testing.assert_allclose(scheme.rows(PLACES) @ columns, jets, rtol=0, atol=1e-14 * scale)
+    modes = scheme.rows(np.array([0.0, 1.0]))[:, :k, 2 * k - 1 :]
+    np.testing.assert_allclose(modes, 0.0, rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
+
+
+def test_torques_need_a_scheme_of_order_two() -> None:
+    with pytest.raises(SchemeError, match="for Lagrangians of order 3; torques need"):
+        require_regular(galerkin(1, derivatives=3))
+
+
+@pytest.mark.parametrize("k", [0, 5, -1, 2.0])
+def test_orders_out_of_range_are_refused(k: int) -> None:
+    with pytest.raises(SchemeError, match=f"Lagrangians of order 1 to 4, got {k}"):
+        galerkin(1, derivatives=k)
 
 
 # Laws of all tables
@@ -335,10 +399,14 @@ def test_an_unknown_name_is_answered_with_the_nearest(name: str, hint: str) -> N
     assert hint in str(raised.value)
 
 
-@pytest.mark.parametrize("r", [-1, 41, 9999])
-def test_inner_modes_out_of_range_are_refused(r: int) -> None:
-    with pytest.raises(SchemeError, match=f"0 to 40 inner modes, got {r}"):
+@pytest.mark.parametrize("r", [-1, 41, 9999, 2.5, "2"])
+def test_inner_modes_out_of_range_are_refused(r: Any) -> None:
+    with pytest.raises(SchemeError, match=f"0 to 40 inner modes, got {r!r}"):
         galerkin(r)
+
+
+def test_numpys_whole_numbers_are_whole_numbers() -> None:
+    assert galerkin(np.int64(3)).name == "galerkin-3"  # type: ignore[arg-type]
 
 
 def test_a_name_with_too_many_inner_modes_is_refused() -> None:

@@ -120,6 +120,25 @@ def test_without_multipliers_the_hessian_is_that_of_the_effort(scene: Scene) -> 
             assert_close(H, derivative_per_point(gradient, np.concatenate(jet, axis=1)), 1e-9)
 
 
+@pytest.mark.parametrize("added", [None, drag], ids=["RNEA alone", "with an added torque"])
+def test_every_point_may_have_a_weight_of_its_own(
+    scene: Scene, added: Callable[[Columns], ca.SX] | None
+) -> None:
+    n = scene.robot.nv
+    q, v, a, t = jets(n)
+    R = np.random.default_rng(6).uniform(0.0, 2.0, (POINTS, n))
+    multiplier = np.random.default_rng(7).normal(size=(POINTS, n))
+    for model in models(scene, added):
+        for curvature in (None, multiplier):
+            whole = model.expand(q, v, a, t, R, curvature)
+            for k in range(POINTS):
+                one = slice(k, k + 1)
+                weight = None if curvature is None else curvature[one]
+                alone = model.expand(q[one], v[one], a[one], t[one], R[k], weight)
+                for found, expected in zip(whole, alone, strict=True):
+                    assert_close(found[one], expected, 1e-13)
+
+
 def test_hessians_are_symmetric(scene: Scene) -> None:
     n = scene.robot.nv
     for model in models(scene, drag):

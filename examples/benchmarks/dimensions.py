@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from math import pi
 from pathlib import Path
 
@@ -10,12 +11,12 @@ import numpy as np
 
 import hovi
 from hovi.chain_urdf import write_chain
-from measuring import alone, best_time, exponent, print_machine, print_table
+from measuring import alone, exponent, print_machine, print_table
 
 LINKS = (2, 3, 5, 7, 10, 14, 20, 30)
 INTERVALS = (16, 32, 64, 128, 256, 512)
-STEPS = 6
-"""Steps that are timed: long before a solution for large n, which changes nothing in the work."""
+STEPS = 12
+REPEATS = 5
 
 
 def measure(links: int, intervals: int) -> float:
@@ -28,12 +29,23 @@ def measure(links: int, intervals: int) -> float:
     start[0], goal[0] = -pi / 2, 0.3
     ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
     problem = hovi.TrajectoryProblem(ld, hovi.State(start), hovi.State(goal))
-    steps = hovi.solve(problem, max_iterations=STEPS).nit
-    return best_time(lambda: hovi.solve(problem, max_iterations=STEPS), 0.5, least=2) / steps
+    return min(_step_time(problem) for _ in range(REPEATS))
+
+
+def _step_time(problem: hovi.TrajectoryProblem) -> float:
+    """The median time from step to step."""
+    clock: list[float] = []
+    hovi.solve(
+        problem,
+        max_iterations=STEPS,
+        escape_saddles=False,
+        report=lambda number, cost: clock.append(time.perf_counter()),
+    )
+    return float(np.median(np.diff(clock)))
 
 
 def main() -> None:
-    print(f"Chains of n links, `galerkin-2`, 16 intervals: the first {STEPS} steps.\n")
+    print(f"Chains of n links, `galerkin-2`, 16 intervals: the median of the first {STEPS} steps.\n")
     times = {t: [alone(measure, n, 16, threads=t) for n in LINKS] for t in (1, 2)}
     rows = [
         [n, f"{1e3 * one:.2f}", f"{1e3 * two:.2f}", f"{one / two:.2f}"]

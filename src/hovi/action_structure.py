@@ -35,12 +35,21 @@ class ActionStructure:
     @cached_property
     def layout(self) -> BandLayout:
         """The places of nodes and inner modes in a banded matrix."""
-        return BandLayout.of(unknowns(self.grid, self.dof))
+        return BandLayout.of(unknowns(self.grid, self.dof), self._scales())
 
     @cached_property
     def metric_band(self) -> Array:
         """The metric as a banded matrix."""
         return self.layout.assemble(self.metric["nodal"][..., None, None] * np.eye(self.dof))
+
+    def _scales(self) -> Array | None:
+        """Columns over unknowns: h over the mean step for velocities; None where steps are equal."""
+        steps = self.grid.steps
+        if np.ptp(steps) == 0:
+            return None
+        scales = np.ones((self.grid.intervals, 4 + self.grid.inner_modes))
+        scales[:, 1] = scales[:, 3] = steps / steps.mean()
+        return scales
 
     @cached_property
     def tree(self) -> MergeTree:

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.grid import DiscretePath, Grid
-from hovi.lagrangian import EffortLagrangian, Lagrangian
+from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -114,11 +114,13 @@ class DiscreteLagrangian:
         path: DiscretePath,
         coordinates: Coordinates = "nodal",
         multipliers: list[Array] | None = None,
+        terms: list[PointTerms] | None = None,
     ) -> Expansion:
         """Value, gradient and Hessian of every L_d: see Expansion.
 
         multipliers: weights of the curvature of tau, one array per batch, as `predict` gives
             them; the torque itself when None.
+        terms: what limits add at the points, one per batch; the values stay those of L_d.
         """
         N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv
         values = np.empty(N)
@@ -127,7 +129,10 @@ class DiscreteLagrangian:
         torque = []
         for i, batch in enumerate(self._batches):
             multiplier = None if multipliers is None else multipliers[i]
-            value, point_gradient, point_hessian, tau_J = self._evaluate(batch, path, multiplier)
+            term = None if terms is None else terms[i]
+            value, point_gradient, point_hessian, tau_J = self._evaluate(
+                batch, path, multiplier, term
+            )
             torque += tau_J
             table = _table(batch.scheme, coordinates)
             k = table.shape[2]
@@ -146,14 +151,41 @@ class DiscreteLagrangian:
         if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
             return None
         multipliers = []
-        for batch, (tau, J) in zip(self._batches, expansion.torque, strict=True):
+        steps = self.point_steps(step, coordinates)
+        for dx, (tau, J) in zip(steps, expansion.torque, strict=True):
+            predicted = tau + np.matmul(J, dx[:, :, None])[:, :, 0]
+            multipliers.append(self.lagrangian.weight * predicted)
+        return multipliers
+
+    def point_steps(self, step: Array, coordinates: Coordinates) -> list[Array]:
+        """Change of (q, v, a) at the quadrature points in a step, (P, 3 n) per batch."""
+        steps = []
+        for batch in self._batches:
             table = _table(batch.scheme, coordinates)
             points = np.tensordot(step[batch.index, : table.shape[2]], table, axes=(1, 2))
             jet = points.transpose(0, 2, 3, 1) * batch.h[:, None, None, None] ** _MINUS_POWERS
-            dx = jet.reshape(len(tau), -1, 1)
-            predicted = tau + np.matmul(J, dx)[:, :, 0]
-            multipliers.append(self.lagrangian.weight * predicted)
-        return multipliers
+            steps.append(jet.reshape(len(batch.t), -1))
+        return steps
+
+    def jets(self, path: DiscretePath) -> list[tuple[Array, Array, Array]]:
+        """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
+        return [_jet(batch, path) for batch in self._batches]
+
+    @cached_property
+    def point_weights(self) -> list[Array]:
+        """h w_j of every quadrature point, shape (P,), per batch."""
+        return [(batch.h[:, None] * batch.scheme.weights).ravel() for batch in self._batches]
+
+    @cached_property
+    def point_times(self) -> list[Array]:
+        """Time of every quadrature point, shape (P,), per batch."""
+        return [batch.t for batch in self._batches]
+
+    @cached_property
+    def point_intervals(self) -> list[Index]:
+        """Number of the interval of every quadrature point, shape (P,), per batch."""
+        numbers = np.arange(self.grid.intervals)
+        return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self._batches]
 
     def momenta(self, path: DiscretePath) -> Array:
         """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
@@ -185,14 +217,14 @@ class DiscreteLagrangian:
         return list(_split(self.grid))
 
     def _evaluate(
-        self, batch: _Batch, path: DiscretePath, multiplier: Array | None
+        self, batch: _Batch, path: DiscretePath, multiplier: Array | None, terms: PointTerms | None
     ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
         """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
         jet = _jet(batch, path)
         weights = batch.h[:, None] * batch.scheme.weights
         if isinstance(self.lagrangian, EffortLagrangian):
             value, gradient, hessian, tau, J = self.lagrangian.expand(
-                *jet, t=batch.t, multiplier=multiplier
+                *jet, t=batch.t, multiplier=multiplier, terms=terms
             )
             torque = [(tau, J)]
         else:

@@ -67,6 +67,22 @@ class EffortScene(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class PointTerms:
+    """What limits add to an effort Lagrangian's derivatives at P points.
+
+    With x = (q, v, a), gradient: jet_gradient + J^T effort_gradient; Hessian: diag(jet_weight) +
+    J^T diag(effort_weight) J.
+
+    jet_gradient, jet_weight: shape (P, 3 nv). effort_gradient, effort_weight: shape (P, nv).
+    """
+
+    jet_gradient: Array
+    jet_weight: Array
+    effort_gradient: Array
+    effort_weight: Array
+
+
+@dataclass(frozen=True, eq=False)
 class EffortLagrangian(Lagrangian):
     """L~ = 1/2 tau^T diag(R) tau + V(q): the cost of control as a Lagrangian on T^(2)Q.
 
@@ -107,6 +123,10 @@ class EffortLagrangian(Lagrangian):
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """1/2 tau^T diag(R) tau + V, shape (P,)."""
         tau = self.torques.torque(jet[0], jet[1], jet[2], t)
+        return self.value_of(tau, jet, t)
+
+    def value_of(self, tau: Array, jet: tuple[Array, ...], t: Array | None = None) -> Array:
+        """The value where the torque is known already, shape (P,)."""
         value = 0.5 * np.einsum("pi,pi,i->p", tau, tau, self.weight)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
@@ -128,19 +148,31 @@ class EffortLagrangian(Lagrangian):
         return value, gradient.reshape(points, 3, n), hessian.reshape(points, 3, n, 3, n)
 
     def expand(
-        self, *jet: Array, t: Array | None = None, multiplier: Array | None = None
+        self,
+        *jet: Array,
+        t: Array | None = None,
+        multiplier: Array | None = None,
+        terms: PointTerms | None = None,
     ) -> tuple[Array, Array, Array, Array, Array]:
         """As evaluate, with the curvature of tau weighted by `multiplier` instead of R tau.
 
         multiplier: shape (P, nv). Weighted with the torque that the last step predicted
-        (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
+            (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
+        terms: what limits add.
         Returns value (P,), gradient (P, 3 nv), hessian (P, 3 nv, 3 nv), tau, J.
         """
         q, v, a = jet
-        tau, J, hessian = self.torques.expand(q, v, a, t, self.weight, multiplier)
+        R = self.weight if terms is None else self.weight + terms.effort_weight
+        tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
         effort = self.weight * tau
         value = 0.5 * np.einsum("pi,pi->p", tau, effort)
+        if terms is not None:
+            effort = effort + terms.effort_gradient
         gradient = np.matmul(effort[:, None], J)[:, 0]
+        if terms is not None:
+            gradient += terms.jet_gradient
+            diagonal = np.arange(hessian.shape[1])
+            hessian[:, diagonal, diagonal] += terms.jet_weight
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV
@@ -148,15 +180,19 @@ class EffortLagrangian(Lagrangian):
 
 
 class PotentialTerm:
-    """A term V(q, v, a, t) of the cost from a CasADi expression."""
+    """A term V(q, v, a, t) of the cost from a CasADi expression.
 
-    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], expression: ca.SX) -> None:
+    compile: whether its functions become machine code: see PointFunction.
+    """
+
+    def __init__(
+        self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], expression: ca.SX, compile: bool = False
+    ) -> None:
         q, v, a, t = symbols
         hessian, gradient = ca.hessian(expression, ca.vertcat(q, v, a))
-        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]))
-        self._expand = PointFunction(
-            ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
-        )
+        expand = ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
+        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]), compile)
+        self._expand = PointFunction(expand, compile)
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """V at P points, shape (P,)."""
@@ -177,6 +213,8 @@ class CasadiLagrangian(Lagrangian):
 
     def __init__(self, jet: list[ca.SX], expression: ca.SX) -> None:
         self.order = len(jet) - 1
+        self.jet = list(jet)
+        self.expression = expression
         self._n = int(jet[0].shape[0])
         hessian, gradient = ca.hessian(expression, ca.vertcat(*jet))
         self._value = PointFunction(ca.Function("L", jet, [expression]))

@@ -29,13 +29,17 @@ class Scene:
 
     robot: the robot.
     effects: at most one of each kind.
+    compile: compile what is evaluated by CasADi to machine code, once: the libraries stay in the
+        user's cache folder. It takes a C compiler and seconds, and changes no result.
     model: the scene's own copy of the robot's model, with gravity and armature as the effects
         say (none where no effect says so).
-    Raises SceneError when an effect does not fit the robot, or is named twice.
+    Raises SceneError when an effect does not fit the robot, or is named twice; with compile,
+    its functions raise CompilationError where they cannot be compiled or kept.
     """
 
     robot: Robot
     effects: Sequence[Effect] = ()
+    compile: bool = field(default=False, kw_only=True)
     model: pin.Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -62,10 +66,13 @@ class Scene:
         symbols = self._symbols()
         added = self._added_torque(symbols)
         if self.analytic:
-            more = None if added is None else CasadiTorque(symbols.columns(), added)
+            more = None
+            if added is not None:
+                more = CasadiTorque(symbols.columns(), added, self.compile)
             return AnalyticTorque(InverseDynamicsKernel(self.model), more)
         tau = casadi_functions(self.model).inverse_dynamics(symbols.q, symbols.v, symbols.a)
-        return CasadiTorque(symbols.columns(), tau if added is None else tau + added)
+        tau = tau if added is None else tau + added
+        return CasadiTorque(symbols.columns(), tau, self.compile)
 
     @property
     def analytic(self) -> bool:
@@ -84,7 +91,7 @@ class Scene:
             raise SceneError(
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
-        return EffortLagrangian(self.torques, self, R, self._potential())
+        return EffortLagrangian(self.torques, self, R, self._potential)
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -103,6 +110,8 @@ class Scene:
         lines.append("left out:")
         lines += [f"  {line}" for line in self._left_out()] or ["  nothing that the URDF holds"]
         lines.append(self._derivatives())
+        if self.compile:
+            lines.append("what CasADi evaluates is compiled to machine code")
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,11 +134,14 @@ class Scene:
         sym = ca.SX.sym
         return SceneSymbols(sym("q", nq), sym("v", nv), sym("a", nv), sym("t"))
 
+    @cached_property
     def _potential(self) -> PotentialTerm | None:
         symbols = self._symbols()
         terms = [effect.potential(self.robot, symbols) for effect in self.effects]
         named = [term for term in terms if term is not None]
-        return PotentialTerm(symbols.columns(), sum(named[1:], named[0])) if named else None
+        if not named:
+            return None
+        return PotentialTerm(symbols.columns(), sum(named[1:], named[0]), self.compile)
 
     def _added_torque(self, symbols: SceneSymbols) -> ca.SX | None:
         terms = [effect.torque(self.robot, symbols) for effect in self.effects]
@@ -154,7 +166,7 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is cached, so that worker processes build their own functions."""
-        return {"robot": self.robot, "effects": self.effects, "model": self.model}
+        return {name: getattr(self, name) for name in ("robot", "effects", "compile", "model")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():

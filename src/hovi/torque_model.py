@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from typing import Protocol
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from hovi.point_function import PointFunction
+from hovi.point_function import PointFunction, default_threads
 from hovi.rigid_body import InverseDynamicsKernel
 
 Array = npt.NDArray[np.float64]
@@ -37,23 +36,30 @@ class TorqueModel(Protocol):
     ) -> tuple[Array, Array, Array]:
         """tau, J and J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv).
 
-        R: weight of each joint, shape (nv,). curvature: shape (P, nv); R * tau when None.
+        R: weight of each joint, shape (nv,) or (P, nv). curvature: shape (P, nv); R * tau when
+            None.
         """
 
 
 class CasadiTorque:
-    """A torque model from CasADi expressions: the definition, and the fallback of faster ones."""
+    """A torque model from CasADi expressions: the definition, and the fallback of faster ones.
 
-    def __init__(self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX) -> None:
+    compile: whether its functions become machine code: see PointFunction.
+    """
+
+    def __init__(
+        self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX, compile: bool = False
+    ) -> None:
         q, v, a, t = symbols
         x = ca.vertcat(q, v, a)
         weight = ca.SX.sym("weight", tau.shape[0])
         J = ca.jacobian(tau, x)
         curvature = ca.hessian(ca.dot(weight, tau), x)[0]
         self.nv = int(tau.shape[0])
-        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]))
-        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]))
-        self._curvature = PointFunction(ca.Function("ddtau", [q, v, a, t, weight], [curvature]))
+        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]), compile)
+        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]), compile)
+        ddtau = ca.Function("ddtau", [q, v, a, t, weight], [curvature])
+        self._curvature = PointFunction(ddtau, compile)
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
@@ -82,7 +88,8 @@ class CasadiTorque:
         """tau, J and the Hessian of TorqueModel.expand."""
         tau, J = self.linearize(q, v, a, t)
         weight = R * tau if curvature is None else curvature
-        hessian = np.matmul(J.transpose(0, 2, 1) * R, J) + self.curvature(q, v, a, t, weight)
+        hessian = np.matmul(J.transpose(0, 2, 1), R[..., None] * J)
+        hessian += self.curvature(q, v, a, t, weight)
         return tau, J, hessian
 
 
@@ -128,18 +135,12 @@ class AnalyticTorque:
             return self.kernel.expand(q, v, a, R, curvature, self._threads)
         more, dmore = self.added.linearize(q, v, a, t)
         tau, J, hessian = self.kernel.expand(q, v, a, R, curvature, self._threads)
-        RdJ = R[:, None] * dmore
+        RdJ = R[..., None] * dmore
         cross = np.matmul(J.transpose(0, 2, 1), RdJ)
         hessian += cross + cross.transpose(0, 2, 1)
         hessian += np.matmul(dmore.transpose(0, 2, 1), RdJ)
         hessian += self.added.curvature(q, v, a, t, curvature)
         return tau + more, J + dmore, hessian
-
-
-def default_threads() -> int:
-    """OMP_NUM_THREADS where it is set, as worker processes do, else the processors at hand."""
-    wanted = os.environ.get("OMP_NUM_THREADS", "")
-    return int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1
 
 
 def times(t: Array | None, points: int) -> Array:

@@ -11,6 +11,7 @@ from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import Coordinates, Expansion
 from hovi.grid import DiscretePath
 from hovi.guess import moved
+from hovi.lagrangian import PointTerms
 from hovi.optimize.band import BandModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
@@ -47,6 +48,13 @@ class ActionObjective(Objective[DiscretePath]):
         self._expansion: Expansion | None = None
 
     @property
+    def expansion(self) -> Expansion:
+        """The expansion behind the last model."""
+        if self._expansion is None:
+            raise RuntimeError("no model has been asked for yet")
+        return self._expansion
+
+    @property
     def coordinates(self) -> Coordinates:
         """Columns in which the intervals are expanded."""
         return "nodal" if self.algebra == "band" else "regular"
@@ -63,7 +71,16 @@ class ActionObjective(Objective[DiscretePath]):
         if previous is not None and step is not None and self._expansion is not None:
             local = previous.gather(step)
             multipliers = self.ld.predict(self._expansion, local, self.coordinates)
-        self._expansion = self.ld.expand(x, self.coordinates, multipliers)
+        return self.model_with(x, multipliers, None)
+
+    def model_with(
+        self,
+        x: DiscretePath,
+        multipliers: list[Array] | None,
+        terms: list[PointTerms] | None,
+    ) -> QuadraticModel:
+        """The model at x with given curvature weights and with what limits add at the points."""
+        self._expansion = self.ld.expand(x, self.coordinates, multipliers, terms)
         intervals = IntervalSum(
             self._expansion.gradient,
             self._expansion.hessian,

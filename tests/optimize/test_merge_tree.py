@@ -147,9 +147,8 @@ def merged(grid: Grid, L: CasadiLagrangian, path: DiscretePath) -> tuple[MergeTr
     return model, np.concatenate(ends, axis=1)
 
 
-def sampled(grid: Grid, n: int, *derivatives: Array, z: Array) -> DiscretePath:
-    q, v = derivatives
-    return DiscretePath(q, v, z, np.zeros((grid.intervals, grid.inner_modes, n)))
+def without_modes(grid: Grid, q: Array, v: Array, z: Array) -> DiscretePath:
+    return DiscretePath(q, v, z, np.zeros((grid.intervals, grid.inner_modes, q.shape[1])))
 
 
 def quadratic(potential: float) -> CasadiLagrangian:
@@ -179,7 +178,7 @@ def test_the_spline_is_exact_however_small_the_step(step: float) -> None:
     z0 = 0.1 * (2 * np.sin(d / 2) ** 2 * np.cos(x) + sine * np.sin(x)) / h**2
     z1 = 0.1 * w / T * 2 * np.cos(x + d / 2) * np.sin(d / 2) / h
     z = cubic_z + np.stack([z0, z1], axis=1)
-    model, columns = merged(grid, quadratic(0.0), sampled(grid, 1, q, v, z=z))
+    model, columns = merged(grid, quadratic(0.0), without_modes(grid, q, v, z))
     factor = model.factor(0.0)
     assert factor is not None
     found = columns + model.gather(factor.solve(-model.gradient))
@@ -197,24 +196,20 @@ def test_a_motion_of_ten_thousand_intervals_is_the_analytic_one() -> None:
     q, v = np.exp(t) + np.exp(-t) + t - 1, np.exp(t) - np.exp(-t) + 1
     (q0, q1), (v0, v1) = q[[0, -1], 0], v[[0, -1], 0]
     Z0, Z1 = q1 - q0 - T * v0, T * (v1 - v0)
-    s, ds = t[:, 0] / T, 1 / N
-    start = galerkin(0).rows(s) @ np.array([T * v0, Z0, Z1])
+    start = galerkin(0).rows(t[:, 0] / T) @ np.array([T * v0, Z0, Z1])  # the cubic, (N + 1, 3)
     a = start[:, 2] / T**2
     jerk = np.diff(a) / grid.steps
     z = np.stack([a[:-1] / 2 + jerk * grid.steps / 6, a[:-1] + jerk * grid.steps / 2], axis=1)
     guess = q0 + start[:, :1], start[:, 1:2] / T
-    assert ds * T == pytest.approx(grid.steps[0])
-    model, columns = merged(grid, quadratic(1.0), sampled(grid, 1, *guess, z=z[..., None]))
+    model, columns = merged(grid, quadratic(1.0), without_modes(grid, *guess, z[..., None]))
     factor = model.factor(0.0)
     assert factor is not None
     found = columns + model.gather(factor.solve(-model.gradient))
     np.testing.assert_allclose(found[:, 0], q[:-1], rtol=0, atol=1e-12)
     np.testing.assert_allclose(found[:, 1] / grid.steps[0], v[:-1], rtol=0, atol=1e-12)
-    a0 = np.exp(t) + np.exp(-t)
     z1 = np.diff(np.exp(t) - np.exp(-t), axis=0) / grid.steps[0]
     np.testing.assert_allclose(found[:, 3] / grid.steps[0] ** 2, z1, rtol=0, atol=1e-10)
     assert model.negative_eigenvalues() == 0
-    assert np.isfinite(a0).all()
 
 
 @pytest.mark.parametrize(
@@ -227,6 +222,6 @@ def test_negative_eigenvalues_count_the_conjugate_points(T: float, passed: int, 
     q, v, a = (ca.SX.sym(name, n) for name in "qva")
     L = CasadiLagrangian([q, v, a], ca.sumsqr(a) / 2 - ca.sumsqr(v) / 2)
     zero = np.zeros((41, n))
-    model, _ = merged(grid, L, sampled(grid, n, zero, zero, z=np.zeros((40, 2, n))))
+    model, _ = merged(grid, L, without_modes(grid, zero, zero, np.zeros((40, 2, n))))
     assert model.negative_eigenvalues() == n * passed
     assert (model.factor(0.0) is None) == (passed > 0)

@@ -24,6 +24,8 @@ class BandLayout:
 
     unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
         column is fixed.
+    scales: column = scale * unknown, shape (N, m), so that neighbours of different length share
+        an unknown; None where every scale is one.
     """
 
     unknowns: Index
@@ -31,9 +33,10 @@ class BandLayout:
     bandwidth: int
     entries: Index
     positions: Index
+    scales: Array | None
 
     @classmethod
-    def of(cls, unknowns: Index) -> BandLayout:
+    def of(cls, unknowns: Index, scales: Array | None = None) -> BandLayout:
         """The layout of given unknowns.
 
         Entry (i, j), i >= j, stands at j (bandwidth + 1) + i - j.
@@ -50,10 +53,13 @@ class BandLayout:
         stored = np.arange(m * m * n * n).reshape(m, m, n, n).transpose(0, 2, 1, 3)
         offset = np.arange(N)[:, None, None] * (m * m * n * n)
         entries = (offset + stored.reshape(m * n, m * n))[lower]
-        return cls(unknowns, size, bandwidth, entries, position)
+        return cls(unknowns, size, bandwidth, entries, position, scales)
 
     def assemble(self, hessian: Array) -> Array:
         """The band of a sum over intervals, shape (size, bandwidth + 1): column j at row j."""
+        if self.scales is not None:
+            pairs = self.scales[:, :, None] * self.scales[:, None, :]
+            hessian = hessian * pairs[..., None, None]
         length = self.size * (self.bandwidth + 1)
         band = np.bincount(self.positions, hessian.reshape(-1)[self.entries], minlength=length)
         return np.asarray(band.reshape(self.size, self.bandwidth + 1), dtype=np.float64)
@@ -81,13 +87,17 @@ class BandModel(QuadraticModel):
 
     def scatter(self, local: Array) -> Array:
         """Sum of the intervals' covectors per unknown, shape (size,)."""
+        if self.layout.scales is not None:
+            local = local * self.layout.scales[..., None]
         index = self.layout.unknowns.ravel()
         sums = np.bincount(index + 1, local.ravel(), minlength=self.layout.size + 1)
         return np.asarray(sums[1:], dtype=np.float64)
 
     def gather(self, s: Array) -> Array:
         """Columns of every interval, zero where they are fixed."""
-        return np.append(s, 0.0)[self.layout.unknowns]
+        local = np.append(s, 0.0)[self.layout.unknowns]
+        scales = self.layout.scales
+        return local if scales is None else np.asarray(local * scales[..., None])
 
     def factor(self, shift: float) -> Factor | None:
         """Banded Cholesky of H + shift D; None where it fails."""

@@ -133,6 +133,8 @@ def minimize(
         _iterate(objective, outcome, options, report)
     except KeyboardInterrupt:
         outcome.stop = Stop.INTERRUPTED
+    except ArithmeticError:
+        outcome.stop = Stop.DIVERGED
     return outcome
 
 
@@ -162,7 +164,7 @@ def _iterate(
         outcome.history.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
         if report is not None:
             report(outcome.iterations, min(value, outcome.value))
-        radius = _next_radius(radius, trial, ratio)
+        radius = next_radius(radius, trial.norm, ratio)
         accepted = ratio > 1e-4
         if accepted:
             if trial.along_negative_curvature and stationary:
@@ -171,8 +173,7 @@ def _iterate(
         if stationary and trial.newton:
             outcome.stop = Stop.STATIONARY
             return
-        # the shift falls a little faster than the radius grows
-        shift = trial.shift * (trial.norm / radius) ** 1.2
+        shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
             model = objective.model(outcome.x, model, trial.step)
         elif radius < 1e-14 * options.radius:
@@ -206,12 +207,20 @@ def _ratio(actual: float, predicted: float, noise: float) -> float:
     return actual / predicted if predicted > 0 else -1.0
 
 
-def _next_radius(radius: float, trial: Trial, ratio: float) -> float:
-    """Where the model failed, the minimum of a parabola along the step, within bounds."""
+def next_shift(shift: float, norm: float, radius: float) -> float:
+    """A first shift for another radius: it falls a little faster than the radius grows."""
+    return shift * (norm / radius) ** 1.2
+
+
+def next_radius(radius: float, norm: float, ratio: float) -> float:
+    """Where the model failed, the minimum of a parabola along the step, within bounds.
+
+    norm: length of the step. ratio: actual over predicted decrease.
+    """
     if ratio < 0.25:
         share = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
-        return max(0.25, share) * min(radius, trial.norm)
-    if ratio > 0.75 and trial.norm > 0.7 * radius:
+        return max(0.25, share) * min(radius, norm)
+    if ratio > 0.75 and norm > 0.7 * radius:
         return (2.0 if ratio > 0.9 else 1.4) * radius
     return radius
 
@@ -223,9 +232,12 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
     """
     search = _ShiftSearch(model, radius, guess)
     shift = guess
-    for attempt in range(PASS_SHIFTS):
+    last: tuple[Factor, Trial] | None = None
+    for _ in range(PASS_SHIFTS):
         factor = model.factor(shift)
         if factor is None:
+            if last is not None and last[1].norm < radius and search.is_hard_case(last[1].shift):
+                return search.complete(*last)
             shift = search.after_failure(shift)
             continue
         trial, slope = search.step_at(factor, shift)
@@ -233,9 +245,11 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
             return trial
         if trial.norm < radius and search.is_hard_case(shift):
             return search.complete(factor, trial)
+        last = factor, trial
         shift = search.after_step(shift, trial, slope)
-        if attempt == PASS_SHIFTS - 1:
-            return trial
+    if last is not None:
+        factor, trial = last
+        return search.complete(factor, trial) if trial.norm < radius else trial
     raise ArithmeticError("H + shift D stays indefinite: the model has numbers that are not finite")
 
 
@@ -307,6 +321,6 @@ class _ShiftSearch:
         rest = factor.solve(Du)
         # u.H u from u.(H + shift D) u by one more inverse iteration: a Rayleigh quotient
         rayleigh = 1.0 / float(np.vdot(Du, rest)) - trial.shift
-        decrease = trial.decrease - 0.5 * length**2 * min(rayleigh, 0.0)
+        decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
         negligible = trial.norm < 1e-6 * self.radius
         return Trial(step, decrease, trial.shift, self.radius, negligible)

@@ -120,7 +120,7 @@ class InverseDynamicsKernel:
         """tau, J and H = J^T diag(weight) J + sum_i curvature_i d^2 tau_i at each point.
 
         q, v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
-        weight: shape (n,), the metric of the torques.
+        weight: shape (n,) or (P, n), the metric of the torques.
         curvature: shape (P, n), what multiplies each torque's second derivative; None drops the
             sum. With curvature = weight * tau, H is the Hessian of 1/2 tau^T diag(weight) tau.
         threads: how many threads share the points.
@@ -130,7 +130,9 @@ class InverseDynamicsKernel:
         on a wrong shape.
         """
         q, v, a = self._points(q, v, a)
-        weight = self._array("weight", weight, (self._n,))
+        if np.shape(weight) == (self._n,):
+            weight = np.broadcast_to(weight, q.shape)
+        weight = self._array("weight", weight, q.shape)
         if curvature is not None:
             curvature = self._array("curvature", curvature, q.shape)
         _check_threads(threads)

@@ -30,14 +30,13 @@ CLASSIC: dict[str, Callable[[], Scheme]] = {
 def by_name(name: str) -> Scheme:
     """The scheme that a file or the command line calls `name`.
 
-    name: one of CLASSIC, or `galerkin-R` with R inner modes, `galerkin-R-kK` for Lagrangians of
-        order K. Raises SchemeError otherwise.
+    name: one of CLASSIC, or `galerkin-R` with R inner modes. Raises SchemeError otherwise.
     """
     if name in CLASSIC:
         return CLASSIC[name]()
-    match = re.fullmatch(r"galerkin-(\d{1,4})(?:-k([134]))?", name)
+    match = re.fullmatch(r"galerkin-(\d{1,4})", name)
     if match:
-        return galerkin(int(match.group(1)), int(match.group(2) or 2))
+        return galerkin(int(match.group(1)))
     known = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-3"]
     raise SchemeError(f"there is no scheme {name!r}: {nearest(name, known)}")
 

@@ -159,11 +159,11 @@ void InverseDynamicsKernel::linearize(Points points, Expansion out, int threads)
 void InverseDynamicsKernel::expand(Points points, const double* weight, const double* curvature,
                                    Expansion out, int threads) {
   const std::size_t n = dof();
-  const Eigen::Map<const Eigen::VectorXd> R(weight, n);
   parts_->for_each_point(points, threads, [&](Worker& w, std::size_t point) {
     w.first_derivatives();
     gather_jacobian(w);
     write_first_order(w, point, out);
+    const Eigen::Map<const Eigen::VectorXd> R(weight + point * n, n);
     w.weighted_J.noalias() = R.asDiagonal() * w.J;
     accumulate_gauss_newton(w);
     if (curvature) {

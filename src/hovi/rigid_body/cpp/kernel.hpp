@@ -33,8 +33,8 @@ class InverseDynamicsKernel {
   void torque(Points points, Expansion out, int threads);
   void linearize(Points points, Expansion out, int threads);
 
-  // hessian = J^T diag(weight) J + sum_i curvature_i d2tau_i, with weight (n,) and
-  // curvature (count, n), or null for none.
+  // hessian = J^T diag(weight) J + sum_i curvature_i d2tau_i at each point, with weight and
+  // curvature (count, n), the latter null for none.
   void expand(Points points, const double* weight, const double* curvature, Expansion out,
               int threads);
 

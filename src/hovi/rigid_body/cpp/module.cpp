@@ -46,7 +46,7 @@ void linearize(InverseDynamicsKernel& self, const Input& q, const Input& v, cons
 }
 
 void expand(InverseDynamicsKernel& self, const Input& q, const Input& v, const Input& a,
-            const Array<const double, 1>& weight, const std::optional<Input>& curvature,
+            const Input& weight, const std::optional<Input>& curvature,
             const Array<double, 2>& tau, const Array<double, 3>& jacobian,
             const Array<double, 3>& hessian, int threads) {
   const Points points = points_of(q, v, a);

@@ -1,0 +1,88 @@
+"""hovi against CasADi and Ipopt: the same discrete problem, guess and thread, in one run.
+
+Compiling and building are not counted. From the same guess different solvers may end in
+different minima, so their costs are printed; from hovi's motion Ipopt must stay where it is.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+import casadi as ca
+
+import hovi
+from measuring import alone, best_time, print_machine, print_table
+from transcription import Transcription
+
+SCENES = ("ur5_reach", "panda_reach")
+SCHEME, INTERVALS = "galerkin-2", 16
+
+
+def measure(scene: str) -> list[dict[str, object]]:
+    """hovi, then both peers: steps, seconds when warm, cost, seconds to build."""
+    task = hovi.load_task(hovi.example(scene))
+    began = time.perf_counter()
+    grid = hovi.Grid.uniform(task.duration, INTERVALS, hovi.schemes.by_name(SCHEME))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    problem = hovi.TrajectoryProblem(ld, task.start, task.goal)
+    solution = hovi.solve(problem)
+    built = time.perf_counter() - began - solution.solve_seconds
+    assert solution.success, solution.message
+    warm = best_time(lambda: hovi.solve(problem), seconds=2.0)
+    ours = {"solver": "hovi", "steps": solution.nit, "seconds": warm, "built": built}
+    rows = [ours | {"cost": solution.cost, "stays": 0.0}]
+    transcription = Transcription(problem)
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("compiled", "interpreted"):
+            began = time.perf_counter()
+            arguments = (Path(folder),) if name == "compiled" else ()
+            solver = getattr(transcription, name)(*arguments)
+            row = {"solver": f"Ipopt, {name}", "built": time.perf_counter() - began}
+            rows.append(row | _peer(solver, transcription, solution))
+    return rows
+
+
+def _peer(solver: ca.Function, it: Transcription, ours: hovi.Solution) -> dict[str, object]:
+    near = solver(**it.arguments(ours.trajectory))
+    guess = it.arguments("cubic")
+    found = solver(**guess)
+    stats = solver.stats()
+    assert stats["success"], stats["return_status"]
+    seconds = best_time(lambda: solver(**guess), seconds=2.0)
+    return {
+        "steps": stats["iter_count"],
+        "seconds": seconds,
+        "cost": float(found["f"]),
+        "stays": abs(float(near["f"]) / ours.cost - 1),
+    }
+
+
+def main() -> None:
+    print(f"`{SCHEME}` on {INTERVALS} intervals, from the cubic guess, one thread, when warm.\n")
+    rows = []
+    for scene in SCENES:
+        runs = alone(measure, scene)
+        ours = runs[0]["seconds"]
+        for run in runs:
+            rows.append(
+                [
+                    f"`{scene}`, {run['solver']}",
+                    run["steps"],
+                    f"{1e3 * run['seconds']:.1f}",
+                    f"{run['seconds'] / ours:.1f}",
+                    f"{1e3 * run['seconds'] / run['steps']:.2f}",
+                    f"{run['cost']:.7g}",
+                    f"{run['stays']:.0e}",
+                    f"{run['built']:.2g}",
+                ]
+            )
+    columns = ["scene, solver", "steps", "ms", "time / hovi's", "ms per step", "cost"]
+    columns += ["from hovi's motion: change of cost", "seconds to build"]
+    print_table(columns, rows)
+    print_machine(threads=1)
+
+
+if __name__ == "__main__":
+    main()

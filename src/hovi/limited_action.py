@@ -1,0 +1,143 @@
+"""The discrete action under limits, as an objective of the interior point."""
+
+from __future__ import annotations
+
+import itertools
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.grid import DiscretePath
+from hovi.lagrangian import EffortLagrangian, PointTerms
+from hovi.limits import Limits
+from hovi.optimize.barrier import Bounds
+from hovi.optimize.interior_point import BoundedObjective, Outputs
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.problem import TrajectoryProblem
+from hovi.trajectory_objective import ActionObjective
+
+Array = npt.NDArray[np.float64]
+
+
+class LimitedAction(BoundedObjective[DiscretePath]):
+    """The discrete action, with (q, v, a, tau) bounded at the quadrature points.
+
+    problem: what to minimise.
+    limits: the bounds.
+    margins: by which share of its range each bound is drawn in, below and above, in each
+        interval, shape (2, N, 4, nv); none when None.
+    """
+
+    def __init__(
+        self, problem: TrajectoryProblem, limits: Limits, margins: Array | None = None
+    ) -> None:
+        self.problem = problem
+        self.limits = limits
+        self.action = ActionObjective(problem, structure=problem.structure)
+        self.ld = problem.ld
+        if not isinstance(self.ld.lagrangian, EffortLagrangian):
+            raise TypeError("limits need the effort Lagrangian of a scene")
+        self.lagrangian: EffortLagrangian = self.ld.lagrangian
+        self.columns = np.flatnonzero(limits.bounded.ravel())
+        self.bounds = self._bounds(margins)
+        self._predicted: list[Array] | None = None
+        self._linear: list[Array] = []
+        self._rho = np.zeros(0)
+
+    def outputs(self, x: DiscretePath) -> Outputs:
+        """The discrete action, and the bounded outputs in units of their ranges."""
+        value, rows = 0.0, []
+        for jet, t, weights in zip(
+            self.ld.jets(x), self.ld.point_times, self.ld.point_weights, strict=True
+        ):
+            tau = self.lagrangian.torques.torque(*jet, t)
+            value += float(weights @ self.lagrangian.value_of(tau, jet, t))
+            rows.append(np.concatenate([*jet, tau], axis=1))
+        return Outputs(value, self._scaled(np.concatenate(rows)))
+
+    def model(
+        self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
+    ) -> QuadraticModel:
+        """The action's model with the bounds' terms: see BoundedObjective.model."""
+        self._rho = rho
+        gradient = self._unscaled(rho, 1)
+        weight = self._unscaled(sigma, 2)
+        force = self._unscaled(multipliers, 1)
+        terms, curvatures = [], []
+        for i, part in enumerate(self._parts):
+            jet_part, effort_part = gradient[part], weight[part]
+            k = 3 * self.lagrangian.nv
+            terms.append(
+                PointTerms(jet_part[:, :k], effort_part[:, :k], jet_part[:, k:], effort_part[:, k:])
+            )
+            curvatures.append(self._effort(x, i) + force[part, k:])
+        return self.action.model_with(x, curvatures, terms)
+
+    def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
+        """Change of the action and of the bounded outputs, to first order."""
+        expansion = self.action.expansion
+        changes = self.ld.point_steps(model.gather(step), self.action.coordinates)
+        rows = []
+        self._linear = []
+        for dx, (_tau, J) in zip(changes, expansion.torque, strict=True):
+            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
+            self._linear.append(dtau)
+            rows.append(np.concatenate([dx, dtau], axis=1))
+        dy = np.concatenate(rows)[:, self.columns] / self._ranges
+        slope = float(np.vdot(model.gradient, step))
+        return slope - float(np.sum(self.bounds.weights * self._rho * dy)), dy
+
+    def follow(self, fraction: float) -> None:
+        """The torques that the step taken foresees weight the next curvature."""
+        pairs = zip(self.action.expansion.torque, self._linear, strict=True)
+        self._predicted = [
+            self.lagrangian.weight * (tau + fraction * dtau) for (tau, _), dtau in pairs
+        ]
+
+    def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
+        """The path moved by a step."""
+        return self.action.retract(x, step, model)
+
+    def _effort(self, x: DiscretePath, batch: int) -> Array:
+        """R tau as foreseen, or as it is at x."""
+        if self._predicted is not None:
+            return self._predicted[batch]
+        jet, t = self.ld.jets(x)[batch], self.ld.point_times[batch]
+        return self.lagrangian.weight * self.lagrangian.torques.torque(*jet, t)
+
+    @cached_property
+    def _ranges(self) -> Array:
+        return np.asarray(self.limits.ranges.ravel()[self.columns])
+
+    @cached_property
+    def _parts(self) -> list[slice]:
+        """Rows of every batch among all points."""
+        ends = np.cumsum([0, *(len(weights) for weights in self.ld.point_weights)])
+        return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+    @cached_property
+    def _origin(self) -> Array:
+        """Where the scale of every output starts: its lower bound, or its only one."""
+        lower, upper = self.limits.lower.ravel(), self.limits.upper.ravel()
+        return np.where(np.isfinite(lower), lower, upper)[self.columns]
+
+    def _scaled(self, rows: Array) -> Array:
+        return (rows[:, self.columns] - self._origin) / self._ranges
+
+    def _unscaled(self, y: Array, power: int) -> Array:
+        """Derivatives by scaled outputs as derivatives by (q, v, a, tau), (P, 4 nv)."""
+        full = np.zeros((len(y), self.limits.lower.size))
+        full[:, self.columns] = y / self._ranges**power
+        return full
+
+    def _bounds(self, margins: Array | None) -> Bounds:
+        lower = (self.limits.lower.ravel()[self.columns] - self._origin) / self._ranges
+        upper = (self.limits.upper.ravel()[self.columns] - self._origin) / self._ranges
+        intervals = np.concatenate(self.ld.point_intervals)
+        weights = np.concatenate(self.ld.point_weights)[:, None]
+        shape = (len(intervals), len(self.columns))
+        if margins is None:
+            return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
+        drawn = margins.reshape(2, len(margins[0]), -1)[:, :, self.columns][:, intervals]
+        return Bounds(lower + drawn[0], upper - drawn[1], weights)

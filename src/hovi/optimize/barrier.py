@@ -1,0 +1,163 @@
+"""The logarithmic barrier of slacks between bounds, and their multipliers."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+INSIDE = 1e-2
+"""Least distance of a first slack from its bounds, relative to the range."""
+DUAL_SPREAD = 1e8
+"""How far a multiplier may be from mu over its slack, as a factor."""
+KEEP = 0.99
+"""Share of the way to a bound that a step may go while mu is large."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """lower <= y <= upper for outputs in units of their ranges; infinite where there is none.
+
+    lower, upper: shape (P, K). weights: of the points, shape (P, 1).
+    """
+
+    lower: Array
+    upper: Array
+    weights: Array
+
+    @property
+    def has_lower(self) -> Mask:
+        """Where there is a lower bound."""
+        return np.isfinite(self.lower)
+
+    @property
+    def has_upper(self) -> Mask:
+        """Where there is an upper bound."""
+        return np.isfinite(self.upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Barrier:
+    """-mu sum weights (log(s - lower) + log(upper - s)), with multipliers zl, zu of the slacks.
+
+    s, zl, zu: shape (P, K); a multiplier is zero where there is no bound.
+    scale: the objective's mean density, to which mu is compared.
+    """
+
+    bounds: Bounds
+    s: Array
+    zl: Array
+    zu: Array
+    mu: float
+    scale: float
+
+    @classmethod
+    def central(cls, bounds: Bounds, y: Array, mu: float) -> Barrier:
+        """Slacks as near to y as the inside allows, multipliers on the central path."""
+        s = np.clip(y, *_inside(bounds, INSIDE))
+        below, above = _gaps(bounds, s)
+        return cls(bounds, s, mu / below, mu / above, mu, 10.0 * mu)._masked()
+
+    @property
+    def sigma(self) -> Array:
+        """zl/(s - lower) + zu/(upper - s)."""
+        below, above = _gaps(self.bounds, self.s)
+        return self.zl / below + self.zu / above
+
+    @property
+    def gradient(self) -> Array:
+        """mu/(upper - s) - mu/(s - lower)."""
+        below, above = _gaps(self.bounds, self.s)
+        return self.mu * (1 / above - 1 / below)
+
+    @property
+    def multipliers(self) -> Array:
+        """zu - zl, the force that the bounds exert on the outputs."""
+        return self.zu - self.zl
+
+    def value(self, weights: Array, s: Array | None = None) -> float:
+        """The barrier at its slacks or at others."""
+        below, above = _gaps(self.bounds, self.s if s is None else s)
+        finite = _log(below) + _log(above)
+        return -self.mu * float(np.sum(weights * finite))
+
+    def merit(self, weights: Array, y: Array, penalty: float) -> float:
+        """The barrier plus penalty sum weights |y - s|."""
+        return self.value(weights) + penalty * float(np.sum(weights * np.abs(y - self.s)))
+
+    def dual_step(self, ds: Array) -> tuple[Array, Array]:
+        """Change of zl and zu that Newton's method foresees for a change of the slacks."""
+        below, above = _gaps(self.bounds, self.s)
+        dzl = (self.mu - self.zl * ds) / below - self.zl
+        dzu = (self.mu + self.zu * ds) / above - self.zu
+        return np.where(self.zl > 0, dzl, 0.0), np.where(self.zu > 0, dzu, 0.0)
+
+    def longest(self, ds: Array) -> float:
+        """Largest share of ds, at most 1, that leaves a little of every slack."""
+        below, above = _gaps(self.bounds, self.s)
+        return min(1.0, self._keep() * min(_reach(below, ds), _reach(above, -ds)))
+
+    def moved(self, ds: Array, dzl: Array, dzu: Array, share: float) -> Barrier:
+        """Slacks moved by a share of ds, multipliers as far as they stay positive."""
+        keep = self._keep()
+        dual = min(1.0, keep * min(_reach(self.zl, dzl), _reach(self.zu, dzu)))
+        zl, zu = self.zl + dual * dzl, self.zu + dual * dzu
+        return dataclasses.replace(self, s=self.s + share * ds, zl=zl, zu=zu)._masked()
+
+    def with_reset_slacks(self, y: Array, penalty: float) -> Barrier:
+        """s = y wherever that is inside and lowers the merit function."""
+        below, above = _gaps(self.bounds, y)
+        inside = (below > 0) & (above > 0)
+        here_below, here_above = _gaps(self.bounds, self.s)
+        here = penalty * np.abs(y - self.s) - self.mu * (_log(here_below) + _log(here_above))
+        there = -self.mu * (_log(np.where(inside, below, 1)) + _log(np.where(inside, above, 1)))
+        s = np.where(inside & (there < here), y, self.s)
+        return dataclasses.replace(self, s=s)._masked()
+
+    def with_mu(self, mu: float) -> Barrier:
+        """The barrier of another mu."""
+        return dataclasses.replace(self, mu=mu)
+
+    def complementarity(self) -> float:
+        """The largest |z s - mu|."""
+        below, above = _gaps(self.bounds, self.s)
+        lower = np.where(self.bounds.has_lower, np.abs(self.zl * below - self.mu), 0.0)
+        upper = np.where(self.bounds.has_upper, np.abs(self.zu * above - self.mu), 0.0)
+        return float(max(lower.max(initial=0.0), upper.max(initial=0.0)))
+
+    def _keep(self) -> float:
+        return max(KEEP, 1.0 - self.mu / self.scale)
+
+    def _masked(self) -> Barrier:
+        """Multipliers within reach of the central path, none where there is no bound."""
+        below, above = _gaps(self.bounds, self.s)
+        low, high = self.mu / DUAL_SPREAD, self.mu * DUAL_SPREAD
+        zl = np.where(self.bounds.has_lower, np.clip(self.zl, low / below, high / below), 0.0)
+        zu = np.where(self.bounds.has_upper, np.clip(self.zu, low / above, high / above), 0.0)
+        return dataclasses.replace(self, zl=zl, zu=zu)
+
+
+def _gaps(bounds: Bounds, s: Array) -> tuple[Array, Array]:
+    """(s - lower, upper - s); infinite where there is no bound."""
+    return s - bounds.lower, bounds.upper - s
+
+
+def _inside(bounds: Bounds, share: float) -> tuple[Array, Array]:
+    return bounds.lower + share, bounds.upper - share
+
+
+def _log(gap: Array) -> Array:
+    """log of a gap; 0 where there is no bound."""
+    return np.asarray(np.log(np.where(np.isfinite(gap), gap, 1.0)))
+
+
+def _reach(gap: Array, change: Array) -> float:
+    """Largest share of a change at which a gap is used up."""
+    falling = change < 0
+    ratio = np.where(falling, gap, np.inf) / np.where(falling, -change, 1.0)
+    return float(ratio.min(initial=np.inf))

@@ -1,0 +1,297 @@
+"""A primal-dual interior point for bounds on outputs y(x), with the trust region's subproblem.
+
+Outputs have slacks s, held strictly between their bounds, and y(x) = s only in the limit, so
+that a start may violate every bound. With zl, zu the multipliers of s, Newton's method on
+
+    z_l (s - l) = mu,  z_u (u - s) = mu,  y(x) = s,  d action + J^T (z_u - z_l) = 0
+
+condenses into the block system of the unconstrained problem: per output the Hessian gains
+sigma = z_l/(s-l) + z_u/(u-s), and the gradient rho = mu/(u-s) - mu/(s-l) + sigma (y - s).
+Progress is measured by the action, the logarithmic barrier and an exact penalty of |y - s|; the
+model keeps the barrier as it is and linearises y alone. [WaechterBiegler2006; NocedalWright2006,
+chapter 19]
+"""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize.barrier import Barrier, Bounds
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.trust_region import (
+    Iteration,
+    Options,
+    Stop,
+    Trial,
+    next_radius,
+    next_shift,
+    solve_subproblem,
+)
+
+Array = npt.NDArray[np.float64]
+X = TypeVar("X")
+
+FIRST_MU = 0.1
+"""First barrier parameter, relative to the mean of the objective's density."""
+LAST_MU = 1e-10
+"""Last barrier parameter, relative to the same."""
+FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
+"""Shares of the longest step inside the bounds among which the model chooses."""
+INFEASIBLE = 1e-8
+"""Largest |y - s| of a solution, relative to the range of a bound."""
+STALL = 12
+"""Steps in a row that hardly move before the bounds are called into question."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """The objective and the bounded outputs at a point.
+
+    value: the objective. y: outputs in units of their ranges, shape (P, K).
+    """
+
+    value: float
+    y: Array
+
+
+class BoundedObjective(ABC, Generic[X]):
+    """What the interior point minimises: an objective with bounded outputs at weighted points."""
+
+    bounds: Bounds
+
+    @abstractmethod
+    def outputs(self, x: X) -> Outputs:
+        """The objective and the outputs at x."""
+
+    @abstractmethod
+    def model(self, x: X, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
+        """The objective's quadratic model plus sum of weights (rho dy + sigma dy^2/2).
+
+        multipliers: of the outputs, shape (P, K), with which their curvature is weighted.
+        """
+
+    @abstractmethod
+    def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
+        """First-order change of the objective and of the outputs in a step of the model."""
+
+    @abstractmethod
+    def follow(self, fraction: float) -> None:
+        """Remember that a fraction of the last step of `linear_outputs` was taken."""
+
+    @abstractmethod
+    def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
+        """The point that a step of a model leads to."""
+
+
+@dataclass(eq=False)
+class BoundedOutcome(Generic[X]):
+    """Where the iteration ended, and the multipliers there.
+
+    violation: |y - s| at the end, shape (P, K), in units of the ranges.
+    """
+
+    x: X
+    outputs: Outputs
+    barrier: Barrier
+    stop: Stop
+    iterations: int = 0
+    history: list[Iteration] = field(default_factory=list)
+    model: QuadraticModel | None = None
+
+    @property
+    def violation(self) -> Array:
+        """|y - s|, shape (P, K)."""
+        return np.abs(self.outputs.y - self.barrier.s)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the outputs equal their slacks, which are inside the bounds."""
+        return bool(self.violation.max(initial=0.0) <= INFEASIBLE)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A step of the primal-dual system, cut so that the slacks stay inside.
+
+    fraction: of the trial step that is taken. decrease: of the merit function, by the model.
+    """
+
+    trial: Trial
+    fraction: float
+    ds: Array
+    dzl: Array
+    dzu: Array
+    decrease: float
+
+
+def minimize_bounded(
+    objective: BoundedObjective[X],
+    x: X,
+    options: Options,
+    report: Callable[[int, float], None] | None = None,
+    start: Barrier | None = None,
+) -> BoundedOutcome[X]:
+    """Minimise from x, which may violate the bounds; Ctrl-C ends it with the point so far.
+
+    start: slacks and multipliers of an earlier solution nearby.
+    """
+    outputs = objective.outputs(x)
+    density = max(abs(outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))
+    barrier = start or Barrier.central(objective.bounds, outputs.y, FIRST_MU * density)
+    outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
+    if not np.isfinite(outputs.value):
+        outcome.stop = Stop.DIVERGED
+        return outcome
+    try:
+        _Iteration(objective, outcome, options, density, report).run()
+    except KeyboardInterrupt:
+        outcome.stop = Stop.INTERRUPTED
+    except ArithmeticError:
+        outcome.stop = Stop.DIVERGED
+    return outcome
+
+
+class _Iteration(Generic[X]):
+    """The loop: a subproblem, a step, a test, a smaller mu."""
+
+    def __init__(
+        self,
+        objective: BoundedObjective[X],
+        outcome: BoundedOutcome[X],
+        options: Options,
+        density: float,
+        report: Callable[[int, float], None] | None,
+    ) -> None:
+        self.objective = objective
+        self.outcome = outcome
+        self.options = options
+        self.density = density
+        self.report = report
+        self.radius = options.radius
+        self.shift = 0.0
+        self.penalty = 0.0
+        self.stalled = 0
+
+    def run(self) -> None:
+        """Until stationary, or a budget ends it."""
+        started = time.monotonic()
+        limit = self.options.time_limit
+        model = self._model()
+        while self.outcome.iterations < self.options.max_iterations:
+            if limit is not None and time.monotonic() - started > limit:
+                self.outcome.stop = Stop.TIME_LIMIT
+                return
+            step = self._step(model)
+            accepted = self._try(step, model)
+            if accepted and self._advance(step):
+                self.outcome.stop = Stop.STATIONARY
+                self.outcome.model = self._model()
+                return
+            if self.stalled >= STALL:
+                self.outcome.stop = Stop.DIVERGED
+                return
+            if accepted:
+                model = self._model()
+
+    def _model(self) -> QuadraticModel:
+        outcome, barrier = self.outcome, self.outcome.barrier
+        residual = outcome.outputs.y - barrier.s
+        return self.objective.model(
+            outcome.x,
+            barrier.sigma,
+            barrier.gradient + barrier.sigma * residual,
+            barrier.multipliers,
+        )
+
+    def _step(self, model: QuadraticModel) -> _Step:
+        barrier = self.outcome.barrier
+        weights = self.objective.bounds.weights
+        residual = self.outcome.outputs.y - barrier.s
+        trial = solve_subproblem(model, self.radius, self.shift)
+        slope, dy = self.objective.linear_outputs(trial.step, model)
+        ds = dy + residual
+        dzl, dzu = barrier.dual_step(ds)
+        if np.max(np.abs(residual)) > 1e-12:
+            largest = float(np.max(np.abs(barrier.multipliers + dzu - dzl)))
+            self.penalty = max(self.penalty, 1.2 * largest)
+        square = -float(np.vdot(model.gradient, trial.step)) - trial.shift * trial.norm**2
+        square -= float(np.sum(weights * barrier.sigma * dy**2))
+        distance = self.penalty * float(np.sum(weights * np.abs(residual)))
+
+        def decrease(share: float) -> float:
+            smooth = share * slope + 0.5 * share**2 * square
+            rise = barrier.value(weights, barrier.s + share * ds) - barrier.value(weights)
+            return share * distance - smooth - rise
+
+        shares = barrier.longest(ds) * FRACTIONS
+        decreases = [decrease(share) for share in shares]
+        best = int(np.argmax(decreases))
+        return _Step(trial, float(shares[best]), ds, dzl, dzu, decreases[best])
+
+    def _try(self, step: _Step, model: QuadraticModel) -> bool:
+        outcome, barrier = self.outcome, self.outcome.barrier
+        weights = self.objective.bounds.weights
+        x = self.objective.retract(outcome.x, step.fraction * step.trial.step, model)
+        outputs = self.objective.outputs(x)
+        moved = barrier.moved(step.ds, step.dzl, step.dzu, step.fraction)
+        moved = moved.with_reset_slacks(outputs.y, self.penalty)
+        old = outcome.outputs.value + barrier.merit(weights, outcome.outputs.y, self.penalty)
+        new = outputs.value + moved.merit(weights, outputs.y, self.penalty)
+        ratio = _ratio(old, new, step.decrease)
+        outcome.iterations += 1
+        trial = step.trial
+        outcome.history.append(
+            Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius)
+        )
+        if self.report is not None:
+            self.report(outcome.iterations, outputs.value)
+        length = trial.norm * step.fraction
+        radius = next_radius(self.radius, length, ratio)
+        self.shift = next_shift(trial.shift, trial.norm, radius)
+        self.radius = radius
+        hardly = ratio <= 1e-4 or (length < 1e-4 * max(1.0, radius) and not outcome.feasible)
+        self.stalled = self.stalled + 1 if hardly else 0
+        if ratio <= 1e-4:
+            return False
+        self.objective.follow(step.fraction)
+        outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
+        return True
+
+    def _advance(self, step: _Step) -> bool:
+        """Lower mu where its problem is solved; True where the last one is."""
+        outcome, barrier = self.outcome, self.outcome.barrier
+        total = float(np.sum(self.objective.bounds.weights))
+        last = LAST_MU * self.density
+        newton = step.trial.newton and step.fraction == 1.0
+        scale = abs(outcome.outputs.value)
+        if barrier.mu <= last:
+            return newton and outcome.feasible and step.decrease <= self.options.decrease * scale
+        share = barrier.mu / self.density
+        solved = (
+            step.trial.newton
+            and step.decrease <= 10 * barrier.mu * total
+            and outcome.violation.max(initial=0.0) <= max(INFEASIBLE, 0.1 * share)
+            and barrier.complementarity() <= 10 * barrier.mu
+        )
+        if solved:
+            mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
+            outcome.barrier = barrier.with_mu(mu)
+            self.penalty = 0.0
+        return False
+
+
+def _ratio(old: float, new: float, predicted: float) -> float:
+    """Actual over predicted decrease of the merit; 1 where both drown in rounding."""
+    actual, noise = old - new, 1e-13 * abs(old)
+    if not np.isfinite(actual):
+        return -1.0
+    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
+        return 1.0
+    return actual / predicted if predicted > 0 else -1.0
