@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -65,3 +68,68 @@ def test_many_batch_sizes_in_turn_give_the_same_results() -> None:
     for points in [*range(1, 20), *range(1, 20)]:
         for part, expected in zip(function(x[:points], t[:points]), whole, strict=True):
             np.testing.assert_array_equal(part, expected[:points])
+
+
+def heavy_function() -> ca.Function:
+    """Enough instructions for threads to share a dozen points."""
+    x = ca.SX.sym("x", 3)
+    y = x
+    for _ in range(800):
+        y = ca.sin(y) * y[0] + ca.cos(y[1] * y[2])
+    return ca.Function("heavy", [x], [y, ca.dot(x, y)])
+
+
+@pytest.mark.parametrize("points", [5, 64, 101, CHUNK + 7])
+def test_the_number_of_threads_does_not_change_a_bit(
+    points: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.random.default_rng(points).normal(size=(points, 3))
+    results = []
+    for threads in ("1", "2", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        results.append([r.tobytes() for r in PointFunction(heavy_function())(x)])
+    assert results[0] == results[1] == results[2]
+
+
+def test_threads_share_only_what_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    used = {
+        (name, points): max(threads for _, threads in PointFunction(function)._parts(points))
+        for name, function in (("light", sparse_function()), ("heavy", heavy_function()))
+        for points in (2, 500)
+    }
+    heavy = {("heavy", 2): 1, ("heavy", 500): 2}
+    assert used == {("light", 2): 1, ("light", 500): 1, **heavy}
+
+
+@pytest.mark.parametrize("points", [0, 1, 5, 500, 2 * CHUNK + 1])
+def test_the_parts_of_a_batch_cover_it_once(points: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    parts = list(PointFunction(heavy_function())._parts(points))
+    covered = [i for part, _ in parts for i in range(part.start, part.stop)]
+    assert covered == list(range(points))
+    assert all((part.stop - part.start) % threads == 0 for part, threads in parts)
+    assert all(part.stop - part.start <= CHUNK for part, _ in parts)
+
+
+def test_calls_from_many_threads_do_not_disturb_each_other() -> None:
+    function = PointFunction(heavy_function())
+    x = np.random.default_rng(0).normal(size=(40, 3))
+    whole = [result.copy() for result in function(x)]
+
+    def first(points: int) -> bool:
+        return all(
+            np.array_equal(part, expected[:points])
+            for part, expected in zip(function(x[:points]), whole, strict=True)
+        )
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(first, [1 + i % 40 for i in range(200)]))
+
+
+def test_a_pickled_function_gives_the_same_bytes() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(6, 2)), np.ones((6, 1))
+    copy = pickle.loads(pickle.dumps(function))
+    for result, expected in zip(copy(x, t), function(x, t), strict=True):
+        np.testing.assert_array_equal(result, expected)

@@ -1,8 +1,8 @@
 """Where the time of a call goes, by hovi's own functions, without slowing them down.
 
-A timer interrupts the work every millisecond; the time since the last interrupt is charged to
-the innermost frame that belongs to hovi, so that NumPy, LAPACK and the kernel count for the
-function that called them.
+A timer interrupts the work every millisecond, and the innermost frame that belongs to hovi is
+charged with it, so that NumPy, LAPACK and the kernel count for the function that called them.
+Python hears of an interrupt when such a call returns: it is then charged with all that were due.
 """
 
 from __future__ import annotations
@@ -32,26 +32,24 @@ ASSEMBLING = {"assemble", "scatter", "gather"}
 
 def shares(work: Callable[[], Any], seconds: float = 2.0) -> dict[str, float]:
     """Share of each part in the time of many runs of `work`: they sum to 1."""
-    spent: Counter[str] = Counter()
-    last = time.perf_counter()
+    charged: Counter[str] = Counter()
+    began, heard = time.perf_counter(), 0
 
     def tick(number: int, frame: FrameType | None) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        spent[_part(frame)] += now - last  # type: ignore[assignment]
-        last = now
+        nonlocal heard
+        due = int((time.perf_counter() - began) / PERIOD)
+        charged[_part(frame)] += due - heard
+        heard = due
 
     before = signal.signal(signal.SIGALRM, tick)
     signal.setitimer(signal.ITIMER_REAL, PERIOD, PERIOD)
     try:
-        ends = last + seconds
-        while time.perf_counter() < ends:
+        while time.perf_counter() < began + seconds:
             work()
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
-    total = sum(spent.values())
-    return {part: spent[part] / total for part in (*PARTS, "Python")}
+    return {part: charged[part] / charged.total() for part in (*PARTS, "Python")}
 
 
 def _part(frame: FrameType | None) -> str:

@@ -12,9 +12,22 @@ if TYPE_CHECKING:
     from hovi.chain_urdf import chain as chain
     from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
     from hovi.errors import HoviError as HoviError
+    from hovi.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
+    from hovi.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map
+    from hovi.euler_lagrange import euler_lagrange_residual as euler_lagrange_residual
+    from hovi.euler_lagrange import regularity as regularity
+    from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagrangian
+    from hovi.exact_discrete_lagrangian import conjugate_time as conjugate_time
     from hovi.export import write_csv as write_csv
     from hovi.grid import DiscretePath as DiscretePath
     from hovi.grid import Grid as Grid
+    from hovi.lagrangian import CasadiLagrangian as CasadiLagrangian
+    from hovi.lagrangians import mechanics as mechanics
+    from hovi.lagrangians import riemannian_cubic as riemannian_cubic
+    from hovi.lagrangians import spline as spline
+    from hovi.legendre import hamiltonian as hamiltonian
+    from hovi.legendre import legendre_minus as legendre_minus
+    from hovi.legendre import legendre_plus as legendre_plus
     from hovi.model_files import example as example
     from hovi.planner import plan as plan
     from hovi.playback import replay as replay
@@ -23,13 +36,22 @@ if TYPE_CHECKING:
     from hovi.robot import Robot as Robot
     from hovi.robot import load_robot as load_robot
     from hovi.scene import Scene as Scene
+    from hovi.segment_lagrangian import SchemeLagrangian as SchemeLagrangian
+    from hovi.simulator import Simulation as Simulation
+    from hovi.simulator import simulate as simulate
     from hovi.solver import Solution as Solution
     from hovi.solver import Status as Status
     from hovi.solver import solve as solve
     from hovi.state import State as State
+    from hovi.stepper import Flow as Flow
+    from hovi.stepper import flow as flow
+    from hovi.symmetry import Symmetry as Symmetry
+    from hovi.symmetry import base_rotation as base_rotation
+    from hovi.symmetry import base_translation as base_translation
     from hovi.task_file import Task as Task
     from hovi.task_file import load_task as load_task
     from hovi.trajectory import Trajectory as Trajectory
+    from hovi.variational_error import variational_order as variational_order
 
 try:
     __version__ = version("hovi")
@@ -37,26 +59,48 @@ except PackageNotFoundError:  # a source tree that was never installed
     __version__ = "0+unknown"
 
 _PLACES = {
+    "CasadiLagrangian": "hovi.lagrangian",
     "DiscreteLagrangian": "hovi.discrete_lagrangian",
     "DiscretePath": "hovi.grid",
+    "ExactDiscreteLagrangian": "hovi.exact_discrete_lagrangian",
+    "Flow": "hovi.stepper",
     "Grid": "hovi.grid",
     "HoviError": "hovi.errors",
     "Robot": "hovi.robot",
     "Scene": "hovi.scene",
+    "SchemeLagrangian": "hovi.segment_lagrangian",
+    "Simulation": "hovi.simulator",
     "Solution": "hovi.solver",
     "State": "hovi.state",
     "Status": "hovi.solver",
+    "Symmetry": "hovi.symmetry",
     "Task": "hovi.task_file",
     "Trajectory": "hovi.trajectory",
     "TrajectoryProblem": "hovi.problem",
+    "base_rotation": "hovi.symmetry",
+    "base_translation": "hovi.symmetry",
     "chain": "hovi.chain_urdf",
+    "conjugate_time": "hovi.exact_discrete_lagrangian",
+    "discrete_hamiltonian_flow": "hovi.euler_lagrange",
+    "discrete_lagrangian_map": "hovi.euler_lagrange",
+    "euler_lagrange_residual": "hovi.euler_lagrange",
     "example": "hovi.model_files",
+    "flow": "hovi.stepper",
+    "hamiltonian": "hovi.legendre",
+    "legendre_minus": "hovi.legendre",
+    "legendre_plus": "hovi.legendre",
     "load_robot": "hovi.robot",
     "load_task": "hovi.task_file",
+    "mechanics": "hovi.lagrangians",
     "plan": "hovi.planner",
     "plot": "hovi.plotting",
+    "regularity": "hovi.euler_lagrange",
     "replay": "hovi.playback",
+    "riemannian_cubic": "hovi.lagrangians",
+    "simulate": "hovi.simulator",
     "solve": "hovi.solver",
+    "spline": "hovi.lagrangians",
+    "variational_order": "hovi.variational_error",
     "write_csv": "hovi.export",
 }
 _SUBPACKAGES = ("effects", "schemes")

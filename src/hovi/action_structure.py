@@ -43,7 +43,7 @@ class ActionStructure:
         return self.layout.assemble(self.metric["nodal"][..., None, None] * np.eye(self.dof))
 
     def _scales(self) -> Array | None:
-        """Columns over unknowns: h over the mean step for velocities; None where steps are equal."""
+        """Columns over unknowns: h over the mean h for velocities; None where steps are equal."""
         steps = self.grid.steps
         if np.ptp(steps) == 0:
             return None

@@ -43,7 +43,7 @@ def compiled(function: ca.Function) -> ca.Function:
     """
     code = c_code(function)
     folder = library_folder()
-    made_from = _digest(code, *FLAGS, ca.__version__, __version__, *_platform())
+    made_from = _digest(code, *FLAGS, ca.CasadiMeta.version(), __version__, *_platform())
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None:
         library = next(filter(_is_intact, sorted(folder.glob(f"{made_from}-*.so"))), None)
@@ -132,8 +132,7 @@ def _platform() -> tuple[str, ...]:
 @functools.cache
 def _identity(compiler: str) -> str:
     """What a compiler says of its version and of the machine that it compiles for."""
-    command = [compiler, "--version", "-dumpmachine"]
-    return "\n".join(_run(compiler, [compiler, option]) for option in command[1:])
+    return "\n".join(_run(o, [compiler, o]) for o in ("--version", "-dumpmachine"))
 
 
 def _build(compiler: str, name: str, code: str, library: Path) -> None:

@@ -64,9 +64,9 @@ def discrete_hamiltonian_flow(
 ) -> tuple[Array, Array]:
     """The discrete Hamiltonian flow (x0, p0) -> (x1, p1) on T*T^(k-1)Q, in three forms.
 
-    "momentum": F^+ o (F^-)^-1. "plus": F^+ o F_{L_d} o (F^+)^-1. "minus": F^- o F_{L_d} o (F^-)^-1.
-    They are equal [ColomboFerraroMartin2016, corollary to theorem 2]; the first is what `flow` steps
-    with.
+    "momentum": F^+ o (F^-)^-1, what `flow` steps with.
+    "plus": F^+ o F_{L_d} o (F^+)^-1. "minus": F^- o F_{L_d} o (F^-)^-1.
+    They are equal [ColomboFerraroMartin2016, corollary to theorem 2].
     """
     if form == "momentum":
         segment = ld.from_start(batch(x0), batch(p0))

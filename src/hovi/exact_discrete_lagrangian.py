@@ -112,9 +112,9 @@ def _refuse_conjugate_points(segment: Segment) -> None:
     passed = int(np.max(np.sum(negative, axis=1) - r * indefinite))
     if passed > 0:
         raise InputError(
-            f"h = {segment.h:g} s is too long for the exact discrete Lagrangian: {passed} conjugate "
-            "point(s) lie before its end, so that the solution between the two ends is not the one "
-            "of least action; take a shorter step."
+            f"h = {segment.h:g} s is too long for the exact discrete Lagrangian: {passed} "
+            "conjugate point(s) lie before its end, so that the solution between the two ends is "
+            "not the one of least action; take a shorter step."
         )
 
 

@@ -50,6 +50,15 @@ class Grid:
             raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
         return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
 
+    def halved(self, chosen: npt.NDArray[np.bool_]) -> Grid:
+        """The grid with the chosen intervals cut in half.
+
+        chosen: shape (N,).
+        """
+        parts = np.where(chosen, 2, 1)
+        schemes = [s for s, count in zip(self.schemes, parts, strict=True) for _ in range(count)]
+        return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
+
     @property
     def intervals(self) -> int:
         """Number N of intervals."""

@@ -131,6 +131,24 @@ def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> 
     return DiscretePath(q, v, regularised(robot, grid, q, v), _inner_modes(curve, grid, v.shape[1]))
 
 
+def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
+    """Raise InputError for a path that does not fit a grid and a robot, or not itself."""
+    N, r, n = grid.intervals, grid.inner_modes, robot.nv
+    shapes = {"q": (N + 1, robot.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
+    for name, shape in shapes.items():
+        array = getattr(path, name)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(
+                f"the guess's {name} must be finite and of shape {shape}, got {array.shape}; hand "
+                "in a Trajectory to change grids."
+            )
+    gap = (regularised(robot, grid, path.q, path.v) - path.z) * (grid.steps**2)[:, None, None]
+    if np.max(np.abs(gap)) > 1e-6 * max(1.0, float(np.max(np.abs(path.q)))):
+        raise InputError(
+            "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h."
+        )
+
+
 def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
     """A path plus the cubic that carries its ends to other boundary data."""
     q0, v0, q1, v1 = boundary
@@ -142,6 +160,8 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
             v1 - path.v[-1],
         ]
     )  # (4, n)
+    if not ends.any():
+        return path
     T, s = grid.duration, grid.t / grid.duration
     local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
     dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each

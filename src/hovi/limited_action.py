@@ -15,7 +15,7 @@ from hovi.optimize.barrier import Bounds
 from hovi.optimize.interior_point import BoundedObjective, Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.problem import TrajectoryProblem
-from hovi.trajectory_objective import ActionObjective
+from hovi.trajectory_objective import ActionObjective, LinearAlgebra
 
 Array = npt.NDArray[np.float64]
 
@@ -27,14 +27,19 @@ class LimitedAction(BoundedObjective[DiscretePath]):
     limits: the bounds.
     margins: by which share of its range each bound is drawn in, below and above, in each
         interval, shape (2, N, 4, nv); none when None.
+    algebra: as for ActionObjective.
     """
 
     def __init__(
-        self, problem: TrajectoryProblem, limits: Limits, margins: Array | None = None
+        self,
+        problem: TrajectoryProblem,
+        limits: Limits,
+        margins: Array | None = None,
+        algebra: LinearAlgebra | None = None,
     ) -> None:
         self.problem = problem
         self.limits = limits
-        self.action = ActionObjective(problem, structure=problem.structure)
+        self.action = ActionObjective(problem, algebra, problem.structure)
         self.ld = problem.ld
         if not isinstance(self.ld.lagrangian, EffortLagrangian):
             raise TypeError("limits need the effort Lagrangian of a scene")

@@ -18,6 +18,7 @@ from joblib import Parallel, delayed, parallel_config
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import path_on_grid, stretched, with_bump
+from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.solver import Solution, Status, solve
@@ -47,11 +48,13 @@ class Job:
     start: State
     goal: State
     max_iterations: int
+    limits: Limits
 
     def problem(self) -> TrajectoryProblem:
         """The trajectory problem."""
         lagrangian = self.scene.effort_lagrangian(self.weight)
-        return TrajectoryProblem(DiscreteLagrangian(lagrangian, self.grid), self.start, self.goal)
+        ld = DiscreteLagrangian(lagrangian, self.grid)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits)
 
 
 @dataclass(eq=False)

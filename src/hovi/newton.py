@@ -20,8 +20,8 @@ def newton(system: System, u: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
 
     system: u (B, m) -> F (B, m), dF/du (B, m, m). u: where to start.
     A step is judged against the size of the root, at least one; where rounding keeps steps above
-    `SMALL`, the first that does not shrink any more is the last. No line search: the steps of a motion
-    are short, and a root that is lost is reported.
+    `SMALL`, the first that does not shrink any more is the last. No line search: the steps of a
+    motion are short, and a root that is lost is reported.
     """
     before = np.full(len(u), np.inf)
     for _ in range(MOST_STEPS):

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy.typing as npt
 
 from hovi.errors import InputError
 from hovi.grid import Grid
+from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, default_processes, distinct, explore
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
@@ -37,7 +39,7 @@ def plan(
     *,
     scheme: str | Scheme = "galerkin-2",
     intervals: int = 16,
-    limits: str = "none",
+    limits: str | Limits | Mapping[str, Any] = "urdf",
     starts: int = 1,
     seed: int = 0,
     guess: str | Trajectory = "cubic",
@@ -51,7 +53,8 @@ def plan(
 
     scene: what is simulated. start, goal: a State, or a configuration of shape (nq,) at rest.
     duration: T in [s]. scheme, intervals: how the action is discretised.
-    limits: "none", the only choice so far.
+    limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
+        "none", a Limits, or a mapping as as_limits takes it.
     starts: number of solves from seeded random perturbations; all minima found are refined on
         the grid that was asked for and ranked after that. seed: of the perturbations.
     guess: "cubic", "minimum-jerk" or a Trajectory.
@@ -62,7 +65,7 @@ def plan(
     Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
     """
     began = time.perf_counter()
-    _check(limits, starts, max_iterations, time_limit)
+    _check(starts, max_iterations, time_limit)
     table = by_name(scheme) if isinstance(scheme, str) else scheme
     fine = Job(
         scene,
@@ -71,6 +74,7 @@ def plan(
         as_state(start),
         as_state(goal),
         max_iterations,
+        as_limits(scene.robot, limits),
     )
     ends = None if time_limit is None else time.monotonic() + time_limit
     search = _Search(fine, processes or default_processes(), ends, progress or _silent)
@@ -149,12 +153,7 @@ def _silent(text: str, fraction: float) -> None:
     """No progress."""
 
 
-def _check(limits: str, starts: int, max_iterations: int, time_limit: float | None) -> None:
-    if limits != "none":
-        raise InputError(
-            f"limits are not enforced yet, got limits={limits!r}; say limits='none' and compare "
-            "the motion with the robot's limits."
-        )
+def _check(starts: int, max_iterations: int, time_limit: float | None) -> None:
     for name, count in (("starts", starts), ("max_iterations", max_iterations)):
         if count != int(count) or count < 1:
             raise InputError(f"{name} must be a whole number of 1 or more, got {count}.")

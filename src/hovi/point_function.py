@@ -18,9 +18,10 @@ Array = npt.NDArray[np.float64]
 
 CHUNK = 1024
 """Points of one mapped call; more are done chunk by chunk, so that memory stays bounded."""
-SHARE = 50_000
-"""Instructions that a thread has to have for itself to be worth its start: a thread takes some
-50 microseconds to start and end, the interpreter 2 to 5 nanoseconds for an instruction."""
+SHARE = 100_000
+"""Instructions that a thread has to have for itself to be worth its start. Two threads break even
+at 50,000 each: starting and ending them takes up to 100 microseconds, the interpreter 2 to 5
+nanoseconds for an instruction."""
 COMPILED_GAIN = 10
 """How many times faster compiled code is, for the same account: 4 to 25 were measured."""
 
@@ -44,7 +45,6 @@ class PointFunction:
             function = compiled(function)
             self._cost //= COMPILED_GAIN
         self.function = function
-        self._widths = [function.size1_in(i) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         self._threads = default_threads()
         self._mapped = functools.lru_cache(maxsize=16)(function.map)

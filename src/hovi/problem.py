@@ -14,6 +14,7 @@ from hovi.errors import InputError, ModelError
 from hovi.grid import Grid
 from hovi.guess import Boundary
 from hovi.lagrangian import EffortLagrangian
+from hovi.limits import Limits
 from hovi.robot import Robot
 from hovi.robot_model import check_mass_matrix
 from hovi.scene import Scene, require_vector_joints
@@ -33,12 +34,14 @@ class TrajectoryProblem:
 
     ld: the discrete Lagrangian of a scene's effort on a grid.
     start, goal: states at t = 0 and t = T.
+    limits: bounds that hold along the motion; none when None.
     Raises InputError, ModelError or SchemeError when no motion can be planned.
     """
 
     ld: DiscreteLagrangian
     start: State
     goal: State
+    limits: Limits | None = None
     boundary: Boundary = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -53,11 +56,21 @@ class TrajectoryProblem:
         """What the action's Hessian looks like on this grid."""
         return ActionStructure(self.grid, self.robot.nv)
 
+    def on(self, grid: Grid) -> TrajectoryProblem:
+        """The same problem on another grid."""
+        ld = DiscreteLagrangian(self.ld.lagrangian, grid)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits)
+
     def between(self, start: State, goal: State) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""
-        problem = TrajectoryProblem(self.ld, start, goal)
+        problem = TrajectoryProblem(self.ld, start, goal, self.limits)
         object.__setattr__(problem, "structure", self.structure)
         return problem
+
+    @property
+    def limited(self) -> bool:
+        """Whether anything is bounded."""
+        return self.limits is not None and bool(self.limits.bounded.any())
 
     @property
     def grid(self) -> Grid:

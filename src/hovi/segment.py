@@ -71,9 +71,7 @@ class Segment:
     @cached_property
     def p0(self) -> Array:
         """Momenta at the start, -D_1 .. -D_k of L_d, shape (B, k, n)."""
-        return np.asarray(
-            self.regularised.taylor.T @ self.p1 - self.h * self.gradient[:, : self.k]
-        )
+        return np.asarray(self.regularised.taylor.T @ self.p1 - self.h * self.gradient[:, : self.k])
 
     @property
     def derivatives(self) -> Array:
@@ -92,7 +90,7 @@ class Segment:
         """Hessian of phi in (x0, w) with the inner modes extremal, (B, 2 k n, 2 k n)."""
         H, m = flat(self.hessian), 2 * self.k * self.x0.shape[2]
         if self.inner.shape[1] == 0:
-            return H
+            return np.asarray(H)
         inner = np.linalg.solve(H[:, m:, m:], H[:, m:, :m])
         return np.asarray(H[:, :m, :m] - H[:, :m, m:] @ inner)
 
@@ -103,7 +101,7 @@ class Segment:
         A = np.concatenate([np.eye(k, 2 * k), self.regularised.from_ends])
         A = np.kron(A, np.eye(n))
         H = self.h * (A.T @ self.condensed @ A)
-        return H.reshape(-1, 2 * k, n, 2 * k, n).transpose(0, 1, 3, 2, 4)
+        return np.asarray(H.reshape(-1, 2 * k, n, 2 * k, n).transpose(0, 1, 3, 2, 4))
 
     @property
     def regularity_matrix(self) -> Array:
@@ -146,7 +144,7 @@ class Segment:
         """gamma^T S T^-T (x) I: how forces along the interval enter the equations of w."""
         R = self.regularised
         back = gamma(self.k).T @ (R.scale[:, None] * R.inverse_taylor.T)
-        return np.kron(back, np.eye(self.x0.shape[2]))
+        return np.asarray(np.kron(back, np.eye(self.x0.shape[2])))
 
 
 def flat(blocks: Array) -> Array:

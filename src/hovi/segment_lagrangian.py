@@ -154,6 +154,10 @@ class SchemeLagrangian(SegmentLagrangian):
         w, inner = self._split(self._solve(system, self._guess(B, None)), B)
         return self._segment(R.start(x1, w), w, inner, t0)
 
+    def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
+        """The segment with given inner modes, taken as extremal."""
+        return self._segment(x0, w, inner, t0)
+
     def jet(self, x0: Array, w: Array, inner: Array) -> list[Array]:
         """(q, q', ..., q^(k)) at the quadrature points, k + 1 arrays of shape (B * Q, n)."""
         data = np.concatenate([x0, w, inner], axis=1)  # (B, 2k + r, n)
@@ -189,13 +193,14 @@ class SchemeLagrangian(SegmentLagrangian):
         return self.lagrangian.evaluate(*jet, t=t)
 
     def _contract(self, gradient: Array) -> Array:
-        return np.matmul(self._weighted_rows, gradient.reshape(-1, len(self._rows), self.n))
+        points = gradient.reshape(-1, len(self._rows), self.n)
+        return np.asarray(np.matmul(self._weighted_rows, points))
 
     def _contract_twice(self, hessian: Array) -> Array:
         k, n, (Q, _, m) = self.k, self.n, self.table.shape
         blocks = hessian.reshape(-1, Q, k + 1, n, k + 1, n).transpose(0, 1, 2, 4, 3, 5)
         points = blocks.reshape(len(blocks), Q * (k + 1) ** 2, n * n)
-        return np.matmul(self._pairs, points).reshape(-1, m, m, n, n)
+        return np.asarray(np.matmul(self._pairs, points).reshape(-1, m, m, n, n))
 
     @cached_property
     def _rows(self) -> Array:
@@ -209,7 +214,7 @@ class SchemeLagrangian(SegmentLagrangian):
     @cached_property
     def _pairs(self) -> Array:
         pairs = np.einsum("qri,qsj,q->ijqrs", self.table, self.table, self.scheme.weights)
-        return pairs.reshape(self.table.shape[2] ** 2, -1)
+        return np.asarray(pairs.reshape(self.table.shape[2] ** 2, -1))
 
     @cached_property
     def _back(self) -> Array:
@@ -218,7 +223,7 @@ class SchemeLagrangian(SegmentLagrangian):
 
     @cached_property
     def _back_n(self) -> Array:
-        return np.kron(self._back, np.eye(self.n))
+        return np.asarray(np.kron(self._back, np.eye(self.n)))
 
     def _split(self, u: Array, B: int) -> tuple[Array, Array]:
         modes = u.reshape(B, -1, self.n)

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from hovi.errors import InputError
 from hovi.grid import DiscretePath
-from hovi.guess import named_curve, path_on_grid, stretched
+from hovi.guess import check_path, moved, named_curve, path_on_grid, stretched
+from hovi.limited_solver import LimitedOutcome, solve_limited
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.problem import TrajectoryProblem
 from hovi.state import State, as_state
@@ -110,6 +111,8 @@ def solve(
     max_iterations: steps. time_limit: in [s]. Both return the best motion so far.
     escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
     report: called with the number of each step and the least cost so far.
+    With limits, `cost` is that of the motion that holds them everywhere, and intervals may have
+    been split for it.
     Raises InputError for a guess that does not fit.
     """
     began = time.perf_counter()
@@ -119,11 +122,13 @@ def solve(
         max_iterations=max_iterations, time_limit=time_limit, escape_saddles=escape_saddles
     )
     started = time.perf_counter()
+    if problem.limited:
+        return _solve_limited(problem, path, options, report, began)
     outcome = minimize(objective, path, options, report)
     n_neg, outcome = _certify(objective, outcome)
     solved = time.perf_counter()
     status, message = _verdict(outcome, n_neg)
-    trajectory = _trajectory(problem, outcome, status, n_neg)
+    trajectory = _trajectory(problem, outcome.x, outcome.value, status, n_neg)
     return Solution(
         success=status is Status.MINIMUM,
         status=status,
@@ -140,16 +145,63 @@ def solve(
     )
 
 
+def _solve_limited(
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    options: Options,
+    report: Report | None,
+    began: float,
+) -> Solution:
+    """The same under limits, by an interior point."""
+    assert problem.limits is not None
+    started = time.perf_counter()
+    outcome = solve_limited(problem, problem.limits, path, options, report)
+    status, message = _limited_verdict(outcome)
+    trajectory = _trajectory(outcome.problem, outcome.x, outcome.value, status, outcome.n_neg)
+    return Solution(
+        success=status is Status.MINIMUM,
+        status=status,
+        message=message,
+        trajectory=trajectory,
+        cost=outcome.value,
+        nit=outcome.iterations,
+        n_neg=outcome.n_neg,
+        problem=outcome.problem,
+        minima=(outcome.value,) if status is Status.MINIMUM else (),
+        history=tuple(outcome.history),
+        setup_seconds=started - began,
+        solve_seconds=time.perf_counter() - started,
+    )
+
+
+def _limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
+    """Status and sentence of an outcome under limits."""
+    if outcome.reason:
+        return Status.INFEASIBLE, f"no motion within the limits was found: {outcome.reason}."
+    if outcome.stop is not Stop.STATIONARY:
+        status, reason = _LIMITS[outcome.stop]
+        return status, (
+            f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
+            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}"
+        )
+    held = (
+        f"limits hold to {max(outcome.excess, 0.0):.1e} of their ranges everywhere, on "
+        f"{outcome.problem.grid.intervals} intervals"
+    )
+    if outcome.n_neg == 0:
+        return (
+            Status.MINIMUM,
+            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps; {held}.",
+        )
+    return Status.SADDLE, f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} ways down."
+
+
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
     """A guess as a path on the problem's grid, with the problem's boundary data."""
     robot, grid, boundary = problem.robot, problem.grid, problem.boundary
     if isinstance(guess, DiscretePath):
-        if guess.intervals != grid.intervals or guess.v.shape[1] != robot.nv:
-            raise InputError(
-                f"the guess has {guess.intervals} intervals and {guess.v.shape[1]} joints, the "
-                f"problem {grid.intervals} and {robot.nv}; hand in a Trajectory to change grids."
-            )
-        return guess
+        check_path(guess, grid, robot)
+        return moved(guess, grid, boundary, robot)
     if isinstance(guess, str):
         return path_on_grid(
             named_curve(guess, robot, boundary, grid.duration), grid, boundary, robot
@@ -214,8 +266,7 @@ def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
 
 
 def _trajectory(
-    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], status: Status, n_neg: int
+    problem: TrajectoryProblem, path: DiscretePath, cost: float, status: Status, n_neg: int
 ) -> Trajectory:
-    metadata = {"cost": outcome.value, "status": str(status), "n_neg": n_neg}
-    momenta = problem.ld.momenta(outcome.x)
-    return Trajectory(problem.grid, outcome.x, momenta, problem.scene, metadata)
+    metadata = {"cost": cost, "status": str(status), "n_neg": n_neg}
+    return Trajectory(problem.grid, path, problem.ld.momenta(path), problem.scene, metadata)

@@ -111,11 +111,12 @@ class ActionObjective(Objective[DiscretePath]):
         return DiscretePath(q, x.v + dv, x.z + dZ / hh, x.inner + local[:, 4:] / hh)
 
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
-        """The largest change of q or T v at a node, relative to their size (at least one)."""
+        """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
         local = model.gather(step)
+        m = local.shape[1]
         T = self.problem.grid.duration
         size = max(1.0, float(np.max(np.abs(x.q))), T * float(np.max(np.abs(x.v))))
-        dq = float(np.max(np.abs(local[:, 0])))
+        dq = max(float(np.max(np.abs(local[:, k]), initial=0.0)) for k in (0, *range(4, m)))
         dv = float(np.max(np.abs(local[:, 1] / self._h)))
         return max(dq, T * dv) / size
 

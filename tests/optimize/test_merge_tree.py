@@ -110,12 +110,15 @@ def test_negative_eigenvalues_are_those_of_the_dense_matrix(
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
 def test_band_and_tree_take_the_same_newton_step(n: int, modes: tuple[int, ...]) -> None:
-    problem = random_problem(n, modes, np.ones(len(modes)), DEFINITE)
+    steps = np.random.default_rng(n).uniform(0.1, 1.0, len(modes))
+    problem = random_problem(n, modes, steps, DEFINITE)
     levels = merge_levels(problem.steps)
     tree = MergeTreeModel(
         problem.regular, MergeTree(levels, len(modes), problem.inner_modes, n, problem.present)
     )
-    layout = BandLayout.of(problem.unknowns)
+    scales = np.ones((len(modes), 4 + max(modes)))
+    scales[:, 1] = scales[:, 3] = steps
+    layout = BandLayout.of(problem.unknowns, scales)
     metric = layout.assemble(problem.nodal.metric[..., None, None] * np.eye(n))
     band = BandModel(problem.nodal, layout, metric)
     for shift in (0.0, 3.0):

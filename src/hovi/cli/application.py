@@ -7,7 +7,14 @@ from typing import Annotated
 import typer
 
 from hovi import __version__
-from hovi.cli import export_command, info_command, plan_command, plot_command, replay_command
+from hovi.cli import (
+    export_command,
+    info_command,
+    plan_command,
+    plot_command,
+    replay_command,
+    simulate_command,
+)
 
 app = typer.Typer(
     help="Least-torque motions of URDF robots by higher-order variational integrators.",
@@ -36,6 +43,7 @@ def _hovi(
 
 
 app.command("plan")(plan_command.plan)
+app.command("simulate")(simulate_command.simulate)
 app.command("replay")(replay_command.replay)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)

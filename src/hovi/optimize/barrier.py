@@ -13,6 +13,8 @@ Mask = npt.NDArray[np.bool_]
 
 INSIDE = 1e-2
 """Least distance of a first slack from its bounds, relative to the range."""
+WARM_INSIDE = 1e-5
+"""The same for a start near a solution."""
 DUAL_SPREAD = 1e8
 """How far a multiplier may be from mu over its slack, as a factor."""
 KEEP = 0.99
@@ -62,6 +64,13 @@ class Barrier:
         s = np.clip(y, *_inside(bounds, INSIDE))
         below, above = _gaps(bounds, s)
         return cls(bounds, s, mu / below, mu / above, mu, 10.0 * mu)._masked()
+
+    def warm(self, bounds: Bounds, y: Array, mu: float) -> Barrier:
+        """A start near this barrier's solution, for bounds that moved a little."""
+        s = np.clip(y, *_inside(bounds, WARM_INSIDE))
+        below, above = _gaps(bounds, s)
+        zl, zu = np.maximum(self.zl, mu / below), np.maximum(self.zu, mu / above)
+        return dataclasses.replace(self, bounds=bounds, s=s, zl=zl, zu=zu, mu=mu)._masked()
 
     @property
     def sigma(self) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Integral
+
 import numpy as np
 
 from hovi.errors import SchemeError
@@ -21,12 +23,12 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
     inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian: 1 for mechanics, 2
         for torques and accelerations, 3 for jerk. Raises SchemeError outside.
     """
-    if not (isinstance(inner_modes, int) and 0 <= inner_modes <= MAX_INNER_MODES):
+    if not (isinstance(inner_modes, Integral) and 0 <= inner_modes <= MAX_INNER_MODES):
         raise SchemeError(
             f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes!r}; "
             "for more accuracy use more intervals."
         )
-    if not (isinstance(derivatives, int) and 1 <= derivatives <= MAX_DERIVATIVES):
+    if not (isinstance(derivatives, Integral) and 1 <= derivatives <= MAX_DERIVATIVES):
         raise SchemeError(
             f"a Galerkin scheme is for Lagrangians of order 1 to {MAX_DERIVATIVES}, "
             f"got {derivatives!r}."

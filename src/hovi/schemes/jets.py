@@ -33,7 +33,7 @@ def end_basis(s: Array, k: int) -> Array:
 
 
 def end_weights(s: Array, k: int) -> Array:
-    """The paper's a^[k]_j(s) = (1 - s)^(k-j-1) / (k-j-1)!, shape (k, M), with z_j = <a_j, Q^[k]>."""
+    """The paper's a^[k]_j(s) = (1 - s)^(k-j-1) / (k-j-1)!, of which z_j = <a_j, Q^[k]>, (k, M)."""
     s = np.asarray(s, dtype=np.float64)
     return np.array([(1 - s) ** m / factorial(m) for m in end_degrees(k)])
 
@@ -54,7 +54,7 @@ def gamma(k: int) -> Array:
 
 
 def inverse_gamma(k: int) -> Array:
-    """The matrix of w = gamma^-1 z, shape (k, k); for k = 2: w0 = 2 sqrt(3) (z0 - z1/2), w1 = z1."""
+    """The matrix of w = gamma^-1 z, (k, k); for k = 2: w0 = 2 sqrt(3) (z0 - z1/2), w1 = z1."""
     return np.asarray(np.linalg.inv(gamma(k)))
 
 

@@ -37,8 +37,8 @@ def require_regular(scheme: Scheme) -> None:
     """Raise SchemeError for a scheme on which no motion can be planned."""
     if scheme.derivatives != 2:
         raise SchemeError(
-            f"scheme {scheme.name!r} is for Lagrangians of order {scheme.derivatives}; torques need "
-            "accelerations, a scheme of order 2."
+            f"scheme {scheme.name!r} is for Lagrangians of order {scheme.derivatives}; torques "
+            "need accelerations, a scheme of order 2."
         )
     if not is_regular(scheme):
         rank = np.linalg.matrix_rank(regularity_matrix(scheme), tol=1e-10)

@@ -1,0 +1,46 @@
+"""Run every benchmark, one after the other, and put what they print into the docs.
+
+Each script prints Markdown; it goes to docs/tables/NAME.md, from which the docs include it. The
+table of swing_up goes into the README as well, between two comments that name it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+TOP = HERE.parents[1]
+TABLES = TOP / "docs" / "tables"
+SCRIPTS = ("swing_up", "orders", "kernel", "scenes", "dimensions", "peers", "growth")
+
+
+def run(name: str) -> None:
+    """One benchmark into its table; a failure ends everything."""
+    began = time.perf_counter()
+    print(f"{name} ...", file=sys.stderr, flush=True)
+    done = subprocess.run([sys.executable, HERE / f"{name}.py"], stdout=subprocess.PIPE, check=True)
+    text = done.stdout.decode().rstrip() + "\n"
+    (TABLES / f"{name}.md").write_text(text)
+    _into_readme(name, text)
+    print(f"{name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+
+
+def _into_readme(name: str, table: str) -> None:
+    readme = TOP / "README.md"
+    first, last = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->"
+    text = readme.read_text()
+    if first in text:
+        before, rest = text.split(first, 1)
+        readme.write_text(f"{before}{first}\n{table}\n{last}{rest.split(last, 1)[1]}")
+
+
+def main() -> None:
+    for name in sys.argv[1:] or SCRIPTS:
+        run(name)
+
+
+if __name__ == "__main__":
+    main()

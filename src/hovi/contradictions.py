@@ -1,0 +1,75 @@
+"""Limits that no motion can meet, seen without solving anything."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.limits import KINDS, NAMES, UNITS, Limits
+from hovi.problem import TrajectoryProblem
+
+Array = npt.NDArray[np.float64]
+
+
+def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
+    """Why no motion between the problem's ends is within the limits; "" if nothing speaks against.
+
+    The ends themselves, and the mean velocity that the distance needs.
+    """
+    q0, v0, q1, v1 = problem.boundary
+    names = problem.robot.coordinate_names
+    for end, state in (("start", (q0, v0)), ("goal", (q1, v1))):
+        for row in (0, 1):
+            sentence = _outside(end, row, state[row], limits, names)
+            if sentence:
+                return sentence
+    return _too_short(problem, limits, names)
+
+
+def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
+    """Which end a torque limit does not even hold at rest, as the end of a sentence, or ""."""
+    q0, v0, q1, v1 = problem.boundary
+    zero = np.zeros((1, problem.robot.nv))
+    for end, q, v in (("start", q0, v0), ("goal", q1, v1)):
+        if np.any(v != 0):
+            continue
+        tau = problem.scene.inverse_dynamics(q[None], zero, zero)[0]
+        over = np.maximum(limits.lower[3] - tau, tau - limits.upper[3])
+        i = int(np.argmax(over))
+        if over[i] > 0:
+            bound = limits.upper[3, i] if tau[i] > 0 else limits.lower[3, i]
+            return (
+                f"; holding the {end} alone takes {tau[i]:.4g} N m at joint "
+                f"{problem.robot.coordinate_names[i]!r}, whose limit is {bound:.4g}"
+            )
+    return ""
+
+
+def _outside(end: str, row: int, values: Array, limits: Limits, names: tuple[str, ...]) -> str:
+    outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
+    outside = outside / limits.ranges[row]
+    i = int(np.argmax(outside))
+    if outside[i] <= limits.tolerance:
+        return ""
+    kind = KINDS[row]
+    return (
+        f"the {end}'s {NAMES[kind]} of joint {names[i]!r} is {values[i]:.6g} {UNITS[kind]}, "
+        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the {end} or "
+        "widen them"
+    )
+
+
+def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
+    q0, _, q1, _ = problem.boundary
+    distance = problem.robot.difference(q0, q1)
+    T = problem.grid.duration
+    fastest = np.where(distance >= 0, limits.upper[1], -limits.lower[1])
+    needed = np.abs(distance) / np.maximum(fastest, 1e-300)
+    i = int(np.argmax(needed))
+    if needed[i] <= T:
+        return ""
+    return (
+        f"joint {names[i]!r} has {abs(distance[i]):.4g} rad to go, which takes {needed[i]:.4g} s "
+        f"at its velocity limit of {fastest[i]:.4g} rad/s, more than the duration of {T:.4g} s; allow "
+        "more time or a higher velocity"
+    )

@@ -1,0 +1,154 @@
+"""Ready-made Lagrangians on T^(k)Q, and forces beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.effects import SceneSymbols
+from hovi.errors import InputError, SceneError
+from hovi.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.point_function import PointFunction
+from hovi.rigid_body import casadi_functions
+from hovi.scene import Scene
+from hovi.torque_model import times
+
+Array = npt.NDArray[np.float64]
+Torque = Callable[[Array], Array]
+
+
+def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
+    """L = 1/2 |q^(k)|^2 on R^n: cubic splines for k = 2, quintic ones (least jerk) for k = 3.
+
+    [ColomboFerraroMartin2016, examples of sections 3 and 4]
+    """
+    if n < 1 or derivatives < 1:
+        raise InputError(f"a spline needs n >= 1 and k >= 1, got n = {n}, k = {derivatives}.")
+    jet = [ca.SX.sym(f"q{j}", n) for j in range(derivatives + 1)]
+    return CasadiLagrangian(jet, ca.sumsqr(jet[-1]) / 2)
+
+
+def mechanics(scene: Scene) -> CasadiLagrangian:
+    """L = K(q, v) - V(q) on TQ: the scene's robot under its gravity, k = 1.
+
+    What effects add to the torques is not in it: see `scene_force`.
+    """
+    functions = casadi_functions(scene.model)
+    q, v = _symbols(scene, 2)
+    return CasadiLagrangian([q, v], functions.kinetic_energy(q, v) - functions.potential_energy(q))
+
+
+def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
+    """L = 1/2 g(D_t v, D_t v) for the robot's own metric g = M(q), k = 2.
+
+    With D_t v = M^-1 (M a + C(q, v) v), the acceleration that needs no torque taken away.
+    Effects count only as far as they change the masses (armature).
+    [NoakesHeinzingerPaden1989; ColomboFerraroMartin2016, equation of special Lagrangians]
+    """
+    model = scene.model.copy()
+    model.gravity.linear = np.zeros(3)
+    functions = casadi_functions(model)
+    q, v, a = _symbols(scene, 3)
+    force = functions.inverse_dynamics(q, v, a)
+    covariant = ca.solve(functions.mass_matrix(q), force)
+    return CasadiLagrangian([q, v, a], ca.dot(force, covariant) / 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A force on TQ x time: f(q, v, t) = u(t) - d(q, v, t).
+
+    n: degrees of freedom. torque: u, times (P,) -> (P, n), in [N m] or [N]; none when None.
+    resistance: what a scene's effects ask of the joints, d, or None.
+    """
+
+    n: int
+    torque: Torque | None = None
+    resistance: PointFunction | None = None
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """f (P, n) and its derivatives with respect to (q, v), shape (P, n, 2, n)."""
+        f, df = np.zeros((len(q), self.n)), np.zeros((len(q), self.n, 2, self.n))
+        if self.torque is not None:
+            f = f + np.asarray(self.torque(t), dtype=np.float64).reshape(f.shape)
+        if self.resistance is not None:
+            d, slope = self.resistance(q, v, times(t, len(q)))
+            f, df = f - d.reshape(f.shape), df - slope.reshape(df.shape)
+        return f, df
+
+
+def scene_force(scene: Scene, torque: Torque | None = None) -> Force:
+    """The torques that are put on a scene's joints, less what its effects resist with.
+
+    torque: u(t), times (P,) -> (P, nv); none when not given.
+    Raises SceneError for an effect whose torque depends on the acceleration.
+    """
+    nq, nv = scene.robot.nq, scene.robot.nv
+    symbols = SceneSymbols(
+        ca.SX.sym("q", nq), ca.SX.sym("v", nv), ca.SX.sym("a", nv), ca.SX.sym("t")
+    )
+    added = [(e, e.torque(scene.robot, symbols)) for e in scene.effects]
+    named = [(effect, term) for effect, term in added if term is not None]
+    for effect, term in named:
+        if ca.depends_on(term, symbols.a):
+            raise SceneError(f"effect {effect.key!r} depends on the acceleration: not simulated.")
+    if not named:
+        return Force(nv, torque)
+    total = sum((term for _, term in named[1:]), named[0][1])
+    q, v, t = symbols.q, symbols.v, symbols.t
+    slope = ca.jacobian(total, ca.vertcat(q, v))
+    return Force(nv, torque, PointFunction(ca.Function("resistance", [q, v, t], [total, slope])))
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedLagrangian(Lagrangian):
+    """L on TQ with a force: the Lagrange-d'Alembert principle.
+
+    The virtual work f . delta q joins dL in every variation, so that f is added to dL/dq wherever
+    a discrete Lagrangian contracts it: at the quadrature points this is the discrete
+    Lagrange-d'Alembert principle with its forces F_d^+ and F_d^-. The "Hessian" is not symmetric
+    then. [MarsdenWest2001, section 3.2]
+
+    free: L, of order 1. force: f(q, v, t).
+    """
+
+    free: Lagrangian
+    force: Force
+    order: int = 1
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return self.free.nq
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self.free.nv
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """L without the work of the force, shape (P,)."""
+        return self.free.value(*jet, t=t)
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """L, dL + (f, 0) and the derivatives of that."""
+        value, gradient, hessian = self.free.evaluate(*jet, t=t)
+        f, df = self.force.evaluate(jet[0], jet[1], times(t, len(value))[:, 0])
+        gradient, hessian = gradient.copy(), hessian.copy()
+        gradient[:, 0] += f
+        hessian[:, 0] += df
+        return value, gradient, hessian
+
+
+def _symbols(scene: Scene, count: int) -> list[ca.SX]:
+    if not scene.robot.vector_joints:
+        joints = ", ".join(repr(joint) for joint in scene.robot.manifold_joints)
+        raise SceneError(
+            f"configurations of {joints} are not vectors (nq differs from nv); lock these joints "
+            "with load_robot(..., locked=[...])."
+        )
+    return [ca.SX.sym(f"q{j}", scene.robot.nv) for j in range(count)]

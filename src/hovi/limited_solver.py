@@ -1,0 +1,275 @@
+"""Motions under limits: solve at the quadrature points, then tighten until they hold between."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.contradictions import contradiction, static_sentence
+from hovi.grid import DiscretePath
+from hovi.guess import path_on_grid, stretched
+from hovi.limit_check import Excess, excess_along, worst_sentence
+from hovi.limited_action import LimitedAction
+from hovi.limits import Limits
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
+from hovi.optimize.merge_tree import MergeTreeModel
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.trust_region import Iteration, Objective, Options, Stop, minimize
+from hovi.problem import TrajectoryProblem
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+Report = Callable[[int, float], None]
+
+ROUNDS = 20
+"""Times that limits are tightened or intervals split before giving up."""
+SPLIT = 0.05
+"""Excess, as a share of the range, beyond which the grid is halved instead of tightened."""
+OVERSHOOT = 1.5
+"""How much further than the excess a bound is drawn in: motions lean on what is left to them."""
+SPARE = 1e-3
+"""Unused share of a range beyond which a bound that was drawn in is let out again."""
+WARM_MU = 1e-7, 1e-4
+"""Range of the first barrier parameter of a tightened problem, relative to the mean density."""
+PENALTIES = 1e4, 1e6
+"""Penalties of violated limits, relative to the same, when the interior point finds no way."""
+HELD = 1e-3
+"""Violation, as a share of the range, below which the larger penalty counts as having found one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitedOutcome:
+    """What became of a problem with limits.
+
+    problem: the problem as solved, with the intervals that had to be split.
+    reason: why there is no motion, in a sentence without its end; "" where there is one.
+    excess: largest share of a range by which a limit is exceeded anywhere.
+    rounds: how many times limits were tightened between the points.
+    first_value: the action before any tightening.
+    """
+
+    problem: TrajectoryProblem
+    x: DiscretePath
+    value: float
+    stop: Stop
+    iterations: int
+    history: list[Iteration]
+    n_neg: int
+    reason: str = ""
+    excess: float = 0.0
+    rounds: int = 0
+    first_value: float = 0.0
+
+
+def solve_limited(
+    problem: TrajectoryProblem,
+    limits: Limits,
+    path: DiscretePath,
+    options: Options,
+    report: Report | None = None,
+) -> LimitedOutcome:
+    """Minimise the action between limits, which hold everywhere to their tolerance.
+
+    path: the guess, which may violate everything.
+    """
+    reason = contradiction(problem, limits)
+    if reason:
+        value = problem.ld.action(path)
+        return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason)
+    deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
+    search = _Search(problem, limits, options, deadline, report, path)
+    outcome = search.first(path)
+    if not outcome.feasible and outcome.stop in (Stop.DIVERGED, Stop.ITERATION_LIMIT):
+        outcome, reason = search.restored(outcome)
+    if reason or outcome.stop is not Stop.STATIONARY:
+        return search.finished(outcome, reason, 0.0, 0, outcome.outputs.value)
+    return search.tightened(outcome)
+
+
+@dataclass(eq=False)
+class _Search:
+    """The stages of a solve, which share a problem and its budgets."""
+
+    problem: TrajectoryProblem
+    limits: Limits
+    options: Options
+    deadline: float | None
+    report: Report | None
+    guess: DiscretePath
+    iterations: int = 0
+
+    def __post_init__(self) -> None:
+        self.history: list[Iteration] = []
+        shape = (2, self.problem.grid.intervals, *self.limits.lower.shape)
+        self.margins = np.zeros(shape)
+
+    def first(self, path: DiscretePath) -> BoundedOutcome[DiscretePath]:
+        """The interior point from a guess, at the quadrature points."""
+        objective = LimitedAction(self.problem, self.limits)
+        return self._count(minimize_bounded(objective, path, self._options(), self.report))
+
+    def restored(
+        self, outcome: BoundedOutcome[DiscretePath]
+    ) -> tuple[BoundedOutcome[DiscretePath], str]:
+        """A second try from a motion that violates little, or the reason why there is none."""
+        objective = LimitedAction(self.problem, self.limits)
+        path = outcome.x
+        for penalty in PENALTIES:
+            penalised = PenalisedAction(objective, penalty * _density(outcome, objective))
+            path = minimize(penalised, path, self._options(), None).x
+        if penalised.violation(path) <= HELD:
+            again = self._count(minimize_bounded(objective, path, self._options(), self.report))
+            if again.feasible:
+                return again, ""
+        outcome.x = path
+        outcome.outputs = objective.outputs(path)
+        return outcome, self._why(path)
+
+    def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
+        """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
+        first_value = outcome.outputs.value
+        tolerance = self.limits.tolerance
+        for rounds in range(ROUNDS + 1):
+            excess = excess_along(self._trajectory(outcome.x), self.limits)
+            if excess.worst <= tolerance or rounds == ROUNDS:
+                break
+            coarse = excess.worst > SPLIT
+            again = self._halved() if coarse else self._again(outcome, excess)
+            if not (again.feasible and again.stop is Stop.STATIONARY):
+                outcome = again
+                break
+            outcome = again
+        reason = ""
+        if excess.worst > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
+            reason = (
+                f"{self._why(outcome.x)}, between the points where limits are imposed; use more "
+                "intervals"
+            )
+        return self.finished(outcome, reason, excess.worst, rounds, first_value)
+
+    def finished(
+        self,
+        outcome: BoundedOutcome[DiscretePath],
+        reason: str,
+        excess: float,
+        rounds: int,
+        first_value: float,
+    ) -> LimitedOutcome:
+        """The result of the stages."""
+        return LimitedOutcome(
+            self.problem,
+            outcome.x,
+            outcome.outputs.value,
+            outcome.stop,
+            self.iterations,
+            self.history,
+            self._inertia(outcome),
+            reason,
+            excess,
+            rounds,
+            first_value,
+        )
+
+    def _halved(self) -> BoundedOutcome[DiscretePath]:
+        """Solve again from the guess with every interval halved.
+
+        A motion that far exceeds a limit between the points lives in the gaps between them: it is
+        no guess for a finer grid.
+        """
+        grid = self.problem.grid
+        curve = stretched(self._trajectory(self.guess), grid.duration)
+        problem = self.problem.on(grid.halved(np.ones(grid.intervals, dtype=bool)))
+        self.guess = path_on_grid(curve, problem.grid, problem.boundary, problem.robot)
+        self.problem = problem
+        self.margins = np.zeros((2, problem.grid.intervals, *self.limits.lower.shape))
+        return self.first(self.guess)
+
+    def _again(
+        self, outcome: BoundedOutcome[DiscretePath], excess: Excess
+    ) -> BoundedOutcome[DiscretePath]:
+        """Solve again with the bounds drawn in by what the interpolant exceeds them."""
+        sides = np.stack([excess.lower, excess.upper])
+        tighter = np.where(sides > 0, OVERSHOOT * sides + 0.5 * self.limits.tolerance, 0.0)
+        looser = np.where(np.isfinite(sides) & (sides < -SPARE), sides + 0.5 * SPARE, 0.0)
+        self.margins = np.clip(self.margins + tighter + looser, 0.0, 0.45)
+        objective = LimitedAction(self.problem, self.limits, self.margins)
+        mu = float(np.clip(1e-2 * excess.worst, *WARM_MU)) * _density(outcome, objective)
+        start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
+        options = self._options()
+        return self._count(minimize_bounded(objective, outcome.x, options, self.report, start))
+
+    def _count(self, outcome: BoundedOutcome[DiscretePath]) -> BoundedOutcome[DiscretePath]:
+        self.iterations += outcome.iterations
+        self.history += outcome.history
+        return outcome
+
+    def _options(self) -> Options:
+        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        most = max(self.options.max_iterations - self.iterations, 1)
+        return dataclasses.replace(self.options, time_limit=left, max_iterations=most)
+
+    def _inertia(self, outcome: BoundedOutcome[DiscretePath]) -> int:
+        """n_neg of the condensed system, which is positive definite at a minimum."""
+        if outcome.stop is not Stop.STATIONARY or outcome.model is None:
+            return -1
+        if outcome.model.factor(0.0) is not None:
+            return 0
+        objective = LimitedAction(self.problem, self.limits, self.margins, "tree")
+        barrier: Barrier = outcome.barrier
+        model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)
+        return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
+
+    def _trajectory(self, path: DiscretePath) -> Trajectory:
+        momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+        return Trajectory(self.problem.grid, path, momenta, self.problem.scene)
+
+    def _why(self, path: DiscretePath) -> str:
+        sentence = worst_sentence(self._trajectory(path), self.limits, self.problem.robot)
+        return sentence + static_sentence(self.problem, self.limits)
+
+
+class PenalisedAction(Objective[DiscretePath]):
+    """The action plus penalty/2 sum weights (distance outside the bounds)^2."""
+
+    def __init__(self, limited: LimitedAction, penalty: float) -> None:
+        self.limited = limited
+        self.penalty = penalty
+
+    def violation(self, x: DiscretePath) -> float:
+        """Largest distance outside the bounds, as a share of the range."""
+        return float(np.max(np.abs(self._outside(x)), initial=0.0))
+
+    def value(self, x: DiscretePath) -> float:
+        """The penalised action."""
+        squares = float(np.sum(self.limited.bounds.weights * self._outside(x) ** 2))
+        return self.limited.outputs(x).value + 0.5 * self.penalty * squares
+
+    def model(
+        self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
+    ) -> QuadraticModel:
+        """The quadratic model, the penalty's kinks taken as they are at x."""
+        outside = self._outside(x)
+        force = self.penalty * outside
+        return self.limited.model(x, self.penalty * (outside != 0), force, force)
+
+    def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
+        """The path moved by a step."""
+        return self.limited.retract(x, step, model)
+
+    def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
+        """As for the action."""
+        return self.limited.action.relative_size(x, step, model)
+
+    def _outside(self, x: DiscretePath) -> Array:
+        y, bounds = self.limited.outputs(x).y, self.limited.bounds
+        return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
+
+
+def _density(outcome: BoundedOutcome[DiscretePath], objective: LimitedAction) -> float:
+    return max(abs(outcome.outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))

@@ -1,0 +1,115 @@
+"""simulate: forced mechanics of a scene by the discrete Lagrange-d'Alembert equations.
+
+The first-order sibling (k = 1) of the planner: L = K - V, with the torques that are put on the
+joints and what the effects resist with as forces. [MarsdenWest2001, section 3.2]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError
+from hovi.grid import DiscretePath, Grid
+from hovi.lagrangian import CasadiLagrangian
+from hovi.lagrangians import ForcedLagrangian, Torque, mechanics, scene_force
+from hovi.legendre import hamiltonian, highest_derivative, legendre
+from hovi.scene import Scene
+from hovi.schemes import galerkin
+from hovi.segment_lagrangian import SchemeLagrangian
+from hovi.state import State, as_state
+from hovi.stepper import Flow, flow
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A motion of a scene under given torques.
+
+    scene: what was simulated. lagrangian: K - V. flow: the discrete motion.
+    """
+
+    scene: Scene
+    lagrangian: CasadiLagrangian
+    flow: Flow
+
+    @property
+    def t(self) -> Array:
+        """Times of the nodes, shape (N + 1,), in [s]."""
+        return self.flow.t
+
+    @property
+    def q(self) -> Array:
+        """Configurations, shape (N + 1, nv)."""
+        return self.flow.q
+
+    @property
+    def momenta(self) -> Array:
+        """p = M(q) v at the nodes, shape (N + 1, nv)."""
+        return self.flow.p[:, 0]
+
+    @property
+    def v(self) -> Array:
+        """Velocities M(q)^-1 p, shape (N + 1, nv)."""
+        return highest_derivative(self.lagrangian, self.flow.x, self.flow.p)
+
+    @property
+    def energy(self) -> Array:
+        """K + V at the nodes, shape (N + 1,), in [J]."""
+        return hamiltonian(self.lagrangian, self.flow.x, self.flow.p)
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion to be replayed, plotted and saved: the cubic through (q, v) at the nodes."""
+        q, v, h = self.q, self.v, self.flow.ld.h
+        N, n = len(q) - 1, q.shape[1]
+        z0 = ((q[1:] - q[:-1]) / h - v[:-1]) / h
+        z = np.stack([z0, (v[1:] - v[:-1]) / h], axis=1)
+        path = DiscretePath(q.copy(), v, z, np.zeros((N, 0, n)))
+        momenta = np.stack([self.momenta, np.zeros_like(q)], axis=1)
+        metadata = {"status": "simulated"}
+        return Trajectory(
+            Grid(np.full(N, h), (galerkin(0),) * N), path, momenta, self.scene, metadata
+        )
+
+
+def simulate(
+    scene: Scene,
+    start: State | npt.ArrayLike,
+    duration: float,
+    torque: Torque | Trajectory | None = None,
+    *,
+    intervals: int = 1000,
+    inner_modes: int = 1,
+) -> Simulation:
+    """The motion of a scene's robot from a state, by a symplectic integrator of order 2 (r + 1).
+
+    scene: what is simulated. start: a State, or a configuration of shape (nq,) at rest.
+    duration: in [s]. torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques
+    of a plan; none when not given.
+    intervals: N. inner_modes: r, from 0 (the midpoint rule).
+    Raises InputError or SceneError for what does not fit, or for steps too long to be solved.
+    """
+    if not (np.isfinite(duration) and duration > 0):
+        raise InputError(f"the duration must be positive and finite, got {duration} s.")
+    if intervals < 1:
+        raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
+    free = mechanics(scene)
+    forced = ForcedLagrangian(free, scene_force(scene, _torque(torque)))
+    ld = SchemeLagrangian(forced, galerkin(inner_modes, 1), duration / intervals)
+    q, v = as_state(start).on(scene.robot, "start")
+    x, p = legendre(free, q, v)
+    return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
+
+
+def _torque(torque: Torque | Trajectory | None) -> Torque | None:
+    if not isinstance(torque, Trajectory):
+        return torque
+    plan = torque
+    if plan.robot is None:
+        raise InputError("the torques of a motion without a scene cannot be simulated.")
+    return lambda t: plan.sample(np.clip(t, 0.0, plan.duration)).tau

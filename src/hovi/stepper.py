@@ -1,0 +1,218 @@
+"""The discrete flow: initial value problems, stepped in momentum form.
+
+One step solves p0 = -D_1 L_d(x0, x1), ... for the regularised coordinates w of the interval, whose
+equations stay well conditioned as h tends to zero, and moves on by increments,
+
+    x1 = x0 + (T - 1) x0 + S gamma w,      p1 = p0 + (T^-T - 1) p0 + h T^-T dphi/dx0,
+
+summed with compensation. [ColomboFerraroMartin2016, section 2 and corollary to theorem 2]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.errors import InputError
+from hovi.grid import DiscretePath, Grid
+from hovi.lagrangian import EffortLagrangian
+from hovi.legendre import hamiltonian
+from hovi.scene import Scene
+from hovi.segment import Segment
+from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian
+from hovi.state import State
+from hovi.symmetry import Symmetry
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """A discrete motion from momenta.
+
+    ld: the discrete Lagrangian. t: times of the nodes, shape (N + 1,), in [s].
+    x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n). p: momenta, same shape.
+    z: regularised coordinates of the intervals, shape (N, k, n).
+    inner: inner modes, (N, r, n).
+    rounding: what rounding of the start has grown to in q, shape (N + 1,); None when `force`d.
+    symmetries: of which the momentum maps are wanted, by name.
+    """
+
+    ld: SegmentLagrangian
+    t: Array
+    x: Array
+    p: Array
+    z: Array
+    inner: Array
+    rounding: Array | None = None
+    symmetries: Mapping[str, Symmetry] = field(default_factory=dict)
+
+    @property
+    def q(self) -> Array:
+        """Configurations at the nodes, shape (N + 1, n)."""
+        return self.x[:, 0]
+
+    @property
+    def energy(self) -> Array:
+        """H = sum_j p_j . q^(j+1) - L at the nodes, shape (N + 1,)."""
+        return hamiltonian(self.ld.lagrangian, self.x, self.p)
+
+    @property
+    def momentum_maps(self) -> dict[str, Array]:
+        """J of every symmetry at the nodes, each of shape (N + 1,)."""
+        return {name: s.momentum(self.x, self.p) for name, s in self.symmetries.items()}
+
+    @property
+    def reevaluated_momenta(self) -> tuple[Array, Array]:
+        """-D_1 .. -D_k and D_{k+1} .. D_2k of L_d from the stored x, z and inner modes.
+
+        Shape (N, k, n) each: what F^- and F^+ make of the intervals, beside the carried p.
+        """
+        if not isinstance(self.ld, SchemeLagrangian):
+            raise InputError("only the L_d of a scheme is evaluated again from its inner modes.")
+        w = self.ld.regularised.w_of_z(self.z)
+        segment = self.ld.at(self.x[:-1], w, self.inner)
+        return segment.p0, segment.p1
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion of a scene's effort Lagrangian as a Trajectory, to be replayed and saved."""
+        lagrangian, ld = self.ld.lagrangian, self.ld
+        if not (isinstance(ld, SchemeLagrangian) and isinstance(lagrangian, EffortLagrangian)):
+            raise InputError("only the flow of a scene's effort Lagrangian is a Trajectory.")
+        assert isinstance(lagrangian.scene, Scene)
+        path = DiscretePath(self.x[:, 0].copy(), self.x[:, 1].copy(), self.z, self.inner)
+        N = len(self.z)
+        grid = Grid(np.full(N, ld.h), (ld.scheme,) * N)
+        return Trajectory(grid, path, self.p, lagrangian.scene, {"status": "flow"})
+
+
+def flow(
+    ld: DiscreteLagrangian | SegmentLagrangian,
+    z0: State | npt.ArrayLike,
+    p0: npt.ArrayLike,
+    steps: int,
+    *,
+    t0: float = 0.0,
+    force: bool = False,
+    tolerance: float = 1e-6,
+    symmetries: Mapping[str, Symmetry] | None = None,
+) -> Flow:
+    """The discrete Hamiltonian flow (x0, p0) -> (x1, p1) -> ..., F^+ o (F^-)^-1 repeated.
+
+    ld: a discrete Lagrangian on a uniform grid, or that of one interval.
+    z0: start in T^(k-1)Q: a State for k = 2, or (q, q', ..., q^(k-1)) of shape (k, n).
+    p0: momenta, shape (k, n): (p, p~) for k = 2. `legendre` gives both from (q, v, a, jerk).
+    steps: how many. t0: time of the start, in [s].
+    force: go on where the flow's own instability has made of the rounding of the start an error in
+        q above `tolerance` (relative to the largest |q|, at least one); otherwise InputError says
+        how far the motion can be known. Optimal control is unstable both ways in time.
+    Raises InputError also for shapes that do not fit and steps that have no solution.
+    """
+    segment = SchemeLagrangian.of(ld) if isinstance(ld, DiscreteLagrangian) else ld
+    x, p = _start(segment, z0, p0)
+    if steps < 1:
+        raise InputError(f"the number of steps must be 1 or more, got {steps}.")
+    stepper = _Stepper(segment, x, p, t0)
+    watch = None if force else _Watch(segment, x, p, tolerance)
+    records = _records(segment, x, p, steps)
+    for i in range(steps):
+        done = stepper.step()
+        records[0][i + 1], records[1][i + 1] = stepper.x, stepper.p
+        records[2][i], records[3][i, : done.inner.shape[1]] = done.z[0], done.inner[0]
+        if watch is not None:
+            watch.follow(done, stepper.x, (i + 1) * segment.h)
+    t = np.asarray(t0 + np.arange(steps + 1) * segment.h)
+    rounding = None if watch is None else np.array(watch.errors)
+    return Flow(segment, t, *records, rounding, symmetries or {})
+
+
+class _Stepper:
+    """The state of a flow, with what its sums have lost."""
+
+    def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, t0: float) -> None:
+        R = ld.regularised
+        self.ld, self.x, self.p, self.t0 = ld, x, p, t0
+        self._lost = np.zeros((2, *x.shape))
+        self._taylor = R.taylor - np.eye(ld.k)
+        self._moments = R.moments
+        self._back = R.inverse_taylor.T - np.eye(ld.k)
+        self._kick = ld.h * R.inverse_taylor.T
+        self._segment: Segment | None = None
+        self._steps = 0
+
+    def step(self) -> Segment:
+        """One step: F^+ o (F^-)^-1."""
+        t = self.t0 + self._steps * self.ld.h
+        try:
+            segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
+        except InputError as lost:
+            raise InputError(f"the flow ends at t = {t:.6g} s: {lost}") from lost
+        dx = self._taylor @ self.x + self._moments @ segment.w[0]
+        dp = self._back @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
+        self.x, self._lost[0] = compensated(self.x, dx, self._lost[0])
+        self.p, self._lost[1] = compensated(self.p, dp, self._lost[1])
+        self._segment = segment
+        self._steps += 1
+        return segment
+
+
+class _Watch:
+    """Follows what the rounding of the start becomes, by the tangent maps of the steps."""
+
+    def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, tolerance: float) -> None:
+        sizes = np.concatenate([np.abs(x).max(axis=1), np.abs(p).max(axis=1)])
+        sizes[0] = max(1.0, sizes[0])
+        self._tangent = np.diag(EPS * np.repeat(sizes, ld.n))
+        self._n, self._tolerance, self._size = ld.n, tolerance, sizes[0]
+        self.errors = [EPS * float(sizes[0])]
+
+    def follow(self, segment: Segment, x: Array, t: float) -> None:
+        """One more step. Raises InputError where the error passes the tolerance."""
+        self._tangent = segment.tangent[0] @ self._tangent
+        self._size = max(self._size, float(np.abs(x[0]).max()))
+        self.errors.append(float(np.linalg.norm(self._tangent[: self._n], 2)))
+        if not self.errors[-1] <= self._tolerance * self._size:
+            raise InputError(
+                f"the flow is so unstable that after {t:.4g} s the rounding of its start alone "
+                f"moves q by {self.errors[-1]:.1g}, more than tolerance {self._tolerance:g}: take "
+                "a shorter horizon, a boundary value problem instead, or force=True."
+            )
+
+
+def compensated(sum_: Array, increment: Array, lost: Array) -> tuple[Array, Array]:
+    """Kahan's summation: sum + increment, and what the new sum has lost. [Kahan1965]"""
+    increment = increment - lost
+    total = sum_ + increment
+    return total, (total - sum_) - increment
+
+
+def _start(
+    ld: SegmentLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
+) -> tuple[Array, Array]:
+    """x and p as arrays (k, n). Raises InputError where they do not fit."""
+    if isinstance(z0, State):
+        v = np.zeros(ld.n) if z0.v is None else z0.v
+        z0 = np.stack([np.asarray(z0.q, float), np.asarray(v, float)][: ld.k])
+    x, p = np.array(z0, dtype=np.float64), np.array(p0, dtype=np.float64)
+    for name, array in (("z0", x), ("p0", p)):
+        if array.shape != (ld.k, ld.n) or not np.isfinite(array).all():
+            raise InputError(
+                f"{name} needs {ld.k} rows of {ld.n} finite numbers, got shape {array.shape}."
+            )
+    return x, p
+
+
+def _records(
+    ld: SegmentLagrangian, x: Array, p: Array, steps: int
+) -> tuple[Array, Array, Array, Array]:
+    modes = ld.scheme.inner_modes if isinstance(ld, SchemeLagrangian) else 40
+    nodes, momenta = np.empty((steps + 1, *x.shape)), np.empty((steps + 1, *p.shape))
+    nodes[0], momenta[0] = x, p
+    return nodes, momenta, np.empty((steps, *x.shape)), np.zeros((steps, modes, ld.n))
