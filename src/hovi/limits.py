@@ -63,6 +63,23 @@ class Limits:
         single = np.maximum(1.0, np.abs(np.where(np.isfinite(one), one, 1.0)))
         return np.where(np.isfinite(both), both, single)
 
+    def to_dict(self) -> dict[str, Any]:
+        """The limits as JSON-able data, None where there is none."""
+        rows = {
+            name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
+            for name, bound in (("lower", self.lower), ("upper", self.upper))
+        }
+        return {**rows, "tolerance": self.tolerance}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Limits:
+        """The limits that to_dict wrote."""
+        bounds = [
+            np.array([[free if x is None else x for x in row] for row in data[name]], dtype=float)
+            for name, free in (("lower", -np.inf), ("upper", np.inf))
+        ]
+        return cls(bounds[0], bounds[1], float(data["tolerance"]))
+
     def excess(self, outputs: Array) -> Array:
         """By which share of its range each output is outside; negative inside.
 

@@ -268,5 +268,7 @@ def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
 def _trajectory(
     problem: TrajectoryProblem, path: DiscretePath, cost: float, status: Status, n_neg: int
 ) -> Trajectory:
-    metadata = {"cost": cost, "status": str(status), "n_neg": n_neg}
+    metadata: dict[str, Any] = {"cost": cost, "status": str(status), "n_neg": n_neg}
+    if problem.limits is not None and problem.limited:
+        metadata["limits"] = problem.limits.to_dict()
     return Trajectory(problem.grid, path, problem.ld.momenta(path), problem.scene, metadata)

@@ -1,0 +1,119 @@
+"""A CasADi graph, instruction by instruction, in mpmath; and Galerkin actions in its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import casadi as ca
+import mpmath as mp
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+_UNARY: dict[int, Callable[[Any], Any]] = {
+    ca.OP_ASSIGN: lambda x: x,
+    ca.OP_NEG: lambda x: -x,
+    ca.OP_SQ: lambda x: x * x,
+    ca.OP_TWICE: lambda x: 2 * x,
+    ca.OP_INV: lambda x: 1 / x,
+    ca.OP_SIN: mp.sin,
+    ca.OP_COS: mp.cos,
+    ca.OP_SQRT: mp.sqrt,
+}
+_BINARY: dict[int, Callable[[Any, Any], Any]] = {
+    ca.OP_ADD: lambda x, y: x + y,
+    ca.OP_SUB: lambda x, y: x - y,
+    ca.OP_MUL: lambda x, y: x * y,
+    ca.OP_DIV: lambda x, y: x / y,
+}
+
+
+def graph(function: ca.Function) -> Callable[..., list[Any]]:
+    """An SX function with one dense output column as a function of lists of mpmath numbers."""
+    program = [
+        (
+            function.instruction_id(i),
+            list(function.instruction_input(i)),
+            list(function.instruction_output(i)),
+        )
+        for i in range(function.n_instructions())
+    ]
+    constants = {
+        i: function.instruction_constant(i)
+        for i, (op, _, _) in enumerate(program)
+        if op == ca.OP_CONST
+    }
+    size = function.size1_out(0)
+
+    def run(*arguments: list[Any]) -> list[Any]:
+        work: dict[int, Any] = {}
+        result: list[Any] = [mp.mpf(0)] * size
+        for i, (op, inputs, outputs) in enumerate(program):
+            if op == ca.OP_OUTPUT:
+                result[outputs[1]] = work[inputs[0]]
+            elif op == ca.OP_CONST:
+                work[outputs[0]] = mp.mpf(constants[i])
+            elif op == ca.OP_INPUT:
+                work[outputs[0]] = arguments[inputs[0]][inputs[1]]
+            elif op in _UNARY:
+                work[outputs[0]] = _UNARY[op](work[inputs[0]])
+            else:
+                work[outputs[0]] = _BINARY[op](work[inputs[0]], work[inputs[1]])
+        return result
+
+    return run
+
+
+def gauss(points: int) -> tuple[list[Any], list[Any]]:
+    """Nodes and weights of Gauss's rule on [0, 1], Newton from NumPy's."""
+    nodes, weights = [], []
+    for guess in np.polynomial.legendre.leggauss(points)[0]:
+        x = mp.findroot(lambda y: mp.legendre(points, y), mp.mpf(float(guess)))
+        slope = points * (x * mp.legendre(points, x) - mp.legendre(points - 1, x)) / (x * x - 1)
+        nodes.append((x + 1) / 2)
+        weights.append(1 / ((1 - x * x) * slope**2))
+    return nodes, weights
+
+
+def mode(degree: int) -> list[list[Any]]:
+    """Monomial coefficients of sqrt(2 m + 1) P_m(2 s - 1), twice integrated, once, as it is."""
+    p = [
+        mp.sqrt(2 * degree + 1) * (-1) ** (degree + i) * mp.binomial(degree, i)
+        * mp.binomial(degree + i, i)
+        for i in range(degree + 1)
+    ]
+    jets = [p]
+    for _ in range(2):
+        jets.insert(0, [mp.mpf(0), *(c / (i + 1) for i, c in enumerate(jets[0]))])
+    return jets
+
+
+def action(
+    lagrangian: Callable[..., Any], h: float, x0: Array, w: Array, inner: Array
+) -> Any:
+    """L_d of Galerkin for k = 2 with modes as NumPy found them, shape x0, w (2, n), inner (r, n).
+
+    L_d is extremal in the inner modes: what they lack in digits counts squared.
+    lagrangian: lists (q, v, a) of mpmath numbers -> L.
+    """
+    nodes, weights = gauss(len(inner) + 2)
+    signs = [-1, 1, *[1] * len(inner)]  # b_0 = sqrt(3) (1 - 2 s)
+    modes = [mode(m) for m in (1, 0, *range(2, 2 + len(inner)))]
+    rows = [*w, *inner]
+    step = mp.mpf(h)
+    total = mp.mpf(0)
+    for s, weight in zip(nodes, weights, strict=True):
+        jet: list[list[Any]] = [[], [], []]
+        for i in range(x0.shape[1]):
+            q0, v0 = mp.mpf(x0[0, i]), mp.mpf(x0[1, i])
+            base = [q0 + step * s * v0, v0, mp.mpf(0)]
+            for j in range(3):
+                moved = [
+                    sign * mp.fsum(c * s**l for l, c in enumerate(m[j])) * mp.mpf(row[i])
+                    for sign, m, row in zip(signs, modes, rows, strict=True)
+                ]
+                jet[j].append(base[j] + step ** (2 - j) * mp.fsum(moved))
+        total += weight * lagrangian(*jet)
+    return step * total
