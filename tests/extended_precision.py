@@ -80,7 +80,9 @@ def gauss(points: int) -> tuple[list[Any], list[Any]]:
 def mode(degree: int) -> list[list[Any]]:
     """Monomial coefficients of sqrt(2 m + 1) P_m(2 s - 1), twice integrated, once, as it is."""
     p = [
-        mp.sqrt(2 * degree + 1) * (-1) ** (degree + i) * mp.binomial(degree, i)
+        mp.sqrt(2 * degree + 1)
+        * (-1) ** (degree + i)
+        * mp.binomial(degree, i)
         * mp.binomial(degree + i, i)
         for i in range(degree + 1)
     ]
@@ -90,9 +92,7 @@ def mode(degree: int) -> list[list[Any]]:
     return jets
 
 
-def action(
-    lagrangian: Callable[..., Any], h: float, x0: Array, w: Array, inner: Array
-) -> Any:
+def action(lagrangian: Callable[..., Any], h: float, x0: Array, w: Array, inner: Array) -> Any:
     """L_d of Galerkin for k = 2 with modes as NumPy found them, shape x0, w (2, n), inner (r, n).
 
     L_d is extremal in the inner modes: what they lack in digits counts squared.
@@ -106,12 +106,12 @@ def action(
     total = mp.mpf(0)
     for s, weight in zip(nodes, weights, strict=True):
         jet: list[list[Any]] = [[], [], []]
-        for i in range(x0.shape[1]):
-            q0, v0 = mp.mpf(x0[0, i]), mp.mpf(x0[1, i])
+        for joint in range(x0.shape[1]):
+            q0, v0 = mp.mpf(x0[0, joint]), mp.mpf(x0[1, joint])
             base = [q0 + step * s * v0, v0, mp.mpf(0)]
             for j in range(3):
                 moved = [
-                    sign * mp.fsum(c * s**l for l, c in enumerate(m[j])) * mp.mpf(row[i])
+                    sign * mp.fsum(c * s**i for i, c in enumerate(m[j])) * mp.mpf(row[joint])
                     for sign, m, row in zip(signs, modes, rows, strict=True)
                 ]
                 jet[j].append(base[j] + step ** (2 - j) * mp.fsum(moved))

@@ -1,4 +1,4 @@
-"""The discrete action minimised by Ipopt, written down in CasADi without hovi's tables of blocks."""
+"""The discrete action minimised by Ipopt, written down in CasADi interval by interval."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ from hovi.trajectory import Trajectory
 Array = npt.NDArray[np.float64]
 
 
-def least_action(problem: TrajectoryProblem, guess: Trajectory, seed: int = 0) -> tuple[float, Array]:
+def least_action(
+    problem: TrajectoryProblem, guess: Trajectory, seed: int = 0
+) -> tuple[float, Array]:
     """The cost and the nodes (q, v), shape (N - 1, 2 n), that Ipopt finds near a motion.
 
     Each unknown of the guess is first moved by a random thousandth.

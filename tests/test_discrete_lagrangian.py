@@ -46,9 +46,7 @@ def part(grid: Grid, path: DiscretePath, i: int) -> DiscretePath:
     """Interval i alone."""
     r = grid.schemes[i].inner_modes
     one = slice(i, i + 1)
-    return DiscretePath(
-        path.q[i : i + 2], path.v[i : i + 2], path.z[one], path.inner[one, :r]
-    )
+    return DiscretePath(path.q[i : i + 2], path.v[i : i + 2], path.z[one], path.inner[one, :r])
 
 
 def assert_close(found: Array, expected: Array, tolerance: float) -> None:

@@ -182,7 +182,7 @@ def test_numbers_that_make_no_ramp_are_refused(
 @pytest.mark.parametrize("joint", ["root_joint", "root_joint[3]"])
 def test_a_joint_with_several_coordinates_has_no_range(joint: str) -> None:
     robot = load_robot("simple_humanoid")  # its base floats
-    with pytest.raises(SceneError, match="no joint 'root_joint.*' with one coordinate"):
+    with pytest.raises(SceneError, match=r"no joint 'root_joint.*' with one coordinate"):
         Scene(robot, [JointLimitPotential({joint: RANGE})])
 
 

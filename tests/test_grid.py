@@ -55,6 +55,16 @@ def test_schemes_of_one_name_with_different_tables_are_not_mixed_up() -> None:
             np.testing.assert_array_equal(scheme.table, grid.schemes[i].table)
 
 
+def test_chosen_intervals_are_cut_in_half() -> None:
+    grid = Grid(np.array([0.5, 0.25, 1.0]), (galerkin(0), hermite_simpson(), galerkin(2)))
+    fine = grid.halved(np.array([True, False, True]))
+    np.testing.assert_array_equal(fine.steps, [0.25, 0.25, 0.25, 0.5, 0.5])
+    names = [scheme.name for scheme in fine.schemes]
+    assert names == ["galerkin-0"] * 2 + ["hermite-simpson"] + ["galerkin-2"] * 2
+    assert fine.duration == grid.duration
+    np.testing.assert_array_equal(grid.halved(np.zeros(3, dtype=bool)).steps, grid.steps)
+
+
 def test_a_grid_does_not_change_behind_ones_back() -> None:
     steps = np.array([0.5, 0.5])
     grid = Grid(steps, (galerkin(0),) * 2)
@@ -96,5 +106,7 @@ def test_steps_are_one_row_of_numbers() -> None:
 
 
 def test_a_path_counts_its_intervals() -> None:
-    path = DiscretePath(np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((3, 2, 2)), np.zeros((3, 0, 2)))
+    path = DiscretePath(
+        np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((3, 2, 2)), np.zeros((3, 0, 2))
+    )
     assert path.intervals == 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,8 +15,10 @@ from hovi.guess import (
     NAMED,
     Boundary,
     Curve,
+    check_path,
     cubic,
     minimum_jerk,
+    moved,
     named_curve,
     path_on_grid,
     regularised,
@@ -213,3 +217,47 @@ def test_a_motion_on_its_own_grid_is_its_own_guess(arm_scene: Scene, curve: Curv
     np.testing.assert_allclose(again.v, motion.path.v, rtol=0, atol=1e-13)
     np.testing.assert_allclose(again.z, motion.path.z, rtol=0, atol=1e-11)
     np.testing.assert_allclose(again.inner, motion.path.inner, rtol=0, atol=1e-11)
+
+
+# Paths between other ends
+
+OTHER_ENDS: Boundary = tuple(  # type: ignore[assignment]
+    end + 0.1 * (i + 1) * np.array([1.0, -2.0]) for i, end in enumerate(ENDS)
+)
+UNEQUAL = Grid(T * np.array([1, 2, 3, 4]) / 10, (by_name("galerkin-2"),) * 4)
+
+
+def test_a_moved_path_is_the_path_plus_a_cubic(arm_scene: Scene, curve: Curve) -> None:
+    robot = arm_scene.robot
+    path = path_on_grid(curve, UNEQUAL, ENDS, robot)
+    found = moved(path, UNEQUAL, OTHER_ENDS, robot)
+    shift: Boundary = tuple(b - a for a, b in zip(ENDS, OTHER_ENDS, strict=True))  # type: ignore[assignment]
+    dq, dv, _ = cubic(robot, shift, T)(UNEQUAL.t)
+    np.testing.assert_allclose(found.q, path.q + dq, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found.v, path.v + dv, rtol=0, atol=1e-13)
+    np.testing.assert_array_equal(found.inner, path.inner)
+    z = regularised(robot, UNEQUAL, found.q, found.v)
+    np.testing.assert_allclose(found.z, z, rtol=0, atol=1e-11)
+    for end, x in zip(OTHER_ENDS, (found.q[0], found.v[0], found.q[-1], found.v[-1]), strict=True):
+        np.testing.assert_array_equal(x, end)
+
+
+def test_a_path_that_need_not_move_stays_to_the_last_bit(two_link: Robot, curve: Curve) -> None:
+    path = path_on_grid(curve, UNEQUAL, ENDS, two_link)
+    found = moved(path, UNEQUAL, ENDS, two_link)
+    for name in ("q", "v", "z", "inner"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(path, name))
+
+
+def test_a_path_is_checked_against_its_grid_and_itself(two_link: Robot, curve: Curve) -> None:
+    path = path_on_grid(curve, UNEQUAL, ENDS, two_link)
+    check_path(path, UNEQUAL, two_link)
+    bad = [
+        (dataclasses.replace(path, q=path.q[:-1]), r"guess's q must be .* shape \(5, 2\)"),
+        (dataclasses.replace(path, v=path.v * np.inf), "guess's v must be finite"),
+        (dataclasses.replace(path, inner=path.inner[:, :1]), "guess's inner must be"),
+        (dataclasses.replace(path, z=-path.z), "guess's z is not that of its q and v"),
+    ]
+    for other, sentence in bad:
+        with np.errstate(invalid="ignore"), pytest.raises(InputError, match=sentence):
+            check_path(other, UNEQUAL, two_link)

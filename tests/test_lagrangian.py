@@ -70,7 +70,9 @@ def test_the_effort_of_the_arm_is_the_one_derived_by_hand(arm_scene: Scene) -> N
     np.testing.assert_allclose(L.evaluate(*jet)[0], expected, rtol=1e-12)
 
 
-def test_gradient_and_hessian_of_an_effort_are_its_derivatives(lagrangian: EffortLagrangian) -> None:
+def test_gradient_and_hessian_of_an_effort_are_its_derivatives(
+    lagrangian: EffortLagrangian,
+) -> None:
     assert_consistent(lagrangian, jets(lagrangian.nv))
 
 
@@ -131,7 +133,9 @@ def test_sizes_are_those_of_the_robot(lagrangian: EffortLagrangian) -> None:
 def test_a_casadi_lagrangian_of_any_order_has_exact_derivatives(order: int) -> None:
     n = 2
     jet = [ca.SX.sym(name, n) for name in "qvaj"[: order + 1]]
-    expression = ca.sumsqr(jet[-1]) / 2 + ca.sin(jet[0][0]) * jet[1][1] ** 2 + jet[-1][0] * jet[0][1]
+    expression = (
+        ca.sumsqr(jet[-1]) / 2 + ca.sin(jet[0][0]) * jet[1][1] ** 2 + jet[-1][0] * jet[0][1]
+    )
     L = CasadiLagrangian(jet, expression)
     assert (L.nq, L.nv, L.order) == (n, n, order)
     x = jets(n, order)

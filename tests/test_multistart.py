@@ -1,4 +1,4 @@
-"""Many starts: distinct minima, the same from any number of processes, until time or a person ends."""
+"""Many starts: distinct minima, the same from any number of processes, whatever ends the search."""
 
 from __future__ import annotations
 
@@ -40,7 +40,9 @@ def silent(text: str, fraction: float) -> None:
     pass
 
 
-def search(job: Job, guesses: list, starts: int, seed: int = 0, processes: int = 1) -> list[Solution]:
+def search(
+    job: Job, guesses: list, starts: int, seed: int = 0, processes: int = 1
+) -> list[Solution]:
     found = explore(Pool(job, processes), guesses[0], starts, seed, silent)
     assert found.done == starts
     assert not found.interrupted
@@ -91,9 +93,7 @@ def test_there_is_a_processor(job: Job) -> None:
 
 
 def fake(solution: Solution, cost: float, status: Status = Status.MINIMUM) -> Solution:
-    return dataclasses.replace(
-        solution, cost=cost, status=status, success=status is Status.MINIMUM
-    )
+    return dataclasses.replace(solution, cost=cost, status=status, success=status is Status.MINIMUM)
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,9 @@ def test_a_motion_is_a_guess(arm_scene: Scene) -> None:
 
 def test_weights_change_which_motion_is_best(arm_scene: Scene) -> None:
     even, shy = swing_up(arm_scene), swing_up(arm_scene, weight=[1.0, 100.0])
-    peaks = [np.abs(s.trajectory.sample(np.linspace(0, 3, 99)).tau[:, 1]).max() for s in (even, shy)]
+    peaks = [
+        np.abs(s.trajectory.sample(np.linspace(0, 3, 99)).tau[:, 1]).max() for s in (even, shy)
+    ]
     assert peaks[1] < peaks[0]
 
 

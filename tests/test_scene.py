@@ -1,4 +1,4 @@
-"""A scene simulates what was named: torques are RNEA's with the scene's own gravity and armature."""
+"""A scene simulates what was named: RNEA with the scene's own gravity and armature."""
 
 from __future__ import annotations
 

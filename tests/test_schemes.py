@@ -1,4 +1,4 @@
-"""The tables: what they integrate exactly, which formula they are, and which of them are methods."""
+"""The tables: what they integrate exactly, which formula they are, and which are methods."""
 
 from __future__ import annotations
 
@@ -54,10 +54,7 @@ def shifted_legendre(degree: int) -> Polynomial:
         older = previous + [Fraction(0)] * (len(x_p) - len(previous))
         previous, p = (
             p,
-            [
-                (Fraction(2 * j + 1) * a - j * b) / (j + 1)
-                for a, b in zip(x_p, older, strict=True)
-            ],
+            [(Fraction(2 * j + 1) * a - j * b) / (j + 1) for a, b in zip(x_p, older, strict=True)],
         )
     return p
 
@@ -104,9 +101,7 @@ def test_the_curve_meets_the_end_data(name: str) -> None:
 def test_gauss_points_integrate_the_square_of_the_acceleration_exactly(r: int) -> None:
     scheme = galerkin(r)
     modes = scheme.table[:, 2, 3:]
-    np.testing.assert_allclose(
-        (modes.T * scheme.weights) @ modes, np.eye(r), rtol=0, atol=1e-13
-    )
+    np.testing.assert_allclose((modes.T * scheme.weights) @ modes, np.eye(r), rtol=0, atol=1e-13)
     degrees = np.arange(2 * r + 4)
     quadrature = scheme.weights @ scheme.points[:, None] ** degrees
     np.testing.assert_allclose(quadrature, 1 / (degrees + 1), rtol=1e-13)
@@ -141,9 +136,7 @@ def test_gamma_takes_the_orthonormal_basis_to_the_weights_of_the_end_data(k: int
 
 @pytest.mark.parametrize("r", [0, 1, 5])
 def test_jets_of_order_two_are_the_rows_of_an_interval(r: int) -> None:
-    np.testing.assert_allclose(
-        jet_rows(PLACES, 2, r), interval_rows(PLACES, r), rtol=0, atol=5e-15
-    )
+    np.testing.assert_allclose(jet_rows(PLACES, 2, r), interval_rows(PLACES, r), rtol=0, atol=5e-15)
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 4])
@@ -157,9 +150,7 @@ def test_jets_of_any_order_meet_the_end_data_and_are_exact_on_polynomials(k: int
     jets[:, 0] -= p(0)
     start, end = ([p.deriv(j)(s) if j else p(s) for j in range(k)] for s in (0.0, 1.0))
     # Z_j: what Taylor's polynomial of the start misses of the end, one derivative after another
-    taylor = [
-        sum(start[i] / factorial(i - j) for i in range(j, k)) for j in range(k)
-    ]
+    taylor = [sum(start[i] / factorial(i - j) for i in range(j, k)) for j in range(k)]
     Z = np.array(end) - taylor
     columns = np.concatenate([start[1:], Z, np.zeros(r)])
     scale = np.abs(jets).max()

@@ -39,7 +39,9 @@ def drag(symbols: Columns) -> ca.SX:
     return ca.sin(2 * q) * v**2 + ca.cos(t) * a * q + 0.3 * v * ca.sum1(q * a) + t**2
 
 
-def models(scene: Scene, added: Callable[[Columns], ca.SX] | None) -> tuple[TorqueModel, TorqueModel]:
+def models(
+    scene: Scene, added: Callable[[Columns], ca.SX] | None
+) -> tuple[TorqueModel, TorqueModel]:
     """The analytic model, and the same thing entirely in CasADi."""
     symbols = columns(scene.robot.nv)
     tau = casadi_functions(scene.model).inverse_dynamics(*symbols[:3])

@@ -176,15 +176,18 @@ def test_multipliers_of_the_last_step_keep_value_and_gradient(
     assert 0 < difference < 1e-2 * np.abs(fresh.intervals.hessian).max()
 
 
-def test_relative_size_is_the_largest_change_of_q_and_t_v(arm_scene: Scene, grid: Grid) -> None:
+def test_relative_size_is_the_largest_change_of_all_that_moves(
+    arm_scene: Scene, grid: Grid
+) -> None:
     path = random_path(grid, 2, seed=6)
     for algebra in ALGEBRAS:
         action = objective(arm_scene, grid, path, algebra)
         model = action.model(path, None, None)
         step = model.random_vector(0)
         moved = action.retract(path, step, model)
-        T = grid.duration
-        change = max(np.abs(moved.q - path.q).max(), T * np.abs(moved.v - path.v).max())
+        T, hh = grid.duration, grid.steps[:, None, None] ** 2
+        changes = moved.q - path.q, T * (moved.v - path.v), hh * (moved.inner - path.inner)
+        change = max(np.abs(x).max() for x in changes)
         size = max(1.0, np.abs(path.q).max(), T * np.abs(path.v).max())
         assert action.relative_size(path, step, model) == pytest.approx(change / size, rel=1e-9)
 

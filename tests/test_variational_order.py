@@ -1,4 +1,4 @@
-"""Variational orders by the paper's definition, and the orders of the flow that follow from them."""
+"""Variational orders by the paper's definition, and the orders of the flow that follow."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def six_joints(ur5: Robot) -> EffortLagrangian:
 
 
 ORDERS = [
-    ("taylor-midpoint", 2, [0.01, 0.005, 0.0025]),
-    ("taylor-trapezoid", 2, [0.01, 0.005, 0.0025]),
+    ("taylor-midpoint", 2, [0.005, 0.0025, 0.00125]),
+    ("taylor-trapezoid", 2, [0.005, 0.0025, 0.00125]),
     ("hermite-simpson", 4, [0.02, 0.014, 0.01]),
     ("galerkin-0", 4, [0.02, 0.014, 0.01]),
     ("galerkin-1", 6, [0.04, 0.028, 0.02]),

@@ -14,7 +14,17 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 TOP = HERE.parents[1]
 TABLES = TOP / "docs" / "tables"
-SCRIPTS = ("swing_up", "orders", "kernel", "scenes", "dimensions", "peers", "growth")
+SCRIPTS = (
+    "swing_up",
+    "regularity",
+    "orders",
+    "kernel",
+    "scenes",
+    "replanning",
+    "dimensions",
+    "peers",
+    "growth",
+)
 
 
 def run(name: str) -> None:

@@ -8,10 +8,10 @@ from math import pi
 from pathlib import Path
 
 import numpy as np
+from measuring import alone, exponent, print_machine, print_table
 
 import hovi
 from hovi.chain_urdf import write_chain
-from measuring import alone, exponent, print_machine, print_table
 
 LINKS = (2, 3, 5, 7, 10, 14, 20, 30)
 INTERVALS = (16, 32, 64, 128, 256, 512)
@@ -45,7 +45,9 @@ def _step_time(problem: hovi.TrajectoryProblem) -> float:
 
 
 def main() -> None:
-    print(f"Chains of n links, `galerkin-2`, 16 intervals: the median of the first {STEPS} steps.\n")
+    print(
+        f"Chains of n links, `galerkin-2`, 16 intervals: the median of the first {STEPS} steps.\n"
+    )
     times = {t: [alone(measure, n, 16, threads=t) for n in LINKS] for t in (1, 2)}
     rows = [
         [n, f"{1e3 * one:.2f}", f"{1e3 * two:.2f}", f"{one / two:.2f}"]
@@ -54,8 +56,8 @@ def main() -> None:
     columns = ["ms per step", "with 2 threads", "gain"]
     print_table(["n", *columns], rows)
     print(
-        f"Time per step grows like n^{exponent(LINKS[:5], times[1][:5]):.2f} from 2 to 10 links and "
-        f"like n^{exponent(LINKS[4:], times[1][4:]):.2f} from 10 to 30.\n"
+        f"Time per step grows like n^{exponent(LINKS[:5], times[1][:5]):.2f} from 2 to 10 links "
+        f"and like n^{exponent(LINKS[4:], times[1][4:]):.2f} from 10 to 30.\n"
     )
     print("A chain of 7 links on more intervals.\n")
     times = {t: [alone(measure, 7, N, threads=t) for N in INTERVALS] for t in (1, 2)}

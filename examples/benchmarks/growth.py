@@ -5,8 +5,9 @@ Up to 1,000 intervals the nodal band matrix is factored; beyond, intervals are m
 
 from __future__ import annotations
 
-import hovi
 from measuring import alone, exponent, peak_memory, print_machine, print_table
+
+import hovi
 
 SIZES = (100, 1_000, 10_000, 100_000)
 SCHEMES = ("taylor-midpoint", "galerkin-2")

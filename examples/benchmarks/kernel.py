@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
+from measuring import alone, best_time, print_machine, print_table
 
 import hovi
 from hovi.rigid_body import InverseDynamicsKernel, casadi_functions
 from hovi.torque_model import CasadiTorque
-from measuring import alone, best_time, print_machine, print_table
 
 ROBOTS = {
     "UR5": ("ur5", ()),

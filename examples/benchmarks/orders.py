@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from measuring import exponent, print_table
 
 import hovi
 from hovi.schemes import by_name
-from measuring import exponent, print_table
 
 REFERENCE = ("galerkin-6", 192)
 COMMON = (24, 32, 48, 64, 96)

@@ -11,10 +11,10 @@ import time
 from pathlib import Path
 
 import casadi as ca
-
-import hovi
 from measuring import alone, best_time, print_machine, print_table
 from transcription import Transcription
+
+import hovi
 
 SCENES = ("ur5_reach", "panda_reach")
 SCHEME, INTERVALS = "galerkin-2", 16

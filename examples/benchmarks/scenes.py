@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 
-import hovi
-import hovi.planner  # what is imported here is not timed below
 from measuring import alone, best_time, blas_threads, peak_memory, print_machine, print_table
 from sampling import PARTS, shares
+
+import hovi
+import hovi.planner  # what is imported here is not timed below
 
 SCENES = (
     "two_link_reach",

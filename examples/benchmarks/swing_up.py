@@ -1,4 +1,4 @@
-"""The paper's motions: solved as their scenes say, checked, and drawn for the README and the docs."""
+"""The paper's motions: solved as their scenes say, checked, and drawn for the README."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
+from measuring import print_machine, print_table
 from scipy.integrate import solve_ivp
 
 import hovi
 from hovi.plotting import angles_figure, plot_angles, plot_swept_surface
 from hovi.schemes import by_name
-from measuring import print_machine, print_table
 
 Array = npt.NDArray[np.float64]
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 EXACT = ("galerkin-4", 400)
-"""A grid on which the same minimum is converged to round-off."""
+"""Where a minimum is converged to round-off."""
 BETWEEN = np.array([0.2, 0.37, 0.5, 0.71, 0.9])
 
 
@@ -34,17 +34,18 @@ def solve(name: str, scheme: str = "", intervals: int = 0) -> tuple[hovi.Solutio
         task.duration,
         scheme=scheme or task.scheme,
         intervals=intervals or task.intervals,
+        limits=task.limits,
         starts=task.starts,
         seed=task.seed,
     )
     return solution, time.perf_counter() - began
 
 
-def same_minimum(motion: hovi.Solution) -> hovi.Solution:
-    """The minimum that a motion approximates, on a grid that resolves it."""
+def on_grid(motion: hovi.Solution, scheme: str, intervals: int) -> hovi.Solution:
+    """The minimum that a motion approximates, on another grid."""
     scene, t = motion.trajectory.scene, motion.trajectory
     ends = hovi.State(t.q[0], t.v[0]), hovi.State(t.q[-1], t.v[-1])
-    grid = hovi.Grid.uniform(t.duration, EXACT[1], by_name(EXACT[0]))
+    grid = hovi.Grid.uniform(t.duration, intervals, by_name(scheme))
     ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
     solution = hovi.solve(hovi.TrajectoryProblem(ld, *ends), t)
     assert solution.success, solution.message
@@ -60,6 +61,15 @@ def errors(motion: hovi.Solution, exact: hovi.Solution) -> list[float]:
     pairs = [(mine.q, at_nodes.q), (mine.v, at_nodes.v)]
     pairs += [(found.q, wanted.q), (found.v, wanted.v), (found.tau, wanted.tau)]
     return [abs(motion.cost / exact.cost - 1), *(float(np.abs(x - y).max()) for x, y in pairs)]
+
+
+def effort(trajectory: hovi.Trajectory) -> float:
+    """1/2 integral |tau|^2 of the torque between the nodes, as `sample` gives it."""
+    x, w = np.polynomial.legendre.leggauss(8)
+    N = trajectory.grid.intervals
+    tau = trajectory.sample_intervals(np.repeat(np.arange(N), 8), np.tile((x + 1) / 2, N)).tau
+    weights = (trajectory.grid.steps[:, None] * w / 2).ravel()
+    return float(0.5 * weights @ np.sum(tau**2, axis=1))
 
 
 def replay_error(trajectory: hovi.Trajectory) -> float:
@@ -83,47 +93,69 @@ def replay_error(trajectory: hovi.Trajectory) -> float:
     return worst
 
 
-def draw(swing_up: hovi.Trajectory, elbow: hovi.Trajectory) -> None:
-    """The paper's two figures, and the elbow's angles within their range."""
+def draw(swing_up: hovi.Trajectory, resolved: hovi.Trajectory, elbow: hovi.Trajectory) -> None:
+    """The paper's two figures, the torque, and the elbow's angles within their range."""
     IMAGES.mkdir(exist_ok=True)
     plot_angles(swing_up, IMAGES / "swing_up_angles.png")
     plot_swept_surface(swing_up, IMAGES / "swing_up_surface.png", window=(3.0, 6.0))
+    hovi.plot(resolved, IMAGES / "swing_up_torque.png")
     figure = angles_figure(elbow)
     (axes,) = figure.axes
     axes.axhspan(0.0, 170.0, color="0.93", zorder=0)
     figure.savefig(IMAGES / "elbow_angles.png", dpi=150, metadata={"Software": None})
 
 
-def main() -> None:
-    runs = {
-        "the paper's scheme": solve("two_link_swing_up"),
-        "Galerkin": solve("two_link_swing_up", "galerkin-2", 100),
-        "elbow kept in [0, 170] degrees": solve("two_link_elbow"),
-    }
-    (swing_up, _), (galerkin, _), (elbow, _) = runs.values()
-    draw(swing_up.trajectory, elbow.trajectory)
-    columns = ["motion", "scheme", "intervals", "cost", "n_neg", "status", "minima", "seconds"]
+def print_solutions(runs: dict[str, tuple[hovi.Solution, float]]) -> None:
+    """What was found."""
+    columns = ["motion", "scheme", "intervals", "cost", "n_neg", "minima found", "steps", "seconds"]
     rows = []
     for name, (solution, seconds) in runs.items():
         assert solution.success, solution.message
         grid = solution.trajectory.grid
-        rows.append(
-            [name, f"`{grid.schemes[0].name}`", grid.intervals, f"{solution.cost:.7f}"]
-            + [solution.n_neg, solution.status, len(solution.minima), f"{seconds:.0f}"]
-        )
+        cells = [f"`{grid.schemes[0].name}`", grid.intervals, f"{solution.cost:.7f}"]
+        cells += [solution.n_neg, len(solution.minima), solution.nit, f"{seconds:.1f}"]
+        rows.append([name, *cells])
     print_table(columns, rows)
+
+
+def print_accuracy(solutions: list[hovi.Solution]) -> None:
+    """Against the same minimum, resolved; one column per solution."""
+    found = []
+    for solution in solutions:
+        motion = solution.trajectory
+        cost, *absolute = (f"{x:.0e}" for x in errors(solution, on_grid(solution, *EXACT)))
+        ratio = f"{effort(motion) / solution.cost:.4f}"
+        found.append([cost, *absolute, ratio, f"{replay_error(motion):.0e}"])
+    rows = ["cost, relative", "q at the nodes [rad]", "v at the nodes [rad/s]"]
+    rows += ["q between them [rad]", "v between them [rad/s]", "tau between them [N m]"]
+    rows += ["1/2 integral of the sampled tau^2 over the cost"]
+    rows += ["next node when SciPy drives the arm with the sampled tau [rad]"]
+    grids = [solution.trajectory.grid for solution in solutions]
+    columns = ["error", *(f"`{g.schemes[0].name}`, N = {g.intervals}" for g in grids)]
+    print_table(columns, list(zip(rows, *found, strict=True)))
+
+
+def main() -> None:
+    paper, seconds = solve("two_link_swing_up")
+    began = time.perf_counter()
+    resolved = on_grid(paper, "galerkin-2", 200)
+    runs = {
+        "swing-up, the paper's scheme": (paper, seconds),
+        "the same, refined from it": (resolved, time.perf_counter() - began),
+        "swing-up, Galerkin": solve("two_link_swing_up", "galerkin-2", 100),
+        "elbow kept in 0 to 170 degrees": solve("two_link_elbow"),
+    }
+    elbow = runs["elbow kept in 0 to 170 degrees"][0]
+    draw(paper.trajectory, resolved.trajectory, elbow.trajectory)
+    print_solutions(runs)
     angle = np.degrees(elbow.trajectory.sample(np.linspace(0.0, 10.0, 20_001)).q[:, 1])
-    print(f"The kept elbow moves between {angle.min():.2f} and {angle.max():.2f} degrees.\n")
-    print("How accurate the two swing-ups are, against the same minimum resolved to round-off:\n")
-    rows = []
-    for solution in (swing_up, galerkin):
-        cost, *absolute = errors(solution, same_minimum(solution))
-        found = [f"{error:.0e}" for error in (cost, *absolute)]
-        name = solution.trajectory.grid.schemes[0].name
-        rows.append([f"`{name}`", *found, f"{replay_error(solution.trajectory):.0e}"])
-    columns = ["scheme", "cost (relative)", "q at nodes [rad]", "v at nodes [rad/s]"]
-    columns += ["q between [rad]", "v between [rad/s]", "tau between [N m]"]
-    print_table([*columns, "SciPy's replay, node to node [rad]"], rows)
+    peak = np.abs(resolved.trajectory.sample(np.linspace(0.0, 10.0, 20_001)).tau).max()
+    print(
+        f"The kept elbow moves between {angle.min():.2f} and {angle.max():.2f} degrees. The "
+        f"swing-up's largest torque is {peak:.3f} N m. Errors against the same minimum resolved to "
+        "round-off:\n"
+    )
+    print_accuracy([paper, resolved])
     print_machine()
 
 

@@ -66,6 +66,12 @@ class _Batch:
         return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
 
     @cached_property
+    def minus_powers(self) -> Array:
+        """(1, h^-1, h^-2) of every interval, (B, 1, 3, 1)."""
+        powers = self.h[:, None] ** -np.arange(3.0)
+        return np.asarray(powers[:, None, :, None])
+
+    @cached_property
     def pairs(self) -> dict[Coordinates, Array]:
         """What second derivatives count for pairs of columns, (B or 1, m * m, Q * 9)."""
         uniform = bool(np.ptp(self.h) == 0)
@@ -122,24 +128,30 @@ class DiscreteLagrangian:
             them; the torque itself when None.
         terms: what limits add at the points, one per batch; the values stay those of L_d.
         """
+        parts = []
+        for i, batch in enumerate(self._batches):
+            multiplier = None if multipliers is None else multipliers[i]
+            term = None if terms is None else terms[i]
+            value, point_gradient, point_hessian, torque = self._evaluate(
+                batch, path, multiplier, term
+            )
+            gradient = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
+            hessian = _contract_hessian(batch, coordinates, point_hessian)
+            parts.append(Expansion(value, gradient, hessian, torque))
+        return parts[0] if len(parts) == 1 else self._joined(parts)
+
+    def _joined(self, parts: list[Expansion]) -> Expansion:
+        """The expansion of all intervals from those of the batches."""
         N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv
         values = np.empty(N)
         gradient = np.zeros((N, m, n))
         hessian = np.zeros((N, m, m, n, n))
-        torque = []
-        for i, batch in enumerate(self._batches):
-            multiplier = None if multipliers is None else multipliers[i]
-            term = None if terms is None else terms[i]
-            value, point_gradient, point_hessian, tau_J = self._evaluate(
-                batch, path, multiplier, term
-            )
-            torque += tau_J
-            table = _table(batch.scheme, coordinates)
-            k = table.shape[2]
-            values[batch.index] = value
-            gradient[batch.index, :k] = _contract_gradient(batch, table, point_gradient)
-            hessian[batch.index, :k, :k] = _contract_hessian(batch, coordinates, point_hessian)
-        return Expansion(values, gradient, hessian, torque)
+        for batch, part in zip(self._batches, parts, strict=True):
+            k = part.gradient.shape[1]
+            values[batch.index] = part.values
+            gradient[batch.index, :k] = part.gradient
+            hessian[batch.index, :k, :k] = part.hessian
+        return Expansion(values, gradient, hessian, [tau_J for p in parts for tau_J in p.torque])
 
     def predict(
         self, expansion: Expansion, step: Array, coordinates: Coordinates
@@ -162,8 +174,9 @@ class DiscreteLagrangian:
         steps = []
         for batch in self._batches:
             table = _table(batch.scheme, coordinates)
-            points = np.tensordot(step[batch.index, : table.shape[2]], table, axes=(1, 2))
-            jet = points.transpose(0, 2, 3, 1) * batch.h[:, None, None, None] ** _MINUS_POWERS
+            Q, _, m = table.shape
+            points = np.matmul(table.reshape(Q * 3, m), step[batch.index, :m])  # (B, 3 Q, n)
+            jet = points.reshape(len(batch.h), Q, 3, -1) * batch.minus_powers
             steps.append(jet.reshape(len(batch.t), -1))
         return steps
 
@@ -232,9 +245,6 @@ class DiscreteLagrangian:
             torque = []
         action = np.sum(value.reshape(weights.shape) * weights, axis=1)
         return action, gradient, hessian, torque
-
-
-_MINUS_POWERS = -np.arange(3)[:, None]
 
 
 def _split(grid: Grid) -> Iterator[_Batch]:

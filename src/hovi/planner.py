@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError
@@ -65,7 +66,12 @@ def plan(
     Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
     """
     began = time.perf_counter()
-    _check(starts, max_iterations, time_limit)
+    starts, seed = _count("starts", starts, 1), _count("seed", seed, 0)
+    max_iterations = _count("max_iterations", max_iterations, 1)
+    if processes is not None:
+        processes = _count("processes", processes, 1)
+    if time_limit is not None and not time_limit > 0:
+        raise InputError(f"time_limit must be positive, in seconds, got {time_limit}.")
     table = by_name(scheme) if isinstance(scheme, str) else scheme
     fine = Job(
         scene,
@@ -153,12 +159,11 @@ def _silent(text: str, fraction: float) -> None:
     """No progress."""
 
 
-def _check(starts: int, max_iterations: int, time_limit: float | None) -> None:
-    for name, count in (("starts", starts), ("max_iterations", max_iterations)):
-        if count != int(count) or count < 1:
-            raise InputError(f"{name} must be a whole number of 1 or more, got {count}.")
-    if time_limit is not None and not time_limit > 0:
-        raise InputError(f"time_limit must be positive, in seconds, got {time_limit}.")
+def _count(name: str, number: float, least: int) -> int:
+    """A whole number of at least `least`."""
+    if not (np.isfinite(number) and number == int(number) and number >= least):
+        raise InputError(f"{name} must be a whole number of {least} or more, got {number}.")
+    return int(number)
 
 
 __all__ = ["Status", "plan"]

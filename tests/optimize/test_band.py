@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
+from interval_problems import SIZES, IntervalProblem, random_problem
 
 from hovi.optimize.band import BandLayout, BandModel
-from interval_problems import SIZES, IntervalProblem, random_problem
 
 Array = npt.NDArray[np.float64]
 
@@ -45,7 +45,10 @@ def test_the_band_holds_the_lower_half_of_the_dense_matrix(n: int, modes: tuple[
 def test_scatter_and_gather_are_transposes(n: int, modes: tuple[int, ...]) -> None:
     problem, model = build(n, modes, INDEFINITE)
     random = np.random.default_rng(0)
-    s, local = random.normal(size=problem.gradient.shape), random.normal(size=problem.nodal.gradient.shape)
+    s, local = (
+        random.normal(size=problem.gradient.shape),
+        random.normal(size=problem.nodal.gradient.shape),
+    )
     np.testing.assert_allclose(model.gradient, problem.gradient, rtol=0, atol=1e-13)
     np.testing.assert_allclose(model.gather(s), problem.nodal_map @ s, rtol=0, atol=1e-15)
     assert np.vdot(model.scatter(local), s) == pytest.approx(np.vdot(local, model.gather(s)))
@@ -56,15 +59,15 @@ def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> 
     problem, model = build(n, modes, INDEFINITE)
     s = np.random.default_rng(1).normal(size=problem.gradient.shape)
     expected = problem.metric @ s
-    np.testing.assert_allclose(model.metric_product(s), expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        model.metric_product(s), expected, atol=1e-12 * np.abs(expected).max()
+    )
 
 
 @pytest.mark.parametrize("equal", [True, False], ids=["equal steps", "unequal steps"])
 @pytest.mark.parametrize("shift", [0.0, 0.7, 30.0])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_solves_are_dense_solves(
-    n: int, modes: tuple[int, ...], shift: float, equal: bool
-) -> None:
+def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float, equal: bool) -> None:
     problem, model = build(n, modes, DEFINITE, equal=equal)
     factor = model.factor(shift)
     assert factor is not None

@@ -1,4 +1,4 @@
-"""Merging intervals in pairs gives the dense answer, the inertia, and keeps its digits at small h."""
+"""Merging in pairs gives the dense answer and the inertia, and keeps its digits at small h."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
+from interval_problems import SIZES, IntervalProblem, random_problem
 
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import DiscretePath, Grid
@@ -14,7 +15,6 @@ from hovi.optimize.band import BandLayout, BandModel
 from hovi.optimize.merge_tree import MergeTree, MergeTreeModel, merge_levels
 from hovi.optimize.quadratic_model import IntervalSum
 from hovi.schemes import galerkin
-from interval_problems import SIZES, IntervalProblem, random_problem
 
 Array = npt.NDArray[np.float64]
 

@@ -73,7 +73,9 @@ class Smooth(Objective[Array]):
         self.values.append(float(self.function(x)))
         return self.values[-1]
 
-    def model(self, x: Array, previous: QuadraticModel | None, step: Array | None) -> QuadraticModel:
+    def model(
+        self, x: Array, previous: QuadraticModel | None, step: Array | None
+    ) -> QuadraticModel:
         gradient, hessian = self.second(x)
         return DenseModel(gradient.full().ravel(), hessian.full())
 
@@ -139,7 +141,11 @@ def barrier(x: ca.SX) -> ca.SX:
 )
 @pytest.mark.parametrize("radius", [0.01, 10.0, 1e6])
 def test_the_minimum_is_found_from_afar(
-    n: int, f: Callable[[ca.SX], ca.SX], start: list[float], minimum: list[float] | None, radius: float
+    n: int,
+    f: Callable[[ca.SX], ca.SX],
+    start: list[float],
+    minimum: list[float] | None,
+    radius: float,
 ) -> None:
     problem = objective(n, f)
     outcome = minimize(problem, np.array(start), Options(radius=radius))

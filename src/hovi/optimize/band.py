@@ -103,6 +103,6 @@ class BandModel(QuadraticModel):
         """Banded Cholesky of H + shift D; None where it fails."""
         if self._band is None:
             self._band = self.layout.assemble(self.intervals.hessian)
-        band = self._band + shift * self._metric_band
-        factor, info = dpbtrf(band.T, lower=1, overwrite_ab=1)
+        band = self._band if shift == 0.0 else self._band + shift * self._metric_band
+        factor, info = dpbtrf(band.T, lower=1, overwrite_ab=int(shift != 0.0))
         return BandFactor(factor) if info == 0 else None

@@ -230,6 +230,8 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
 
     guess: the shift of the last subproblem, a first value for this one.
     """
+    if not np.isfinite(model.gradient).all():
+        raise ArithmeticError("the model has numbers that are not finite")
     search = _ShiftSearch(model, radius, guess)
     shift = guess
     last: tuple[Factor, Trial] | None = None
@@ -249,7 +251,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
         shift = search.after_step(shift, trial, slope)
     if last is not None:
         factor, trial = last
-        return search.complete(factor, trial) if trial.norm < radius else trial
+        return search.complete(factor, trial) if search.is_short(trial) else trial
     raise ArithmeticError("H + shift D stays indefinite: the model has numbers that are not finite")
 
 
@@ -270,8 +272,7 @@ class _ShiftSearch:
         self.low = max(self.low, shift)
         if np.isfinite(self.high):
             return max(math.sqrt(self.low * self.high), 0.1 * self.high)
-        growth = 4.0 if self.reached else 16.0
-        return max(growth * shift, 1e-5 * self.model.curvature_scale())
+        return max(4.0 * shift, (1e-5 if self.reached else 0.03) * self._scale())
 
     def step_at(self, factor: Factor, shift: float) -> tuple[Trial, float]:
         """The step of a shift, and the slope s.D (H + shift D)^-1 D s."""
@@ -280,6 +281,8 @@ class _ShiftSearch:
         Ds = self.model.metric_product(s)
         norm2 = max(float(np.vdot(s, Ds)), 0.0)
         decrease = -0.5 * float(np.vdot(g, s)) + 0.5 * shift * norm2
+        if not np.isfinite(decrease) or (decrease == 0.0 and g.any()):
+            raise ArithmeticError("the model has numbers that are not finite")
         trial = Trial(s, decrease, shift, float(np.sqrt(norm2)))
         if trial.norm <= 1.25 * self.radius and (shift == 0.0 or trial.norm >= 0.75 * self.radius):
             return trial, 0.0
@@ -296,11 +299,21 @@ class _ShiftSearch:
             newton = shift + trial.norm**2 / slope * (trial.norm - self.radius) / self.radius
         if self.low < newton < self.high:
             return newton
-        if newton <= 0.0 and not self.indefinite and self.low == 0.0:
+        if trial.norm < self.radius and not self.indefinite and self.low == 0.0:
             return 0.0
         if not np.isfinite(self.high):
-            return max(10 * shift, 1e-6 * self.model.curvature_scale())
+            return max(10 * shift, 1e-6 * self._scale())
         return max(math.sqrt(self.low * self.high), 1e-3 * self.high)
+
+    def _scale(self) -> float:
+        scale = self.model.curvature_scale()
+        if not np.isfinite(scale):
+            raise ArithmeticError("the model has numbers that are not finite")
+        return scale or float(np.max(np.abs(self.model.gradient))) / self.radius
+
+    def is_short(self, trial: Trial) -> bool:
+        """Whether a step ends inside the radius although H has negative curvature."""
+        return self.indefinite and trial.norm < self.radius
 
     def is_hard_case(self, shift: float) -> bool:
         """Whether the step stays short down to the edge of definiteness."""

@@ -7,6 +7,7 @@ higher-order sibling of a Butcher tableau.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +62,7 @@ class Scheme:
         """What makes two schemes the same: their numbers."""
         return b"".join(x.tobytes() for x in (self.points, self.weights, self.table))
 
-    @property
+    @cached_property
     def regular_table(self) -> Array:
         """The table for (q0, h v0, Z0, Z1, c), the configuration's base point included.
 
@@ -71,7 +72,7 @@ class Scheme:
         base[:, 0] = 1.0
         return np.concatenate([base, self.table], axis=2)
 
-    @property
+    @cached_property
     def nodal_table(self) -> Array:
         """The table for (q0, h v0, q1, h v1, c), shape (Q, 3, 4 + r)."""
         return self.regular_table @ regular_from_nodal(self.inner_modes)

@@ -1,0 +1,51 @@
+"""Planning again in a loop: the UR5's goal moves, and the last motion is the guess."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from measuring import alone, print_machine, print_table
+
+import hovi
+
+MOVES = (0.005, 0.05, 0.2)
+LAPS = 40
+
+
+def measure(scene: str, move: float) -> list[float]:
+    """Steps (most and mean), milliseconds (median) and Hz, over a walk of the goal."""
+    task = hovi.load_task(hovi.example(scene))
+    grid = hovi.Grid.uniform(task.duration, task.intervals, hovi.schemes.by_name(task.scheme))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    solution = hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal))
+    home = np.asarray(task.goal.q, dtype=float)
+    random = np.random.default_rng(0)
+    goal, steps, times = home, [], []
+    for _ in range(LAPS):
+        # a step of this length in a random direction, pulled back to where it began
+        direction = random.standard_normal(len(home)) + 2 * (home - goal) / move
+        goal = goal + move * direction / np.linalg.norm(direction)
+        began = time.perf_counter()
+        solution = solution.replan(goal=hovi.State(goal))
+        times.append(time.perf_counter() - began)
+        steps.append(solution.nit)
+        assert solution.success, solution.message
+    median = float(np.median(times))
+    return [max(steps), float(np.mean(steps)), 1e3 * median, 1 / median]
+
+
+def main() -> None:
+    rows = []
+    for scene in ("ur5_reach", "panda_reach"):
+        for move in MOVES:
+            most, mean, ms, rate = alone(measure, scene, move)
+            cells = [f"{most:.0f}", f"{mean:.1f}", f"{ms:.1f}", f"{rate:.0f}"]
+            rows.append([f"`{scene}`, goal moved by {move:g} rad", *cells])
+    print(f"`Solution.replan`, {LAPS} goals in a row, one thread.\n")
+    print_table(["scene", "most steps", "mean steps", "ms", "Hz"], rows)
+    print_machine(threads=1)
+
+
+if __name__ == "__main__":
+    main()
