@@ -12,7 +12,7 @@ from hovi.errors import InputError
 from hovi.euler_lagrange import regularity
 from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian, conjugate_time
 from hovi.lagrangian import CasadiLagrangian, EffortLagrangian
-from hovi.legendre import legendre
+from hovi.legendre_transforms import legendre
 from hovi.robot import Robot
 from hovi.scene import Scene
 

@@ -41,7 +41,7 @@ FLOORS = [
     {"discrete_lagrangian", "lagrangians"},
     {"action_structure"},
     {"trajectory", "segment_lagrangian"},
-    {"guess", "legendre"},
+    {"guess", "legendre_transforms"},
     {"limit_check", "problem", "euler_lagrange", "exact_discrete_lagrangian", "symmetry"},
     {"trajectory_objective", "stepper", "variational_error", "contradictions"},
     {"limited_action"},

@@ -22,7 +22,7 @@ from hovi.euler_lagrange import (
 from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
 from hovi.lagrangian import CasadiLagrangian, EffortLagrangian
 from hovi.lagrangians import mechanics, spline
-from hovi.legendre import (
+from hovi.legendre_transforms import (
     hamiltonian,
     inverse_legendre_minus,
     inverse_legendre_plus,

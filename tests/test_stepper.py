@@ -14,7 +14,7 @@ from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
 from hovi.grid import Grid
 from hovi.lagrangian import CasadiLagrangian, EffortLagrangian, Lagrangian
 from hovi.lagrangians import mechanics, spline
-from hovi.legendre import legendre
+from hovi.legendre_transforms import legendre
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 from hovi.scene import Scene
@@ -43,9 +43,8 @@ def floating(two_link: Robot) -> Scene:
 
 
 def quartic() -> CasadiLagrangian:
-    """L = a^2/2 + v^2/2 - q^4/4... with bounded motions: q'''' = q'' + q^3 is not; see `bounded`."""
+    """(d^2 + 1)(d^2 + 4) q + q^3 = 0: two oscillators in a quartic potential, bounded near rest."""
     q, v, a = (ca.SX.sym(c, 1) for c in "qva")
-    # (d2 + 1)(d2 + 4) q + q^3 = 0: two oscillators and a quartic potential, bounded near rest
     return CasadiLagrangian(
         [q, v, a], (ca.sumsqr(a) - 5 * ca.sumsqr(v) + 4 * ca.sumsqr(q)) / 2 + q**4 / 4
     )
@@ -237,14 +236,11 @@ def test_the_condition_of_a_step_tends_to_its_limit_on_the_arm(
 
 @pytest.mark.parametrize("h", [1e-2, 1e-4, 1e-6, 1e-8])
 def test_steps_keep_their_digits_as_h_tends_to_zero(arm: EffortLagrangian, h: float) -> None:
-    # a(0) of the start, from the momenta alone and through the step's regularised coordinates
+    # w1 is the mean acceleration, w0 its slope: neither loses eps/h^2 as differences would
     x, p = legendre(arm, *JET)
     segment = SchemeLagrangian(arm, galerkin(2), h).from_start(x[None], p[None])
-    a_mean = JET[2] + h / 2 * JET[3]  # w1 is the mean acceleration
-    np.testing.assert_allclose(segment.w[0, 1], a_mean, rtol=0, atol=1e-13 + 10 * h**2)
-    jerk = -segment.w[0, 0] * np.sqrt(12) / h  # of the linear part of a(s)
-    if h >= 1e-4:
-        np.testing.assert_allclose(jerk, JET[3], rtol=0, atol=1e-9 / h * 1e-4 + 30 * h)
+    for w, exact in ((1, JET[2] + h / 2 * JET[3]), (0, -h * JET[3] / np.sqrt(12))):
+        np.testing.assert_allclose(segment.w[0, w], exact, rtol=0, atol=1e-13 + 200 * h**2)
 
 
 # The horizon
@@ -267,15 +263,16 @@ def test_a_horizon_beyond_the_flows_own_instability_is_refused(arm_scene: Scene)
     assert np.median(growth) == pytest.approx(3.75, abs=0.1)
 
 
-def test_a_swing_up_cannot_be_replayed_from_its_momenta(arm_scene: Scene) -> None:
+def test_a_swing_up_is_replayed_from_its_momenta_as_far_as_they_carry(arm_scene: Scene) -> None:
+    # what eps of the start becomes in ten seconds is 5e-7 rad; the plan's momenta have some more
     grid = Grid.uniform(10.0, 100, galerkin(1))
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     ends = State([-np.pi / 2, 0.0]), State([np.pi / 2, 0.0])
     plan = solve(TrajectoryProblem(ld, *ends)).trajectory
-    with pytest.raises(InputError, match=r"unstable|ends at"):
-        flow(ld, ends[0], plan.momenta[0], 100)
-    replay = flow(ld, ends[0], plan.momenta[0], 20)
-    np.testing.assert_allclose(replay.q, plan.q[:21], rtol=0, atol=1e-6)
+    replay = flow(ld, ends[0], plan.momenta[0], 100)
+    np.testing.assert_allclose(replay.q, plan.q, rtol=0, atol=1e-3)
+    with pytest.raises(InputError, match="more than tolerance 1e-09"):
+        flow(ld, ends[0], plan.momenta[0], 100, tolerance=1e-9)
 
 
 def test_a_short_reach_is_replayed_from_its_momenta(arm_scene: Scene) -> None:

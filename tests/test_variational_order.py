@@ -12,7 +12,7 @@ from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.lagrangian import EffortLagrangian
 from hovi.lagrangians import spline
-from hovi.legendre import legendre
+from hovi.legendre_transforms import legendre
 from hovi.rigid_body import casadi_functions
 from hovi.robot import Robot
 from hovi.scene import Scene

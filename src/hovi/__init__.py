@@ -25,9 +25,12 @@ if TYPE_CHECKING:
     from hovi.lagrangians import mechanics as mechanics
     from hovi.lagrangians import riemannian_cubic as riemannian_cubic
     from hovi.lagrangians import spline as spline
-    from hovi.legendre import hamiltonian as hamiltonian
-    from hovi.legendre import legendre_minus as legendre_minus
-    from hovi.legendre import legendre_plus as legendre_plus
+    from hovi.legendre_transforms import hamiltonian as hamiltonian
+    from hovi.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
+    from hovi.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus
+    from hovi.legendre_transforms import legendre as legendre
+    from hovi.legendre_transforms import legendre_minus as legendre_minus
+    from hovi.legendre_transforms import legendre_plus as legendre_plus
     from hovi.model_files import example as example
     from hovi.planner import plan as plan
     from hovi.playback import replay as replay
@@ -86,9 +89,12 @@ _PLACES = {
     "euler_lagrange_residual": "hovi.euler_lagrange",
     "example": "hovi.model_files",
     "flow": "hovi.stepper",
-    "hamiltonian": "hovi.legendre",
-    "legendre_minus": "hovi.legendre",
-    "legendre_plus": "hovi.legendre",
+    "hamiltonian": "hovi.legendre_transforms",
+    "legendre": "hovi.legendre_transforms",
+    "inverse_legendre_minus": "hovi.legendre_transforms",
+    "inverse_legendre_plus": "hovi.legendre_transforms",
+    "legendre_minus": "hovi.legendre_transforms",
+    "legendre_plus": "hovi.legendre_transforms",
     "load_robot": "hovi.robot",
     "load_task": "hovi.task_file",
     "mechanics": "hovi.lagrangians",

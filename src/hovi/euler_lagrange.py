@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from hovi.legendre import (
+from hovi.legendre_transforms import (
     batch,
     inverse_legendre_minus,
     inverse_legendre_plus,

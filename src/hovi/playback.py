@@ -18,10 +18,12 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import DisplayError
+from hovi.errors import DisplayError, InputError
+from hovi.limits import KINDS
 from hovi.meshcat_page import Page
 from hovi.meshcat_server import ServedPage
 from hovi.robot import Robot
+from hovi.saturation import at_limit, imposed_limits
 from hovi.skeleton import skeleton
 from hovi.trajectory import Trajectory
 from hovi.whole_file import reason, whole_file
@@ -41,11 +43,52 @@ _ELEVATION = 0.25
 _MARGIN = 1.0
 _TRACE_COLOR = (0.80, 0.47, 0.65)
 _TRACE_WIDTH = 0.006  # of the picture's size
+_AT_LIMIT_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light beside blue, orange and grey
+_BRIDGED_FRAMES = 4
+_AT_LIMIT_NAME = " at its limit"
+_AT_LIMIT_NOTE = "a yellow link: its joint is at a limit"
 _FRAME_RATE = 60.0
 _MAX_FRAMES = 20_000
 _VIEW_SAMPLES = 60
 _TRACE_SAMPLES = 2_000
 _BROWSER_SECONDS = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Highlights:
+    """Which links stand out when: those of joints at a limit of position, velocity or torque.
+
+    A link that ever stands out is drawn twice, and one of the two is hidden at any time: its own
+    look comes back whatever it is.
+
+    times: (M,), in [s]. flags: (M, joints), by number of the joint in the model; none at the end
+        of the motion.
+    """
+
+    times: Array
+    flags: npt.NDArray[np.bool_]
+
+    def at(self, t: float) -> npt.NDArray[np.bool_]:
+        """Flags by joint at a time, shape (joints,)."""
+        index = int(np.searchsorted(self.times, t, side="right")) - 1
+        return np.asarray(self.flags[max(index, 0)])
+
+    def show(self, visualizer: MeshcatVisualizer, t: float) -> None:
+        """Make the page show the links as they are at a time."""
+        flags = self.at(t)
+        for plain, bright, joint in _pairs(visualizer):
+            for node, visible in ((plain, not flags[joint]), (bright, bool(flags[joint]))):
+                visualizer.viewer[node].set_property("visible", visible)
+
+    def tracks(self, visualizer: MeshcatVisualizer) -> dict[str, meshcat.animation.AnimationTrack]:
+        """A track of visibility for each object that is drawn twice, by its node's name."""
+        tracks = {}
+        for plain, bright, joint in _pairs(visualizer):
+            flag = self.flags[:, joint]
+            keys = np.flatnonzero(np.concatenate([[True], flag[1:] != flag[:-1]]))
+            for node, visible in ((plain, ~flag[keys]), (bright, flag[keys])):
+                tracks[node] = _track("visible", "bool", self.times[keys], list(visible))
+        return tracks
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +105,7 @@ class Replay:
     visualizer: MeshcatVisualizer
     url: str
     page: Page
+    highlights: Highlights | None = None
 
     def play(self, *, speed: float = 1.0, loop: bool = False, rate: float = _FRAME_RATE) -> None:
         """Move the robot on the page in real time, by the monotonic clock.
@@ -89,10 +133,14 @@ class Replay:
         start, elapsed = time.monotonic(), 0.0
         while elapsed * speed < duration:
             self.visualizer.display(self.trajectory.configurations(elapsed * speed)[0])
+            if self.highlights is not None:
+                self.highlights.show(self.visualizer, elapsed * speed)
             due = (math.floor(elapsed * rate) + 1) / rate
             time.sleep(max(0.0, start + min(due, duration / speed) - time.monotonic()))
             elapsed = time.monotonic() - start
         self.visualizer.display(self.trajectory.configurations(duration)[0])
+        if self.highlights is not None:
+            self.highlights.show(self.visualizer, duration)
 
     def _repr_html_(self) -> str:
         """The page in a notebook: by its address while it is served, else the page itself."""
@@ -141,15 +189,17 @@ def replay(
     if html is not None:
         return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
     robot = _robot(trajectory)
-    page = ServedPage(_title(trajectory, robot), robot.visual_problem, port)
+    highlights = _highlights(trajectory, robot)
+    page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)
     try:
-        shown = Replay(trajectory, _draw(trajectory, robot, page, trace), page.web_url, page)
+        visualizer = _draw(trajectory, robot, page, trace, highlights)
+        shown = Replay(trajectory, visualizer, page.web_url, page, highlights)
         announce(page.web_url)
         if open_browser:
             _open(page)
         shown.play(speed=speed, loop=loop)
         # Whoever opens the page from now on gets the motion with its controls.
-        page.keep(_animation(trajectory, shown.visualizer, loop))
+        page.keep(_animation(trajectory, visualizer, loop, highlights))
     except BaseException:
         page.close()
         raise
@@ -170,16 +220,17 @@ def write_html(
     """
     _check_positive("speed", speed)
     robot = _robot(trajectory)
-    page = Page(_title(trajectory, robot), robot.visual_problem)
-    visualizer = _draw(trajectory, robot, page, trace)
-    page.keep(_animation(trajectory, visualizer, loop))
+    highlights = _highlights(trajectory, robot)
+    page = Page(_title(trajectory, robot), _note(robot, highlights))
+    visualizer = _draw(trajectory, robot, page, trace, highlights)
+    page.keep(_animation(trajectory, visualizer, loop, highlights))
     text = page.offline_html(speed)
     try:
         with whole_file(path) as stream:
             stream.write(text.encode())
     except OSError as error:
         raise DisplayError(f"cannot write the page {str(path)!r}: {reason(error)}.") from error
-    return Replay(trajectory, visualizer, Path(path).resolve().as_uri(), page)
+    return Replay(trajectory, visualizer, Path(path).resolve().as_uri(), page, highlights)
 
 
 def _robot(trajectory: Trajectory) -> Robot:
@@ -199,16 +250,84 @@ def _open(page: ServedPage) -> None:
         raise DisplayError(f"no browser showed the page in {_BROWSER_SECONDS:.0f} s; {advice}")
 
 
-def _draw(trajectory: Trajectory, robot: Robot, page: Page, trace: bool) -> MeshcatVisualizer:
+def _highlights(trajectory: Trajectory, robot: Robot) -> Highlights | None:
+    """When which links stand out; None where no joint is ever at a limit."""
+    limits = imposed_limits(trajectory)
+    if limits is None:
+        return None
+    times = _frame_times(trajectory)
+    try:
+        motion = trajectory.sample(times)
+    except InputError:  # joints for which there are no velocities between the nodes
+        return None
+    by_kind = at_limit(limits, motion, robot)[:, [KINDS.index(k) for k in ("q", "v", "tau")]]
+    by_coordinate: npt.NDArray[np.bool_] = np.any(by_kind, axis=1)  # (M, nv)
+    by_coordinate = _bridged(by_coordinate)
+    by_coordinate[-1] = False
+    flags = np.zeros((len(times), robot.model.njoints), dtype=bool)
+    for joint in list(robot.model.joints)[1:]:
+        flags[:, joint.id] = by_coordinate[:, joint.idx_v : joint.idx_v + joint.nv].any(axis=1)
+    return Highlights(times, flags) if flags.any() else None
+
+
+def _bridged(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Flags (M, n) without gaps that are too short to be seen as more than a flicker."""
+    k, ends = _BRIDGED_FRAMES, ((_BRIDGED_FRAMES,) * 2, (0, 0))
+    windows = np.lib.stride_tricks.sliding_window_view
+    wide = windows(np.pad(flags, ends), 2 * k + 1, axis=0).any(axis=-1)
+    closed = windows(np.pad(wide, ends, constant_values=True), 2 * k + 1, axis=0).all(axis=-1)
+    return np.asarray(closed)
+
+
+def _note(robot: Robot, highlights: Highlights | None) -> str:
+    notes = [robot.visual_problem, "" if highlights is None else _AT_LIMIT_NOTE]
+    return " ".join(note for note in notes if note)
+
+
+def _with_bright_copies(visual: pin.GeometryModel, highlights: Highlights) -> pin.GeometryModel:
+    """The drawn objects, and a yellow copy of those that ever stand out."""
+    both = visual.copy()
+    for item in list(visual.geometryObjects):
+        if highlights.flags[:, item.parentJoint].any():
+            bright = item.copy()
+            bright.name = item.name + _AT_LIMIT_NAME
+            bright.meshColor, bright.overrideMaterial = _AT_LIMIT_COLOR, True
+            bright.meshPath = ""  # its triangles alone take less room than its file
+            both.addGeometryObject(bright)
+    return both
+
+
+def _pairs(visualizer: MeshcatVisualizer) -> list[tuple[str, str, int]]:
+    """Nodes of an object and of its bright copy, and the joint that carries them."""
+    items = list(visualizer.visual_model.geometryObjects)
+    node = {item.name: _node(visualizer, item) for item in items}
+    return [
+        (node[item.name], node[item.name + _AT_LIMIT_NAME], item.parentJoint)
+        for item in items
+        if item.name + _AT_LIMIT_NAME in node
+    ]
+
+
+def _node(visualizer: MeshcatVisualizer, item: pin.GeometryObject) -> str:
+    return str(visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL))
+
+
+def _draw(
+    trajectory: Trajectory, robot: Robot, page: Page, trace: bool, highlights: Highlights | None
+) -> MeshcatVisualizer:
     """The robot at the start of the motion, its tip's path, and the camera on both."""
     visual = robot.visual
     if visual is None or visual.ngeoms == 0:
         visual = skeleton(robot.model)
+    if highlights is not None:
+        visual = _with_bright_copies(visual, highlights)
     visualizer = MeshcatVisualizer(robot.model, None, visual)
     visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
     visualizer.loadViewerModel(rootNodeName="robot")
     visualizer.setBackgroundColor("gray")
     visualizer.display(trajectory.q[0])
+    if highlights is not None:
+        highlights.show(visualizer, 0.0)
     lower, upper = _swept_box(visualizer, _along(trajectory, _VIEW_SAMPLES))
     if trace:
         tip = robot.frame_position(robot.tip_frame, _along(trajectory, _TRACE_SAMPLES))
@@ -288,12 +407,21 @@ def _placements(visualizer: MeshcatVisualizer, q: Array) -> list[list[pin.SE3]]:
     return placements
 
 
-def _animation(
-    trajectory: Trajectory, visualizer: MeshcatVisualizer, loop: bool
-) -> dict[str, object]:
-    """The message that makes a page play the motion: a track per drawn object, in seconds."""
+def _frame_times(trajectory: Trajectory) -> Array:
+    """Times of an animation's frames, its two ends included."""
     frames = int(min(_MAX_FRAMES, math.ceil(trajectory.duration * _FRAME_RATE))) + 1
-    times = np.linspace(0.0, trajectory.duration, max(frames, 2))
+    return np.linspace(0.0, trajectory.duration, max(frames, 2))
+
+
+def _animation(
+    trajectory: Trajectory,
+    visualizer: MeshcatVisualizer,
+    loop: bool,
+    highlights: Highlights | None,
+) -> dict[str, object]:
+    """The message that makes a page play the motion: tracks by drawn object, in seconds."""
+    times = _frame_times(trajectory)
+    visible = {} if highlights is None else highlights.tracks(visualizer)
     placements = _placements(visualizer, trajectory.configurations(times))
     animation = meshcat.animation.Animation()
     for number, item in enumerate(visualizer.visual_model.geometryObjects):
@@ -303,7 +431,10 @@ def _animation(
             "position": _track("position", "vector3", times, [p.translation for p in places]),
             "quaternion": _track("quaternion", "quaternion", times, turns),
         }
-        node = visualizer.viewer[visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL)]
+        name = _node(visualizer, item)
+        if name in visible:
+            tracks["visible"] = visible[name]
+        node = visualizer.viewer[name]
         animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
     repetitions = math.inf if loop else 1
     command = meshcat.commands.SetAnimation(animation, play=True, repetitions=repetitions)

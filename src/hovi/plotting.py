@@ -22,7 +22,10 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from hovi.errors import DisplayError
+from hovi.limit_bands import Curve, draw_limits, legend_entries
+from hovi.limits import KINDS, Limits
 from hovi.robot import Robot
+from hovi.saturation import at_limit, imposed_limits
 from hovi.trajectory import Sample, Trajectory
 from hovi.whole_file import reason, whole_file
 
@@ -51,19 +54,22 @@ class _Curve:
 
     t: Array  # (N, m)
     motion: Sample  # arrays (N, m, n)
+    limits: Limits | None
+    active: Mask  # (N, m, 4, nv), where a limit is active
 
 
 @dataclass(frozen=True)
 class _Panel:
     """What one panel shows, and how angular and linear coordinates are scaled and labelled."""
 
+    kind: int  # in KINDS
     angular: tuple[str, float]
     linear: tuple[str, float]
 
 
-_POSITION = _Panel(("angle [deg]", np.degrees(1.0)), ("position [m]", 1.0))
-_VELOCITY = _Panel(("velocity [deg/s]", np.degrees(1.0)), ("velocity [m/s]", 1.0))
-_EFFORT = _Panel(("torque [N m]", 1.0), ("force [N]", 1.0))
+_POSITION = _Panel(KINDS.index("q"), ("angle [deg]", np.degrees(1.0)), ("position [m]", 1.0))
+_VELOCITY = _Panel(KINDS.index("v"), ("velocity [deg/s]", np.degrees(1.0)), ("velocity [m/s]", 1.0))
+_EFFORT = _Panel(KINDS.index("tau"), ("torque [N m]", 1.0), ("force [N]", 1.0))
 
 
 def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
@@ -89,14 +95,18 @@ def plot_swept_surface(
 
 
 def motion_figure(trajectory: Trajectory) -> Figure:
-    """Positions, velocities and efforts over time, one line per coordinate, nodes as marks."""
+    """Positions, velocities and efforts over time, one line per coordinate, nodes as marks.
+
+    Limits that the motion was planned under are bands, where they are near enough to be seen
+    beside the curves; a curve is wider where it leans on one.
+    """
     curve = _sampled(trajectory)
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     axes = figure.subplots(3, sharex=True)
     q = _coordinates(trajectory.robot, curve.motion.q)
     values = (q, curve.motion.v, curve.motion.tau)
     for ax, panel, y in zip(axes, (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
-        _draw(ax, trajectory, panel, curve.t, y)
+        _draw(ax, trajectory, panel, curve, y)
     axes[-1].set_xlabel("time [s]")
     _legend(figure, axes[0])
     return figure
@@ -107,7 +117,7 @@ def angles_figure(trajectory: Trajectory) -> Figure:
     curve = _sampled(trajectory)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     ax = figure.subplots()
-    _draw(ax, trajectory, _POSITION, curve.t, _coordinates(trajectory.robot, curve.motion.q))
+    _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory.robot, curve.motion.q))
     ax.set_xlabel("time [s]")
     _legend(figure, ax)
     return figure
@@ -211,33 +221,45 @@ def _sampled(trajectory: Trajectory) -> _Curve:
     s = np.linspace(0.0, 1.0, max(3, -(-_POINTS // N) + 1))
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
     t = trajectory.t[:-1, None] + trajectory.grid.steps[:, None] * s
-    return _Curve(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)))
+    limits = imposed_limits(trajectory)
+    active: Mask = np.zeros((N, len(s), 4, motion.v.shape[1]), dtype=bool)
+    if limits is not None:
+        active = at_limit(limits, motion, trajectory.robot).reshape(active.shape)
+    return _Curve(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)), limits, active)
 
 
-def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, t: Array, y: Array) -> None:
+def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _Curve, y: Array) -> None:
     """One line per coordinate; linear ones on an axis of their own, at the right if need be."""
     robot = trajectory.robot
     if robot is None:  # nobody knows which coordinates are angles: no conversion
         label = f"{panel.angular[0].split(' [')[0]} [SI]".replace("angle", "position")
-        _lines(ax, trajectory, t, y, np.arange(y.shape[-1]))
+        _lines(ax, trajectory, panel.kind, curve, y, 1.0, np.arange(y.shape[-1]))
         _dress(ax, label)
         return
     angular, side = _is_angular(robot), ax
     for mask, (label, scale) in ((angular, panel.angular), (~angular, panel.linear)):
         if mask.any():
             side = ax.twinx() if side.lines else ax
-            _lines(side, trajectory, t, scale * y, np.flatnonzero(mask))
+            _lines(side, trajectory, panel.kind, curve, y, scale, np.flatnonzero(mask))
             _dress(side, label)
             if side is not ax:
                 side.grid(False)
 
 
 def _lines(
-    ax: Axes, trajectory: Trajectory, t: Array, y: Array, members: npt.NDArray[np.intp]
+    ax: Axes,
+    trajectory: Trajectory,
+    kind: int,
+    curve: _Curve,
+    y: Array,
+    scale: float,
+    members: npt.NDArray[np.intp],
 ) -> None:
+    t, y = curve.t, scale * y
     looks = [(c, style) for style, c in itertools.product(_STYLES, _COLORS)]
     gap = np.full((len(t), 1), np.nan)
     broken = np.hstack([t, gap]).ravel()
+    limited: list[Curve] = []
     for i in members:
         color, style = looks[i % len(looks)]
         name = trajectory.coordinate_names[i]
@@ -246,6 +268,12 @@ def _lines(
         if len(t) <= _MOST_MARKS:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)
+        if curve.limits is not None:
+            lower, upper = curve.limits.lower[kind, i], curve.limits.upper[kind, i]
+            active = np.hstack([curve.active[:, :, kind, i], np.isinf(gap)]).ravel()
+            limited.append(Curve(name, color, broken, line, scale * lower, scale * upper, active))
+    if limited:
+        draw_limits(ax, limited)
     ax.set_xlim(0.0, trajectory.duration)
 
 
@@ -259,6 +287,7 @@ def _legend(figure: Figure, ax: Axes) -> None:
     """One legend above the figure, for the lines of all axes that share the first panel."""
     shared: Iterable[Axes] = [a for a in figure.axes if a.bbox.bounds == ax.bbox.bounds]
     pairs = [pair for a in shared for pair in zip(*a.get_legend_handles_labels(), strict=True)]
+    pairs += legend_entries(figure.axes)
     handles, labels = zip(*pairs, strict=True)
     columns = min(len(labels), 4)
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)

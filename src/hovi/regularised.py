@@ -9,7 +9,7 @@ coordinates through h = 0, where (x0, x1) are not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import factorial
 
 import numpy as np
@@ -47,14 +47,24 @@ class Regularised:
         return self.h ** np.arange(self.k, 0.0, -1.0)
 
     @cached_property
+    def gamma(self) -> Array:
+        """gamma^[k] of z = gamma w, shape (k, k)."""
+        return gamma(self.k)
+
+    @cached_property
+    def inverse_gamma(self) -> Array:
+        """Its inverse."""
+        return inverse_gamma(self.k)
+
+    @cached_property
     def moments(self) -> Array:
         """S gamma of x1 = T x0 + S gamma w, shape (k, k)."""
-        return self.scale[:, None] * gamma(self.k)
+        return np.asarray(self.scale[:, None] * self.gamma)
 
     @cached_property
     def from_ends(self) -> Array:
         """Matrix of w = A (x0, x1), shape (k, 2 k)."""
-        unscaled = inverse_gamma(self.k) / self.scale
+        unscaled = self.inverse_gamma / self.scale
         return np.concatenate([-unscaled @ self.taylor, unscaled], axis=1)
 
     def end(self, x0: Array, w: Array) -> Array:
@@ -67,11 +77,11 @@ class Regularised:
 
     def z(self, w: Array) -> Array:
         """z = gamma w, the coordinates that a trajectory stores."""
-        return np.asarray(gamma(self.k) @ w)
+        return np.asarray(self.gamma @ w)
 
     def w_of_z(self, z: Array) -> Array:
         """w = gamma^-1 z; for k = 2: w1 = z1 and w0 = 2 sqrt(3) (z0 - z1 / 2)."""
-        return np.asarray(inverse_gamma(self.k) @ z)
+        return np.asarray(self.inverse_gamma @ z)
 
     def w(self, x0: Array, x1: Array) -> Array:
         """w from the two ends; it loses what their difference loses, eps |q| / h^k."""
@@ -84,3 +94,9 @@ class Regularised:
             for i in range(1, self.k - j):
                 T[j, j + i] = h**i / factorial(i)
         return T
+
+
+@lru_cache(maxsize=256)
+def regularised(k: int, h: float) -> Regularised:
+    """The change of coordinates of intervals of length h, made once."""
+    return Regularised(k, h)

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi.regularised import Regularised
-from hovi.schemes import Scheme, gamma, inverse_gamma
+from hovi.regularised import Regularised, regularised
+from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class Segment:
     @property
     def regularised(self) -> Regularised:
         """The change between (x0, w) and (x0, x1)."""
-        return Regularised(self.k, self.h)
+        return regularised(self.k, self.h)
 
     @cached_property
     def x1(self) -> Array:
@@ -65,7 +65,7 @@ class Segment:
     @cached_property
     def p1(self) -> Array:
         """Momenta at the end, D_{k+1} .. D_2k of L_d, shape (B, k, n)."""
-        dz = inverse_gamma(self.k).T @ self.gradient[:, self.k : 2 * self.k]
+        dz = self.regularised.inverse_gamma.T @ self.gradient[:, self.k : 2 * self.k]
         return np.asarray(self.h * dz / self.regularised.scale[:, None])
 
     @cached_property
@@ -143,7 +143,7 @@ class Segment:
     def _back(self) -> Array:
         """gamma^T S T^-T (x) I: how forces along the interval enter the equations of w."""
         R = self.regularised
-        back = gamma(self.k).T @ (R.scale[:, None] * R.inverse_taylor.T)
+        back = R.gamma.T @ (R.scale[:, None] * R.inverse_taylor.T)
         return np.asarray(np.kron(back, np.eye(self.x0.shape[2])))
 
 

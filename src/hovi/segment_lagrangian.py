@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,8 @@ from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
 from hovi.lagrangian import Lagrangian
 from hovi.newton import newton
-from hovi.regularised import Regularised
-from hovi.schemes import Scheme, gamma
+from hovi.regularised import Regularised, regularised
+from hovi.schemes import Scheme
 from hovi.segment import Segment, flat
 
 Array = npt.NDArray[np.float64]
@@ -47,7 +47,7 @@ class SegmentLagrangian(ABC):
     @property
     def regularised(self) -> Regularised:
         """The change between (x0, w) and (x0, x1)."""
-        return _regularised(self.k, self.h)
+        return regularised(self.k, self.h)
 
     @abstractmethod
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
@@ -140,7 +140,7 @@ class SchemeLagrangian(SegmentLagrangian):
     def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
         """Newton on (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, where x0 follows from w."""
         B, m, R = len(x1), self.k * self.n, self.regularised
-        given = (gamma(self.k).T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
+        given = (R.gamma.T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
         moved = np.kron(R.inverse_taylor @ R.moments, np.eye(self.n))
 
         def system(u: Array) -> tuple[Array, Array]:
@@ -168,7 +168,7 @@ class SchemeLagrangian(SegmentLagrangian):
     def table(self) -> Array:
         """(q, q', ..., q^(k)) at the points over (x0, w, c), shape (Q, k + 1, 2 k + r)."""
         k, table = self.k, np.array(self.scheme.regular_table)
-        table[:, :, k : 2 * k] = table[:, :, k : 2 * k] @ gamma(k)
+        table[:, :, k : 2 * k] = table[:, :, k : 2 * k] @ self.regularised.gamma
         columns = np.concatenate([np.arange(k), np.full(k + self.scheme.inner_modes, k)])
         powers = columns - np.arange(k + 1)[:, None]
         return np.where(table == 0, 0.0, table * self.h ** np.where(table == 0, 0, powers))
@@ -219,7 +219,7 @@ class SchemeLagrangian(SegmentLagrangian):
     @cached_property
     def _back(self) -> Array:
         R = self.regularised
-        return np.asarray(gamma(self.k).T @ (R.scale[:, None] * R.inverse_taylor.T))
+        return np.asarray(R.gamma.T @ (R.scale[:, None] * R.inverse_taylor.T))
 
     @cached_property
     def _back_n(self) -> Array:
@@ -253,8 +253,3 @@ def check_segment(lagrangian: Lagrangian, h: float) -> None:
             "a discrete flow needs joints whose configurations are vectors (nq = nv); lock the "
             "others with load_robot(..., locked=[...])."
         )
-
-
-@lru_cache(maxsize=256)
-def _regularised(k: int, h: float) -> Regularised:
-    return Regularised(k, h)

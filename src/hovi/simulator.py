@@ -15,7 +15,7 @@ from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import CasadiLagrangian
 from hovi.lagrangians import ForcedLagrangian, Torque, mechanics, scene_force
-from hovi.legendre import hamiltonian, highest_derivative, legendre
+from hovi.legendre_transforms import hamiltonian, highest_derivative, legendre
 from hovi.scene import Scene
 from hovi.schemes import galerkin
 from hovi.segment_lagrangian import SchemeLagrangian
@@ -88,7 +88,7 @@ def simulate(
 ) -> Simulation:
     """The motion of a scene's robot from a state, by a symplectic integrator of order 2 (r + 1).
 
-    scene: what is simulated. start: a State, or a configuration of shape (nq,) at rest.
+    scene: what is simulated; potentials that effects add to a cost are no forces. start: a State, or a configuration of shape (nq,) at rest.
     duration: in [s]. torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques
     of a plan; none when not given.
     intervals: N. inner_modes: r, from 0 (the midpoint rule).

@@ -20,7 +20,7 @@ from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import EffortLagrangian
-from hovi.legendre import hamiltonian
+from hovi.legendre_transforms import hamiltonian
 from hovi.scene import Scene
 from hovi.segment import Segment
 from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian

@@ -19,7 +19,7 @@ import pinocchio as pin
 
 from hovi.errors import InputError, SceneError
 from hovi.lagrangian import Lagrangian
-from hovi.legendre import total_derivative
+from hovi.legendre_transforms import total_derivative
 from hovi.point_function import PointFunction
 from hovi.rigid_body import casadi_functions
 from hovi.scene import Scene

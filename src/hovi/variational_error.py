@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
 from hovi.lagrangian import Lagrangian
-from hovi.legendre import legendre
+from hovi.legendre_transforms import legendre
 from hovi.schemes import Scheme
 from hovi.segment_lagrangian import SchemeLagrangian
 

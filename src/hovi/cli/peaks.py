@@ -22,7 +22,7 @@ class Peaks:
 
     names: of the coordinates.
     q_low, q_high: range of q, in [rad] or [m]; NaN for joints with nq != nv.
-    v, tau: largest |v| and |tau|.
+    v, a, tau: largest |v|, |a| and |tau|.
     lower, upper, v_limit, tau_limit: what the URDF states; infinite where it states nothing.
     """
 
@@ -30,6 +30,7 @@ class Peaks:
     q_low: Array
     q_high: Array
     v: Array
+    a: Array
     tau: Array
     lower: Array
     upper: Array
@@ -47,7 +48,7 @@ class Peaks:
 
 
 def peaks(trajectory: Trajectory) -> Peaks:
-    """Extremes of q, v and tau, from up to 20 samples per interval."""
+    """Extremes of q, v, a and tau, from up to 20 samples per interval."""
     N = trajectory.grid.intervals
     per_interval = max(1, min(SAMPLES_PER_INTERVAL, MOST_SAMPLES // N))
     s = np.linspace(0.0, 1.0, per_interval + 1)
@@ -62,9 +63,9 @@ def peaks(trajectory: Trajectory) -> Peaks:
     if robot is not None:
         lower[in_v], upper[in_v] = -_stated(-robot.lower[in_q]), _stated(robot.upper[in_q])
         v_limit, tau_limit = _known(robot.velocity_limit), _known(robot.effort_limit)
-    v, tau = np.abs(motion.v).max(axis=0), np.abs(motion.tau).max(axis=0)
+    v, a, tau = (np.abs(x).max(axis=0) for x in (motion.v, motion.a, motion.tau))
     names = trajectory.coordinate_names
-    return Peaks(names, low, high, v, tau, lower, upper, v_limit, tau_limit)
+    return Peaks(names, low, high, v, a, tau, lower, upper, v_limit, tau_limit)
 
 
 def _plain_coordinates(robot: Robot) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from hovi.trajectory import Trajectory
 
 GUESSES = ("cubic", "minimum-jerk")
+LIMITS = ("urdf", "none")
 
 
 def plan(
@@ -22,6 +23,9 @@ def plan(
     scheme: Annotated[str | None, typer.Option(help="Instead of the scene's.")] = None,
     intervals: Annotated[int | None, typer.Option(help="Instead of the scene's.")] = None,
     starts: Annotated[int | None, typer.Option(help="How many guesses are tried.")] = None,
+    limits: Annotated[
+        str | None, typer.Option(metavar="urdf|none", help="Instead of the scene's.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Of the random guesses.")] = None,
     time_limit: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Keep the best found by then.")
@@ -40,15 +44,24 @@ def plan(
     Exit code 0 for a minimum, 1 when none was found, 2 for bad input.
     """
     from hovi.cli.files import check_output
-    from hovi.errors import InputError
+    from hovi.errors import InputError, nearest
 
     if tolerance is not None:
         raise InputError("--tolerance is not available yet; choose --scheme and --intervals.")
     if time_limit is not None and not 0 < time_limit < float("inf"):
         raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    if limits not in (None, *LIMITS):
+        hint = nearest(limits, LIMITS)
+        raise InputError(f"--limits {limits!r}: {hint} Others are given in the scene file.")
     if out is not None:
         check_output(out, ".npz")
-    chosen = {"scheme": scheme, "intervals": intervals, "starts": starts, "seed": seed}
+    chosen = {
+        "scheme": scheme,
+        "intervals": intervals,
+        "starts": starts,
+        "seed": seed,
+        "limits": limits,
+    }
     task = _task(scene, {key: value for key, value in chosen.items() if value is not None})
     raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json))
 

@@ -12,6 +12,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.peaks import Peaks, peaks
 from hovi.solver import Solution
 from hovi.task_file import Task
@@ -19,7 +20,8 @@ from hovi.task_file import Task
 
 def as_json(solution: Solution, task: Task, out: Path | None) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
-    extremes = None if solution.trajectory is None else peaks(solution.trajectory)
+    trajectory = solution.trajectory
+    room = closeness(trajectory)
     fields = {
         "success": bool(solution.success),
         "status": str(solution.status),
@@ -27,7 +29,7 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "cost": solution.cost,
         "error_estimate": solution.error_estimate,
         "scheme": task.scheme,
-        "intervals": task.intervals,
+        "intervals": trajectory.grid.intervals,
         "nit": solution.nit,
         "n_neg": solution.n_neg,
         "setup_seconds": solution.setup_seconds,
@@ -35,7 +37,9 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "starts": task.starts,
         "seed": task.seed,
         "minima": list(solution.minima),
-        "peaks": None if extremes is None else _peaks_json(extremes),
+        "peaks": _peaks_json(peaks(trajectory)),
+        "limits": None if room is None else room.by_kind(),
+        "excess": None if room is None else room.excess,
         "out": None if out is None else str(out),
     }
     return json.dumps(_finite(fields), allow_nan=False)
@@ -45,12 +49,15 @@ def print_report(solution: Solution, task: Task, out: Path | None) -> None:
     """A summary, the peaks of the motion, and where it was written, on stdout."""
     for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
-    if solution.trajectory is not None:
-        extremes = peaks(solution.trajectory)
-        console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
+    extremes, room = peaks(solution.trajectory), closeness(solution.trajectory)
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
+    if room is not None:
+        console.print(_room_table(extremes, room))
+        print(_room_note(room))
+    else:
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
-            print("! beyond a limit of the URDF: limits are not enforced yet.")
+            print("! beyond a limit of the URDF: the motion was planned without it.")
     if out is not None:
         print(f"wrote {out}")
 
@@ -62,7 +69,7 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("cost", f"{solution.cost:.10g}"),
         ("n_neg", f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
-        ("scheme", f"{task.scheme} on {task.intervals} intervals"),
+        ("scheme", f"{task.scheme} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
     if len(solution.minima) > 1:
@@ -70,6 +77,37 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
         rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
     return rows
+
+
+def _intervals(solution: Solution, task: Task) -> str:
+    taken = solution.trajectory.grid.intervals
+    asked = "" if taken == task.intervals else f" ({task.intervals} asked for)"
+    return f"{taken} intervals{asked}"
+
+
+def _room_table(extremes: Peaks, room: Closeness) -> Table:
+    """The extremes of each output that is limited, each with what is left to its limit."""
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("joint", overflow="fold")
+    values = {
+        "q": [_range(*ends) for ends in zip(extremes.q_low, extremes.q_high, strict=True)],
+        "v": [_short(each) for each in extremes.v],
+        "a": [_short(each) for each in extremes.a],
+        "tau": [_short(each) for each in extremes.tau],
+    }
+    shown = [kind for kind in values if kind != "a" or room.is_limited("a")]
+    for kind in shown:
+        table.add_column(kind if kind == "q" else f"|{kind}|", justify="right")
+        table.add_column("room", justify="right")
+    for i, name in enumerate(extremes.names):
+        cells = [(values[kind][i], room.in_words(kind, i)) for kind in shown]
+        table.add_row(name, *(cell for pair in cells for cell in pair))
+    return table
+
+
+def _room_note(room: Closeness) -> str:
+    note = "room: what is left to the nearest limit, in percent of the range; * at a limit"
+    return note + (", ! beyond one." if room.exceeded else ".")
 
 
 def _peaks_table(extremes: Peaks) -> Table:

@@ -15,12 +15,24 @@ def describe_task(task: Task) -> str:
     lines = [
         f"task {task.name!r}: {task.duration:g} s, {task.scheme} on {task.intervals} intervals"
     ]
-    lines.append(f"starts {task.starts}, seed {task.seed}, limits {task.limits}")
+    lines.append(f"starts {task.starts}, seed {task.seed}, limits {_limits(task)}")
     for name, state in (("start", task.start), ("goal", task.goal)):
         q, v = state.on(robot, name)
         lines.append(f"{name} q = {_numbers(q)}")
         lines.append(f"{name} v = {_numbers(v)}")
     return "\n".join([*lines, "", task.scene.describe(), "", robot.describe()])
+
+
+def _limits(task: Task) -> str:
+    from hovi.limits import Limits
+
+    if isinstance(task.limits, str):
+        return task.limits
+    if isinstance(task.limits, Limits):
+        return "given"
+    base = task.limits.get("base", "urdf")
+    given = [f"{key} = {value}" for key, value in task.limits.items() if key != "base"]
+    return "; ".join([base, *given])
 
 
 def _numbers(values: Iterable[float]) -> str:

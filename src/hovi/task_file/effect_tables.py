@@ -29,7 +29,7 @@ def read_effects(
 
 def effect_table(effect: Effect) -> dict[str, Any]:
     """The table that `read_effects` reads back as this effect."""
-    return {field.name: _plain(getattr(effect, field.name)) for field in fields(effect)}
+    return {field.name: plain(getattr(effect, field.name)) for field in fields(effect)}
 
 
 def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlText) -> Effect:
@@ -95,10 +95,10 @@ def _in_words(hint: Any) -> str:
     return "a value of the right type"
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """The value as TOML can hold it."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
+        return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):
         return value.tolist()
-    return [_plain(each) for each in value] if isinstance(value, (list, tuple)) else value
+    return [plain(each) for each in value] if isinstance(value, (list, tuple)) else value

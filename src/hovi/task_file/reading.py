@@ -17,9 +17,10 @@ from hovi.scene import Scene
 from hovi.schemes import by_name
 from hovi.state import State
 from hovi.task_file.effect_tables import read_effects
+from hovi.task_file.limit_tables import read_limits
 from hovi.task_file.schema import EndTable, TaskTable
 from hovi.task_file.sentences import TomlText, first_sentence
-from hovi.task_file.task import LIMITS_SENTENCE, Task
+from hovi.task_file.task import Task
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,7 @@ def load_task(path: str | Path) -> Task:
         intervals=table.scheme.intervals,
         starts=table.starts,
         seed=table.seed,
+        limits=read_limits(table.limits, robot, toml),
         name=toml.path.stem,
     )
 
@@ -84,8 +86,6 @@ def _syntax_sentence(toml: TomlText, reason: str) -> str:
 
 def _check_names(table: TaskTable, toml: TomlText) -> None:
     """What can be refused before a robot is loaded."""
-    if table.limits != "none":
-        raise toml.error(("limits",), LIMITS_SENTENCE)
     try:
         by_name(table.scheme.name)
     except SchemeError as unknown:

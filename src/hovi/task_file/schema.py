@@ -5,7 +5,7 @@ The description of a field ends the sentence "`key` must be ...".
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
 
@@ -28,6 +28,22 @@ Coordinates = Annotated[
     ],
     Discriminator(_kind),
 ]
+
+
+Bound = Annotated[
+    Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")],
+    Discriminator(_kind),
+]
+Bounds = Annotated[
+    Annotated[float, Tag("<number>")]
+    | Annotated[list[Bound], Tag("<list>")]
+    | Annotated[dict[str, Bound], Tag("<table>")],
+    Discriminator(_kind),
+]
+_BOUNDS = (
+    "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
+    "or a table of joint names"
+)
 
 
 class Table(BaseModel):
@@ -59,6 +75,20 @@ class SchemeTable(Table):
     )
 
 
+class LimitsTable(Table):
+    """[limits]."""
+
+    base: Literal["urdf", "none"] = Field(default="urdf", description='"urdf" or "none"')
+    q: Bounds | None = Field(default=None, description=_BOUNDS)
+    v: Bounds | None = Field(default=None, description=_BOUNDS)
+    a: Bounds | None = Field(default=None, description=_BOUNDS)
+    tau: Bounds | None = Field(default=None, description=_BOUNDS)
+    margin: FiniteFloat = Field(
+        default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
+    )
+    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="a positive share of the range")
+
+
 class TaskTable(Table):
     """The whole file."""
 
@@ -71,7 +101,7 @@ class TaskTable(Table):
     )
     free_flyer: bool = Field(default=False, description="true or false")
     duration: FiniteFloat = Field(gt=0, description="a positive number of seconds")
-    limits: Any = Field(default="none", description='"none"')
+    limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
     starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
     seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
     start: EndTable = Field(description="a table [start] with q and, if moving, v")

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
-from hovi.errors import InputError, SceneError
+from hovi.errors import InputError
+from hovi.limits import Limits, as_limits
 from hovi.scene import Scene
 from hovi.schemes import by_name
 from hovi.state import State
 
 MOST_INTERVALS = 1_000_000
-LIMITS_SENTENCE = (
-    'limits are not enforced yet; write limits = "none" and compare the peaks of the motion '
-    "with the limits of the robot."
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,7 @@ class Task:
     intervals: number N of intervals of equal length.
     starts: number of guesses that are tried.
     seed: seed of the random guesses.
-    limits: "none"; limits are not enforced yet.
+    limits: what `hovi.plan` takes: "urdf", "none", a Limits, or a mapping as as_limits takes it.
     name: what the task is called in reports.
     """
 
@@ -40,11 +39,11 @@ class Task:
     intervals: int = 16
     starts: int = 1
     seed: int = 0
-    limits: str = "none"
+    limits: str | Limits | Mapping[str, Any] = "urdf"
     name: str = "task"
 
     def __post_init__(self) -> None:
-        """Refuse numbers that make no task, and schemes that do not exist."""
+        """Refuse numbers that make no task, limits that do not fit, and unknown schemes."""
         if not (math.isfinite(self.duration) and self.duration > 0):
             raise InputError(f"duration must be a positive number of seconds, not {self.duration}.")
         if not 1 <= self.intervals <= MOST_INTERVALS:
@@ -55,6 +54,5 @@ class Task:
             raise InputError(f"starts must be 1 or more, not {self.starts}.")
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}.")
-        if self.limits != "none":
-            raise SceneError(LIMITS_SENTENCE)
+        as_limits(self.scene.robot, self.limits)
         by_name(self.scheme)

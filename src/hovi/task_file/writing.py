@@ -14,6 +14,7 @@ from tomlkit.items import Table
 from hovi.errors import SceneError
 from hovi.robot_source import RobotSource
 from hovi.task_file.effect_tables import effect_table
+from hovi.task_file.limit_tables import limits_value
 from hovi.task_file.task import Task
 from hovi.whole_file import reason, whole_file
 
@@ -47,9 +48,13 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     if source.free_flyer:
         document["free_flyer"] = True
     document["duration"] = float(task.duration)
-    document["limits"] = task.limits
+    limits = limits_value(task.limits, task.scene.robot)
+    if isinstance(limits, str):
+        document["limits"] = limits
     document["starts"] = task.starts
     document["seed"] = task.seed
+    if isinstance(limits, dict):
+        document["limits"] = _table(limits)
     for name, state in (("start", task.start), ("goal", task.goal)):
         q, v = state.on(task.scene.robot, name)
         document[name] = _table({"q": _floats(q)} | ({"v": _floats(v)} if np.any(v) else {}))

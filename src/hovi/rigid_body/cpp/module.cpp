@@ -34,7 +34,7 @@ void torque(InverseDynamicsKernel& self, const Input& q, const Input& v, const I
   const Points points = points_of(q, v, a);
   const Expansion out{tau.data()};
   const nb::gil_scoped_release released;
-  self.torque(points, out, threads);
+  self.expand(points, {}, out, threads);
 }
 
 void linearize(InverseDynamicsKernel& self, const Input& q, const Input& v, const Input& a,
@@ -42,7 +42,7 @@ void linearize(InverseDynamicsKernel& self, const Input& q, const Input& v, cons
   const Points points = points_of(q, v, a);
   const Expansion out{tau.data(), jacobian.data()};
   const nb::gil_scoped_release released;
-  self.linearize(points, out, threads);
+  self.expand(points, {}, out, threads);
 }
 
 void expand(InverseDynamicsKernel& self, const Input& q, const Input& v, const Input& a,
@@ -50,15 +50,15 @@ void expand(InverseDynamicsKernel& self, const Input& q, const Input& v, const I
             const Array<double, 2>& tau, const Array<double, 3>& jacobian,
             const Array<double, 3>& hessian, int threads) {
   const Points points = points_of(q, v, a);
-  const double* lambda = curvature ? curvature->data() : nullptr;
+  const hovi::Multipliers multipliers{weight.data(), curvature ? curvature->data() : nullptr};
   const Expansion out{tau.data(), jacobian.data(), hessian.data()};
   const nb::gil_scoped_release released;
-  self.expand(points, weight.data(), lambda, out, threads);
+  self.expand(points, multipliers, out, threads);
 }
 
 double time_pinocchio_calls(const std::string& archive, const Input& q, const Input& v,
                             const Input& a, int repeats) {
-  return InverseDynamicsKernel(archive).time_pinocchio_calls(points_of(q, v, a), repeats);
+  return hovi::time_pinocchio_calls(archive, points_of(q, v, a), repeats);
 }
 
 }  // namespace
@@ -77,7 +77,7 @@ NB_MODULE(_core, m) {
       .def("frame_placement", &SymbolicModel::frame_placement, "frame"_a);
 
   nb::class_<InverseDynamicsKernel>(m, "InverseDynamicsKernel")
-      .def(nb::init<const std::string&>(), "archive"_a)
+      .def(nb::init<const std::string&, bool>(), "archive"_a, "portable"_a = false)
       .def("torque", &torque, "q"_a, "v"_a, "a"_a, "tau"_a, "threads"_a)
       .def("linearize", &linearize, "q"_a, "v"_a, "a"_a, "tau"_a, "jacobian"_a, "threads"_a)
       .def("expand", &expand, "q"_a, "v"_a, "a"_a, "weight"_a, "curvature"_a.none(), "tau"_a,

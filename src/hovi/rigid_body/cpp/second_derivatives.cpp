@@ -1,11 +1,12 @@
 #include <pinocchio/algorithm/rnea-second-order-derivatives.hpp>
 
-#include "worker.hpp"
+#include "pinocchio_calls.hpp"
 
 namespace hovi {
 
-// The tensors' zeros are those of the kinematic tree: set once, when data was made.
-void Worker::second_derivatives() {
+void PinocchioCalls::second_derivatives() {
+  for (auto* tensor : {&data.d2tau_dqdq, &data.d2tau_dvdv, &data.d2tau_dqdv, &data.d2tau_dadq})
+    tensor->setZero();  // as Pinocchio's own overload does
   pinocchio::ComputeRNEASecondOrderDerivatives(model, data, q, v, a, data.d2tau_dqdq,
                                                data.d2tau_dvdv, data.d2tau_dqdv, data.d2tau_dadq);
 }

@@ -1,0 +1,89 @@
+"""Sphinx: the pages of this folder, the examples as a gallery, docstrings as they were written."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.errors import SphinxError
+
+import hovi
+
+TOP = Path(__file__).resolve().parents[1]
+
+project = "hovi"
+author = "the hovi developers"
+release = hovi.__version__
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["_build", "tables", "gallery/**/*.ipynb", "gallery/**/*.py"]
+html_theme = "furo"
+html_title = "hovi"
+
+myst_enable_extensions = ["dollarmath", "amsmath"]
+myst_heading_anchors = 3
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+
+sphinx_gallery_conf = {
+    "examples_dirs": ["../examples"],
+    "gallery_dirs": ["gallery"],
+    "ignore_pattern": r"^(?!\d\d_)",  # benchmarks are not examples
+    "within_subsection_order": "FileNameSortKey",
+    "nested_sections": False,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+}
+
+KEY = re.compile(r"\[([A-Za-z]+\d{4})[],; ]|; ([A-Za-z]+\d{4})[],; ]")
+
+
+def check_references(app: Sphinx) -> None:
+    """Every source that a docstring names is in references.md."""
+    listed = (TOP / "docs" / "references.md").read_text()
+    for path in sorted((TOP / "src").rglob("*.py")):
+        for match in KEY.finditer(path.read_text()):
+            key = match[1] or match[2]
+            if f"[{key}]" not in listed:
+                raise SphinxError(f"{path.name} refers to [{key}], which references.md lacks")
+
+
+def as_written(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
+    """Docstrings are prose with formulas, not reStructuredText: show them as they are."""
+    if lines:
+        lines[:] = [".. code-block:: none", "", *(f"   {line}" for line in lines)]
+
+
+def no_substitutions(app: Sphinx, docname: str, source: list[str]) -> None:
+    """|tau| in the prose of an example is a norm, not a substitution."""
+    if docname.startswith("gallery/"):
+        lines = source[0].split("\n")
+        source[0] = "\n".join(x if x.startswith(" ") else x.replace("|", r"\|") for x in lines)
+
+
+def list_names(app: Sphinx, docname: str, source: list[str]) -> None:
+    """The reference page: one entry per public name, whatever they are today."""
+    if docname != "api":
+        return
+    entries = []
+    for name in hovi.__all__:
+        value = getattr(hovi, name)
+        if inspect.isclass(value):
+            entries += [f".. autoclass:: hovi.{name}", "   :members:", ""]
+        elif inspect.isfunction(value):
+            entries += [f".. autofunction:: hovi.{name}", ""]
+    source[0] += "\n".join(["\n```{eval-rst}", *entries, "```\n"])
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("builder-inited", check_references)
+    app.connect("source-read", no_substitutions)
+    app.connect("source-read", list_names)
+    app.connect("autodoc-process-docstring", as_written)

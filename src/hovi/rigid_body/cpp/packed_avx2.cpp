@@ -1,0 +1,8 @@
+#define HOVI_LANES 4
+#include "packed_kernel.inl.hpp"
+
+namespace hovi {
+
+extern const PackedKernel packed_avx2{lanes, workspace_size, expand};
+
+}  // namespace hovi

@@ -1,0 +1,8 @@
+#define HOVI_LANES 2
+#include "packed_kernel.inl.hpp"
+
+namespace hovi {
+
+extern const PackedKernel packed_baseline{lanes, workspace_size, expand};
+
+}  // namespace hovi

@@ -1,0 +1,121 @@
+// From the joints' quantities to J and H: sums over pairs of joints, the second carrying the first.
+#pragma once
+
+#include "packed_recursions.hpp"
+
+namespace hovi {
+namespace {
+
+// Where each lane's point lies in the batch: the last pack repeats its last point.
+struct Lanes {
+  std::size_t point[lanes];
+};
+
+inline Lanes lanes_from(std::size_t first, std::size_t last) {
+  Lanes where;
+  for (int lane = 0; lane < lanes; ++lane)
+    where.point[lane] = first + lane < last ? first + lane : last - 1;
+  return where;
+}
+
+inline void gather(const double* array, const Lanes& where, int n, Pack* out) {
+  for (int lane = 0; lane < lanes; ++lane)
+    for (int i = 0; i < n; ++i) out[i][lane] = array[where.point[lane] * n + i];
+}
+
+inline void scatter(const Pack* values, const Lanes& where, std::size_t size, double* array) {
+  for (int lane = 0; lane < lanes; ++lane)
+    for (std::size_t i = 0; i < size; ++i) array[where.point[lane] * size + i] = values[i][lane];
+}
+
+inline Pack* entry(Pack* J, int n, int i, int j) { return J + 3 * (i * n + j); }
+
+// dtau_j/d(q,v,a)_i and dtau_i/d(q,v,a)_j where joint j carries joint i.
+__attribute__((noinline)) void jacobian(const TreeView& tree, Workspace& work) {
+  const int n = tree.n;
+  for (int i = 0; i < n; ++i) {
+    const Joint& joint = work.joints[i];
+    for (int j = i; j >= 0; j = tree.joints[j].parent) {
+      const Joint& carrier = work.joints[j];
+      Pack* upper = entry(work.J, n, j, i);
+      Pack* lower = entry(work.J, n, i, j);
+      lower[0] = dot(carrier.dS.w, joint.r) + dot(carrier.ddS, joint.c_a);
+      lower[1] = dot(carrier.S.w, joint.r) + 2.0 * dot(carrier.dS, joint.c_a);
+      upper[0] = dot(carrier.S, joint.c_q);
+      upper[1] = dot(carrier.S, joint.c_v);
+      upper[2] = lower[2] = dot(carrier.S, joint.c_a);
+    }
+    entry(work.J, n, i, i)[2] += broadcast(tree.joints[i].armature);
+  }
+}
+
+inline void scatter_jacobian(const Workspace& work, int n, const Lanes& where, double* out) {
+  for (int lane = 0; lane < lanes; ++lane) {
+    double* to = out + where.point[lane] * 3 * n * n;
+    for (int i = 0; i < n; ++i)
+      for (int k = 0; k < 3; ++k)
+        for (int j = 0; j < n; ++j) to[(3 * i + k) * n + j] = work.J[3 * (i * n + j) + k][lane];
+  }
+}
+
+// The block of d2 phi in (q, v, a)_i and (q, v, a)_j. tau is affine in a and quadratic in v: the
+// blocks va and aa vanish.
+inline void curvature_block(const Joint& i, const Joint& j, Pack block[9]) {
+  block[0] = dot(j.L, i.c_q) + dot(j.ddS, i.e) + dot(j.dS, i.h);  // qq
+  block[1] = dot(j.S, i.h) + 2.0 * dot(j.dS, i.e);                // q_i v_j
+  block[2] = dot(j.S, i.e);                                       // q_i a_j
+  block[3] = dot(j.L, i.c_v) + dot(j.dS, i.k);                    // v_i q_j
+  block[4] = dot(j.S, i.k);                                       // vv
+  block[6] = dot(j.L, i.c_a);                                     // a_i q_j
+}
+
+// Adds sum_k weight_k dtau_k/d(q,v,a)_i dtau_k/d(q,v,a)_j over the listed joints k.
+inline void gauss_newton_block(const Workspace& work, int n, int i, int j, const int* rows,
+                               int count, Pack block[9]) {
+  Pack sum[9];
+  for (int b = 0; b < 9; ++b) sum[b] = block[b];
+  for (int row = 0; row < count; ++row) {
+    const Pack* left = entry(work.weighted_J, n, rows[row], i);
+    const Pack* right = entry(work.J, n, rows[row], j);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) sum[3 * r + c] += left[r] * right[c];
+  }
+  for (int b = 0; b < 9; ++b) block[b] = sum[b];
+}
+
+// Both triangles from one, so that the result is symmetric to the last bit.
+inline void scatter_block(const Pack block[9], int n, int i, int j, const Lanes& where,
+                          double* out) {
+  const std::size_t width = 3 * n;
+  for (int lane = 0; lane < lanes; ++lane) {
+    double* H = out + where.point[lane] * width * width;
+    for (int r = 0; r < 3; ++r)
+      for (int c = i == j ? r : 0; c < 3; ++c)
+        H[(r * n + i) * width + c * n + j] = H[(c * n + j) * width + r * n + i] =
+            block[3 * r + c][lane];
+  }
+}
+
+__attribute__((noinline)) void hessian(const TreeView& tree, Workspace& work, bool curved,
+                                       const Lanes& where, double* out) {
+  const int n = tree.n;
+  for (int k = 0; k < n; ++k)
+    for (int c = 0; c < 3 * n; ++c)
+      work.weighted_J[3 * n * k + c] = work.weight[k] * work.J[3 * n * k + c];
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j) {
+      Pack block[9] = {};
+      // Both move the same bodies only when one carries the other; the torques that depend on
+      // both are those of their common carriers, and then also of what the farther one carries.
+      const int meeting = tree.meeting[i * n + j];
+      const bool carried = meeting == j;
+      if (carried && curved) curvature_block(work.joints[i], work.joints[j], block);
+      const int* rows = carried ? tree.related + i * n : tree.carriers + (meeting + 1) * n;
+      const int count = carried ? tree.related_count[i] : tree.carrier_count[meeting + 1];
+      gauss_newton_block(work, n, i, j, rows, count, block);
+      scatter_block(block, n, i, j, where, out);
+    }
+}
+
+}  // namespace
+}  // namespace hovi

@@ -1,0 +1,22 @@
+// Pinocchio's own derivatives of RNEA, whose time is the yardstick of the kernel's.
+#pragma once
+
+#include <pinocchio/multibody.hpp>
+
+#include "points.hpp"
+
+namespace hovi {
+
+struct PinocchioCalls {
+  explicit PinocchioCalls(const pinocchio::Model& model);
+
+  void read_point(const Points& points, std::size_t point);
+  void first_derivatives();
+  void second_derivatives();
+
+  const pinocchio::Model& model;
+  pinocchio::Data data;
+  Eigen::VectorXd q, v, a;
+};
+
+}  // namespace hovi

@@ -1,0 +1,13 @@
+// Pinocchio's model as a tree of joints that turn about and slide along their z axis.
+#pragma once
+
+#include <string>
+
+#include "joint_tree.hpp"
+
+namespace hovi {
+
+// Every joint's axes must be fixed in its frame; a joint of several coordinates becomes as many.
+JointTree read_tree(const std::string& archive);
+
+}  // namespace hovi

@@ -1,0 +1,31 @@
+// What the packed algorithms read of a robot. Joint k comes after its parent.
+#pragma once
+
+namespace hovi {
+
+// The frame of a joint has the joint's axis as its z axis.
+struct TreeJoint {
+  int parent;             // -1: the base
+  double rotation[9];     // of this frame in the parent's, at q = 0, by columns
+  double translation[3];  // [m]
+  double turn;            // angle about z per unit of q: 1, or 0 for a sliding joint
+  double slide;           // displacement along z per unit of q [m]
+  double mass;            // of the body [kg]
+  double center[3];       // its center of mass in this frame [m]
+  double moment[6];       // integral of x x^T dm about the center [kg m^2]: xx xy xz yy yz zz
+  double armature;        // [kg m^2] or [kg]
+  double subtree_mass;    // of this body and all that it carries [kg]
+};
+
+struct TreeView {
+  int n;
+  const TreeJoint* joints;
+  double gravity[6];         // spatial acceleration of free fall: linear, angular
+  const int* meeting;        // (n, n): the last joint that carries both, or -1
+  const int* related;        // (n, n): row i lists the joints that carry i, i, and those i carries
+  const int* related_count;  // (n,)
+  const int* carriers;       // (n + 1, n): row i + 1 lists the joints that carry i, and i
+  const int* carrier_count;  // (n + 1,)
+};
+
+}  // namespace hovi
