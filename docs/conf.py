@@ -35,6 +35,7 @@ autodoc_member_order = "bysource"
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
+    "filename_pattern": r"/\d\d_",
     "ignore_pattern": r"^(?!\d\d_)",  # benchmarks are not examples
     "within_subsection_order": "FileNameSortKey",
     "nested_sections": False,

@@ -32,13 +32,14 @@ solution = hovi.plan(
     goal=[0.9, 0.3, -0.4, -1.2, 0.5, 2.2, -0.3],
     duration=1.5,
     intervals=32,
+    limits="none",
 )
 print(f"{solution.message} {solution.solve_seconds:.2f} s")
 assert solution.success
 
 # %%
-# The least-torque motion uses the arm's own swing and is wild. Compare it with the limits,
-# which are not enforced yet.
+# The least-torque motion uses the arm's own swing and, without limits, is wild. Compare it with
+# what the URDF allows, which `plan` keeps to unless told otherwise; the ninth example does.
 
 trajectory = solution.trajectory
 motion = trajectory.sample(np.linspace(0.0, trajectory.duration, 641))
@@ -58,6 +59,7 @@ careful = hovi.plan(
     goal=[0.9, 0.3, -0.4, -1.2, 0.5, 2.2, -0.3],
     duration=1.5,
     intervals=32,
+    limits="none",
     weight=[1, 1, 1, 1, 100, 100, 100],
 )
 wrist = abs(careful.trajectory.sample(np.linspace(0.0, 1.5, 641)).tau[:, 4:]).max()

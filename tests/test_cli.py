@@ -91,6 +91,8 @@ def test_json_is_one_object_with_the_promised_keys(run: Run) -> None:
     assert math.isclose(fields["cost"], 20.2088008, rel_tol=1e-6)
     assert all(isinstance(fields[key], (int, float)) for key in NUMBERS)
     assert list(fields["peaks"]) == ["shoulder", "elbow"]
+    assert fields["limits"] is None
+    assert fields["excess"] is None
 
 
 def test_options_take_the_place_of_what_the_scene_says(run: Run) -> None:
@@ -105,12 +107,61 @@ def test_options_take_the_place_of_what_the_scene_says(run: Run) -> None:
     ]
 
 
-def test_people_get_a_summary_and_the_peaks_beside_the_limits(run: Run) -> None:
+def test_without_limits_people_see_which_of_the_urdf_are_exceeded(run: Run) -> None:
     code, out, _ = run("plan", "ur5_reach")
     assert code == 0
     for fragment in ("minimum", "galerkin-2 on 16 intervals", "wrist_3_joint", "150"):
         assert fragment in out
-    assert "limits are not enforced yet" in out
+    assert "! beyond a limit of the URDF: the motion was planned without it." in out
+
+
+def test_with_limits_people_see_the_room_that_is_left(run: Run) -> None:
+    code, out, _ = run("plan", "ur5_reach_limited")
+    assert code == 0
+    assert "beyond" not in out
+    assert "* at a limit" in out
+    (row,) = [line for line in out.splitlines() if "elbow_joint" in line]
+    assert re.search(r"3\.14 +\*0\.0 %", row)  # its velocity, of 3.14 rad/s
+    (row,) = [line for line in out.splitlines() if "shoulder_lift_joint" in line]
+    assert "*" not in row
+
+
+def test_json_tells_how_close_each_limit_comes(run: Run, tmp_path: Path) -> None:
+    motion = tmp_path / "ur5.npz"
+    code, out, _ = run("plan", "ur5_reach_limited", "--json", "--out", motion)
+    fields = only_object(out)
+    assert code == 0
+    trajectory = Trajectory.load(motion)
+    assert fields["intervals"] == trajectory.grid.intervals
+    assert 0 <= fields["excess"] <= 1e-6
+    assert list(fields["limits"]) == ["q", "v", "a", "tau"]
+    for name, room in fields["limits"]["v"].items():
+        left = (3.14 - fields["peaks"][name]["v"]) / 6.28
+        assert math.isclose(room, left, abs_tol=1e-4)
+    assert set(fields["limits"]["a"].values()) == {None}
+
+
+def test_split_intervals_are_counted(run: Run) -> None:
+    fields = only_object(run("plan", "panda_reach_limited", "--json")[1])
+    assert fields["success"]
+    assert fields["intervals"] > 16
+
+
+def test_limits_are_overridden_by_a_word(run: Run) -> None:
+    fields = only_object(run("plan", "ur5_reach_limited", "--limits", "none", "--json")[1])
+    assert fields["limits"] is None
+    fields = only_object(run("plan", "two_link_reach", "--limits", "urdf", "--json")[1])
+    assert all(room > 0.4 for room in fields["limits"]["tau"].values())
+
+
+def test_a_goal_outside_the_limits_is_infeasible_with_the_reason(run: Run, tmp_path: Path) -> None:
+    text = REACH.replace('limits = "none"\n', "") + "[limits.q]\nelbow = 0.5\n"
+    code, out, _ = run("plan", scene(tmp_path, text), "--json")
+    fields = only_object(out)
+    assert (code, fields["status"]) == (1, "infeasible")
+    assert "goal" in fields["message"]
+    assert "'elbow'" in fields["message"]
+    assert "! beyond one" in run("plan", tmp_path / "scene.toml")[1]
 
 
 def test_a_written_motion_is_the_one_that_was_planned(motion: Path) -> None:
@@ -281,6 +332,7 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "no starts": (["plan", "two_link_reach", "--starts", "0"], ["starts"]),
     "scheme": (["plan", "two_link_reach", "--scheme", "galerkn-2"], ["'galerkin-2'"]),
     "guess": (["plan", "two_link_reach", "--guess", "cubik"], ["'cubic'"]),
+    "limits": (["plan", "two_link_reach", "--limits", "urd"], ["--limits", "'urdf'"]),
     "no such guess": (["plan", "two_link_reach", "--guess", "no.npz"], ["no.npz"]),
     "time limit": (["plan", "two_link_reach", "--time-limit", "nan"], ["--time-limit"]),
     "ending": (["plan", "two_link_reach", "--out", "motion.toml"], [".npz"]),

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import dataclasses
 import http.client
 import itertools
 import json
@@ -26,6 +27,7 @@ from headless_browser import CHROMIUM, Tab, headless_browser
 from hovi import playback
 from hovi.chain_urdf import chain
 from hovi.errors import DisplayError
+from hovi.limits import as_limits
 from hovi.playback import Replay, replay
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -40,6 +42,17 @@ needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not in
 @pytest.fixture(scope="module")
 def motion(two_link: Robot) -> Trajectory:
     return cubic_motion(Scene(two_link), seed=4)[0]
+
+
+def _speed_limit(motion: Trajectory, bound: float) -> dict[str, Any]:
+    assert motion.robot is not None
+    return as_limits(motion.robot, {"base": "none", "v": {"elbow": bound}}).to_dict()
+
+
+@pytest.fixture(scope="module")
+def limited_motion(motion: Trajectory) -> Trajectory:
+    """The same motion, under a limit of the elbow's velocity that it reaches after 1.3 s."""
+    return dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 5.0)})
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +92,13 @@ def colored(picture: Array) -> npt.NDArray[np.bool_]:
     """Pixels that are neither background nor grid nor the path of the tip."""
     blue_or_orange = np.abs(picture[..., 0] - picture[..., 2]) > 60
     return blue_or_orange
+
+
+def yellow(picture: Array) -> npt.NDArray[np.bool_]:
+    """Pixels in the color of links whose joint is at a limit."""
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    found: npt.NDArray[np.bool_] = (red > 120) & (green > 0.75 * red) & (blue < 0.4 * red)
+    return found
 
 
 # The page in a file
@@ -128,6 +148,63 @@ def test_loop_repeats_for_ever(motion: Trajectory, tmp_path: Path) -> None:
     (animation,) = (m for m in messages(tmp_path / "motion.html") if m["type"] == "set_animation")
     assert math.isinf(animation["options"]["repetitions"])
     assert "timeScale = 0.5;" in (tmp_path / "motion.html").read_text()
+
+
+def visibility(page: Path) -> dict[str, list[dict[str, Any]]]:
+    """Keys of the tracks that show and hide, by the node's path."""
+    (animation,) = (m for m in messages(page) if m["type"] == "set_animation")
+    return {
+        a["path"]: track["keys"]
+        for a in animation["animations"]
+        for track in a["clip"]["tracks"]
+        if track["name"] == ".visible"
+    }
+
+
+def test_links_stand_out_while_their_joint_is_at_a_limit(
+    limited_motion: Trajectory, tmp_path: Path
+) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert "at a limit" in (tmp_path / "motion.html").read_text()
+    robot, highlights = limited_motion.robot, shown.highlights
+    assert robot is not None
+    assert highlights is not None
+    elbow = robot.model.getJointId("elbow")
+    assert set(np.flatnonzero(highlights.flags.any(axis=0))) == {elbow}
+    tracks = visibility(tmp_path / "motion.html")
+    carried = [item for item in robot.visual.geometryObjects if item.parentJoint == elbow]  # type: ignore[union-attr]
+    assert len(tracks) == 2 * len(carried)
+    motion = limited_motion.sample(highlights.times)
+    at_bound = np.abs(motion.v[:, 1]) >= 5.0 - 1e-3 * 10.0
+    at_bound[-1] = False
+    np.testing.assert_array_equal(highlights.flags[:, elbow], at_bound)
+    for path, keys in tracks.items():
+        bright = path.endswith("at its limit")
+        assert [key["value"] for key in keys] == [not bright, bright, not bright]
+
+
+def test_links_look_as_before_at_the_end(limited_motion: Trajectory, tmp_path: Path) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert shown.highlights is not None
+    assert not shown.highlights.at(limited_motion.duration).any()
+
+
+def test_short_gaps_do_not_flicker() -> None:
+    flags = np.zeros((60, 1), dtype=bool)
+    flags[[10, 14, 15, 19, 40]] = True
+    bridged = playback._bridged(flags)[:, 0]
+    np.testing.assert_array_equal(np.flatnonzero(bridged), [*range(10, 20), 40])
+    edges = np.ones((5, 1), dtype=bool)
+    np.testing.assert_array_equal(playback._bridged(edges), edges)
+
+
+def test_a_motion_that_is_never_at_a_limit_is_drawn_once(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    far = dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 1e3)})
+    for name, trajectory in (("1.html", motion), ("2.html", far)):
+        assert replay(trajectory, html=tmp_path / name).highlights is None
+    assert (tmp_path / "1.html").read_bytes() == (tmp_path / "2.html").read_bytes()
 
 
 def test_the_trace_is_the_path_of_the_tip(motion: Trajectory, tmp_path: Path) -> None:
@@ -241,6 +318,26 @@ def test_playing_keeps_pace_and_ends_at_the_goal(
     assert shown[-1][0] == pytest.approx(motion.duration / speed, abs=0.02)
 
 
+def test_playing_shows_and_hides_links(limited_motion: Trajectory, tmp_path: Path) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert shown.highlights is not None
+    during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
+
+    def hidden() -> int:
+        drawn = [umsgpack.unpackb(message) for message in shown.page.messages]
+        flags = [
+            m["value"] for m in drawn if m.get("property") == "visible" and "/visuals/" in m["path"]
+        ]
+        assert len(flags) == 2 * flags.count(False)
+        bright = [m["value"] for m in drawn if m["path"].endswith("at its limit") and "value" in m]
+        return bright.count(False)
+
+    shown.highlights.show(shown.visualizer, during)
+    assert hidden() == 0
+    shown.highlights.show(shown.visualizer, limited_motion.duration)
+    assert hidden() > 0
+
+
 def test_loop_plays_until_interrupted(motion: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     starts = []
 
@@ -325,6 +422,20 @@ def test_a_page_plays_offline(motion: Trajectory, tmp_path: Path, tab: Tab) -> N
         assert 0.002 < colored(picture).mean() < 0.3
     assert (colored(first) != colored(last)).mean() > 0.002
     assert all(url.startswith(("file:", "data:")) for url in tab.requests), tab.requests
+    assert not tab.errors
+
+
+@needs_chromium
+def test_a_link_at_its_limit_is_yellow_on_the_page(
+    limited_motion: Trajectory, tmp_path: Path, tab: Tab
+) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html", trace=False)
+    assert shown.highlights is not None
+    during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
+    tab.open((tmp_path / "motion.html").as_uri())
+    shares = [yellow(seek(tab, t)).mean() for t in (0.0, during, limited_motion.duration)]
+    assert shares[1] > 1e-3
+    assert max(shares[0], shares[2]) < 1e-4
     assert not tab.errors
 
 

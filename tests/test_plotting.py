@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from cubic_motion import cubic_motion
@@ -13,6 +15,7 @@ from hovi import plotting
 from hovi.effects import Gravity
 from hovi.errors import DisplayError
 from hovi.grid import DiscretePath
+from hovi.limits import as_limits
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.trajectory import Trajectory
@@ -29,6 +32,17 @@ def motion(two_link: Robot) -> Trajectory:
     path = trajectory.path
     inner = np.random.default_rng(3).normal(size=path.inner.shape)
     return dataclasses.replace(trajectory, path=DiscretePath(path.q, path.v, path.z, inner))
+
+
+def within(motion: Trajectory, **limits: object) -> Trajectory:
+    """The motion as if it had been planned under these limits."""
+    assert motion.robot is not None
+    imposed = as_limits(motion.robot, {"base": "none", **limits})
+    return dataclasses.replace(motion, metadata={"limits": imposed.to_dict()})
+
+
+def lines(figure: Figure, panel: int, gid: str) -> list[Line2D]:
+    return [line for line in figure.axes[panel].lines if line.get_gid() == gid]
 
 
 @pytest.mark.parametrize("picture", PICTURES)
@@ -83,6 +97,55 @@ def test_the_legend_names_the_joints(motion: Trajectory) -> None:
     for figure in (plotting.motion_figure(motion), plotting.angles_figure(motion)):
         texts = [text.get_text() for text in figure.legends[0].get_texts()]
         assert texts == ["shoulder", "elbow"]
+
+
+def test_limits_that_curves_come_near_are_bands(motion: Trajectory) -> None:
+    speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
+    low, high = float(speed.min()), float(speed.max())
+    figure = plotting.motion_figure(within(motion, v={"elbow": [low - 50.0, 1.01 * high]}))
+    (line,) = lines(figure, 1, "limit")  # the lower bound is far
+    np.testing.assert_allclose(line.get_ydata(), np.degrees(1.01 * high))
+    assert figure.axes[1].patches
+    assert not lines(figure, 0, "limit") + lines(figure, 2, "limit")
+    assert [text.get_text() for text in figure.legends[0].get_texts()][2:] == ["limit"]
+    assert figure.axes[1].get_title(loc="right") == ""
+
+
+def test_a_curve_is_marked_where_it_leans_on_a_limit(motion: Trajectory) -> None:
+    speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
+    figure = plotting.motion_figure(within(motion, v={"elbow": [-100.0, float(speed.max())]}))
+    (mark,) = lines(figure, 1, "at a limit")
+    marked = np.asarray(mark.get_ydata())
+    marked = marked[np.isfinite(marked)]
+    assert 0 < len(marked) < 1000
+    assert marked.min() >= np.degrees(speed.max()) - 1e-3 * np.degrees(speed.max() + 100.0)
+    assert "at a limit" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_far_limits_do_not_squash_the_curves(motion: Trajectory) -> None:
+    free = plotting.motion_figure(motion)
+    figure = plotting.motion_figure(within(motion, q=1000.0, v=1000.0, tau={"elbow": 1e5}))
+    for k, sentence in enumerate(
+        ["far from all limits", "far from all limits", "far from the limits of elbow"]
+    ):
+        assert not lines(figure, k, "limit")
+        assert figure.axes[k].get_ylim() == free.axes[k].get_ylim()
+        assert figure.axes[k].get_title(loc="right") == sentence
+
+
+def test_joints_that_share_a_limit_share_its_line(motion: Trajectory) -> None:
+    speed = np.abs(motion.sample(np.linspace(0.0, motion.duration, 4001)).v)
+    bound = 1.001 * float(speed.max(axis=0).min())
+    figure = plotting.motion_figure(within(motion, v=bound))
+    drawn = {(line.get_ydata()[0], line.get_color()) for line in lines(figure, 1, "limit")}
+    assert len({color for _, color in drawn}) == 2
+    np.testing.assert_allclose({abs(y) for y, _ in drawn}.pop(), np.degrees(bound))
+
+
+@pytest.mark.parametrize("limits", [3, {}, {"lower": [[0]], "upper": [[1]], "tolerance": 1e-6}])
+def test_metadata_that_is_no_limits_is_left_aside(motion: Trajectory, limits: object) -> None:
+    strange = dataclasses.replace(motion, metadata={"limits": limits})
+    assert len(plotting.motion_figure(strange).legends[0].get_texts()) == 2
 
 
 def test_sliding_joints_get_an_axis_in_meters() -> None:

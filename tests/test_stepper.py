@@ -9,7 +9,8 @@ import pytest
 
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
-from hovi.errors import InputError
+from hovi.errors import InputError, SchemeError
+from hovi.euler_lagrange import regularity
 from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
 from hovi.grid import Grid
 from hovi.lagrangian import CasadiLagrangian, EffortLagrangian, Lagrangian
@@ -54,18 +55,21 @@ def quartic() -> CasadiLagrangian:
 
 
 def symplectic_defect(S: Array) -> float:
-    """max |S^T J S - J|, scaled by the rows and columns of S."""
+    """max |S^T J S - J| in canonical units in which S is balanced: entries of order one."""
     m = len(S) // 2
     J = np.block([[np.zeros((m, m)), np.eye(m)], [-np.eye(m), np.zeros((m, m))]])
-    columns = np.linalg.norm(S, axis=0)
-    return float(np.max(np.abs(S.T @ J @ S - J) / np.outer(columns, columns)))
+    unit = np.sqrt(np.linalg.norm(S[:m, m:], 2))
+    D = np.repeat([unit, 1 / unit], m)
+    S = S * D / D[:, None]
+    assert np.abs(S).max() < 10
+    return float(np.max(np.abs(S.T @ J @ S - J)))
 
 
 def scaled(S: Array, k: int, n: int, h: float) -> Array:
     """The tangent map in (h^j q^(j), h^-j p_j), which are canonical too."""
     powers = np.repeat([h**j for j in range(k)], n)
     D = np.concatenate([powers, 1 / powers])
-    return D[:, None] * S / D
+    return np.asarray(D[:, None] * S / D)
 
 
 @pytest.mark.parametrize("name", REGULAR)
@@ -329,6 +333,16 @@ def test_the_exact_flow_takes_long_steps(arm: EffortLagrangian) -> None:
     np.testing.assert_allclose(few.x[-1], many.x[-1], rtol=1e-9)
     with pytest.raises(InputError, match="of a scheme"):
         _ = few.reevaluated_momenta
+
+
+@pytest.mark.parametrize("name", ["mean-difference", "trapezoid-difference"])
+def test_a_degenerate_scheme_has_no_flow(arm: EffortLagrangian, name: str) -> None:
+    x, p = legendre(arm, *JET)
+    ld = SchemeLagrangian(arm, by_name(name), 0.1)
+    found = regularity(ld, x, x + 0.01)
+    assert abs(found.determinant[0]) < 1e-10 * np.abs(found.matrix).max() ** 4
+    with pytest.raises(SchemeError, match="is not regular"):
+        flow(ld, x, p, 5)
 
 
 def test_what_does_not_fit_is_refused(arm: EffortLagrangian) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +12,8 @@ import pytest
 from finite_differences import derivative
 from hovi.effects import Gravity
 from hovi.errors import SceneError
-from hovi.lagrangian import CasadiLagrangian
+from hovi.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.lagrangians import mechanics, riemannian_cubic
 from hovi.legendre_transforms import legendre
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -108,19 +111,18 @@ def test_turning_a_robot_about_its_first_axis_moves_the_first_joint(
     np.testing.assert_allclose(np.abs(arm), np.abs(expected[:, :, :2]), atol=1e-12)
 
 
-@pytest.mark.parametrize("effort", [True, False])
-def test_the_efforts_of_a_robot_are_invariant_under_its_base_motions(
-    panda: Robot, cart: Robot, effort: bool
+@pytest.mark.parametrize("make", [Scene.effort_lagrangian, mechanics, riemannian_cubic])
+def test_the_lagrangians_of_a_robot_are_invariant_under_its_base_motions(
+    panda: Robot, cart: Robot, make: Callable[[Scene], Lagrangian]
 ) -> None:
-    scenes = [(Scene(panda, [Gravity()]), "turn"), (Scene(cart, [Gravity()]), "shift")]
-    for scene, kind in scenes:
-        L = scene.effort_lagrangian()
-        symmetry = (
-            base_rotation(scene, [0, 0, 1])
-            if kind == "turn"
-            else base_translation(scene, [1, 0, 0])
-        )
-        jet = np.random.default_rng(1).normal(size=(3, 4, L.nv))
+    heavy, rolling = Scene(panda, [Gravity()]), Scene(cart, [Gravity()])
+    motions = [
+        (heavy, base_rotation(heavy, [0, 0, 1])),
+        (rolling, base_translation(rolling, [1, 0, 0])),
+    ]
+    for scene, symmetry in motions:
+        L = make(scene)
+        jet = np.random.default_rng(1).normal(size=(L.order + 1, 4, L.nv))
         scale = np.abs(L.gradient(*jet)).max()
         np.testing.assert_allclose(symmetry.defect(L, *jet) / scale, 0.0, atol=1e-13)
 

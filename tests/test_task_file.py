@@ -13,6 +13,7 @@ import pytest
 
 import hovi.effects
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
+from hovi.limits import as_limits
 from hovi.model_files import example, example_scenes
 from hovi.task_file import load_task, save_task
 
@@ -44,11 +45,11 @@ def refusal(folder: Path, text: str, error: type[HoviError] = SceneError) -> str
 def test_every_shipped_scene_loads(name: str) -> None:
     task = load_task(example(name))
     assert task.name == name
-    assert task.limits == "none"
+    assert (task.limits == "none") is not name.endswith("_limited")
     assert task.scene.effects[0].key == "gravity"
 
 
-@pytest.mark.parametrize("name", ["two_link_swing_up", "two_link_elbow", "two_link_reach"])
+@pytest.mark.parametrize("name", sorted(example_scenes()))
 def test_a_saved_task_is_read_back_as_the_same_task(name: str, tmp_path: Path) -> None:
     task = load_task(example(name))
     again = load_task(save_task(task, tmp_path / f"{name}.toml"))
@@ -88,7 +89,7 @@ def test_a_scene_without_effects_or_choices_takes_the_defaults(folder: Path) -> 
     text = 'robot = "two_link.urdf"\nduration = 2\nstart.q = [0, 0]\ngoal.q = [1, 1]\n'
     task = load_task(write(folder, text))
     assert (task.scheme, task.intervals, task.starts, task.seed) == ("galerkin-2", 16, 1, 0)
-    assert task.limits == "none"
+    assert task.limits == "urdf"
     assert tuple(task.scene.effects) == ()
 
 
@@ -129,7 +130,8 @@ MISTAKES = {
     ),
     "no goal": ("[goal]", "[gaol]", ["`gaol`", "'goal'"]),
     "start without q": ("q = [-1.57", "v = [-1.57", ["line 8", "`start.q`", "missing"]),
-    "limits": ('limits = "none"', "[limits]\nv = 3", ["not enforced yet", '"none"']),
+    "limits by an unknown word": ('"none"', '"urd"', ["line 6", "`limits`", '"urdf"', '"urd"']),
+    "limits as a number": ('"none"', "3", ["line 6", "`limits`", '"urdf"', "3"]),
     "robot of the wrong type": ('robot = "two_link.urdf"', "robot = 3", ["`robot`", "3"]),
     "locked of the wrong type": ('"none"', '"none"\nlocked = "elbow"', ["`locked`", "list"]),
     "syntax": ("duration = ", "duration ", ["line 5", "column", "not valid TOML"]),
@@ -237,12 +239,99 @@ def test_an_effect_takes_its_own_defaults(folder: Path) -> None:
         ({"starts": 0}, InputError),
         ({"seed": -1}, InputError),
         ({"scheme": "simpson"}, SchemeError),
-        ({"limits": "urdf"}, SceneError),
+        ({"limits": "urd"}, InputError),
+        ({"limits": {"v": -1.0}}, InputError),
     ],
 )
 def test_a_task_is_valid_once_built(change: dict[str, Any], error: type[HoviError]) -> None:
     with pytest.raises(error):
         dataclasses.replace(load_task(example("two_link_reach")), **change)
+
+
+LIMITS = """
+[limits]
+base = "none"
+q = [[-3.0, 3.0], [0.0, 2.0]]
+v = 3
+a = { shoulder = 40.0, elbow = [-50.0, inf] }
+tau = [20.0, 10.0]
+margin = 0.25
+tolerance = 1e-5
+"""
+
+
+def limited(table: str = LIMITS) -> str:
+    return REACH.replace('limits = "none"\n', "") + table
+
+
+def test_limits_are_a_number_a_list_pairs_or_by_joint(folder: Path) -> None:
+    task = load_task(write(folder, limited(LIMITS.replace("margin = 0.25", ""))))
+    limits = as_limits(task.scene.robot, task.limits)
+    np.testing.assert_array_equal(limits.lower, [[-3, 0], [-3, -3], [-40, -50], [-20, -10]])
+    np.testing.assert_array_equal(limits.upper, [[3, 2], [3, 3], [40, np.inf], [20, 10]])
+    assert limits.tolerance == 1e-5
+
+
+def test_a_list_may_hold_numbers_and_pairs(folder: Path) -> None:
+    task = load_task(write(folder, limited("[limits]\nq = [3.0, [0.0, 2.0]]\n")))
+    limits = as_limits(task.scene.robot, task.limits)
+    np.testing.assert_array_equal([limits.lower[0], limits.upper[0]], [[-3, 0], [3, 2]])
+
+
+def test_a_list_of_pairs_of_the_wrong_length_is_refused(folder: Path) -> None:
+    sentence = refusal(folder, limited("[limits]\nq = [[0.0, 2.0]]\n"))
+    for fragment in ("line 21", "limits.q", "shoulder, elbow"):
+        assert fragment in sentence
+
+
+def test_a_margin_is_taken_on_every_side(folder: Path) -> None:
+    task = load_task(write(folder, limited()))
+    limits = as_limits(task.scene.robot, task.limits)
+    np.testing.assert_array_equal([limits.lower[0], limits.upper[0]], [[-1.5, 0.5], [1.5, 1.5]])
+
+
+def test_a_table_of_limits_starts_from_the_urdf(folder: Path) -> None:
+    task = load_task(write(folder, limited("[limits.v]\nelbow = 2.0\n")))
+    limits = as_limits(task.scene.robot, task.limits)
+    np.testing.assert_array_equal(limits.upper[1], [1000.0, 2.0])
+    np.testing.assert_array_equal(limits.upper[3], [1000.0, 1000.0])
+
+
+@pytest.mark.parametrize("table", [LIMITS, "[limits.v]\nelbow = 2.0\n"])
+def test_saved_limits_are_read_back(table: str, folder: Path) -> None:
+    task = load_task(write(folder, limited(table)))
+    imposed = as_limits(task.scene.robot, task.limits)
+    for given in (task.limits, imposed):
+        changed = dataclasses.replace(task, limits=given)
+        again = load_task(save_task(changed, folder / "again.toml"))
+        assert as_limits(again.scene.robot, again.limits).to_dict() == imposed.to_dict()
+
+
+WRONG_LIMITS = {
+    "unknown key": ("v = 3", "w = 3", ["line 24", "`limits.w`", "valid names", "'v'"]),
+    "unknown base": ('base = "none"', 'base = "urd"', ["`limits.base`", '"urdf" or "none"']),
+    "word for numbers": ("v = 3", 'v = "slow"', ["line 24", "`limits.v`", '"slow"', "pair"]),
+    "boolean": ("v = 3", "v = true", ["`limits.v`", "true"]),
+    "negative": ("v = 3", "v = -3", ["line 24", "limits.v of 'shoulder'", "positive", "-3"]),
+    "NaN": ("v = 3", "v = nan", ["line 24", "limits.v", "nan"]),
+    "falling pair": ("[0.0, 2.0]", "[2.0, 0.0]", ["line 23", "limits.q of 'elbow'", "rising"]),
+    "three numbers": ("[0.0, 2.0]", "[1, 2, 3]", ["line 23", "limits.q of 'elbow'", "pair"]),
+    "too short": ("tau = [20.0, 10.0]", "tau = [20.0]", ["line 26", "shoulder, elbow"]),
+    "unknown joint": ("elbow = [-50.0", "elbo = [-50.0", ["line 25", "'elbo'", "'elbow'"]),
+    "word in a list": ("[20.0, 10.0]", '[20.0, "x"]', ["line 26", "`limits.tau[1]`", '"x"']),
+    "word by joint": ("shoulder = 40.0", 'shoulder = "x"', ["`limits.a.shoulder`", '"x"']),
+    "margin": ("margin = 0.25", "margin = 0.5", ["line 27", "`limits.margin`", "0.5"]),
+    "tolerance": ("tolerance = 1e-5", "tolerance = 0", ["line 28", "`limits.tolerance`"]),
+}
+
+
+@pytest.mark.parametrize("mistake", WRONG_LIMITS)
+def test_a_mistake_in_limits_is_named_with_its_place(mistake: str, folder: Path) -> None:
+    old, new, expected = WRONG_LIMITS[mistake]
+    assert LIMITS.count(old) == 1
+    sentence = refusal(folder, limited(LIMITS.replace(old, new)))
+    for fragment in ("scene.toml", *expected):
+        assert fragment in sentence
 
 
 def test_an_unknown_example_gets_the_nearest_names() -> None:

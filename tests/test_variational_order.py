@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from functools import cache
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from hovi.effects import Gravity
 from hovi.errors import InputError
-from hovi.lagrangian import EffortLagrangian
+from hovi.lagrangian import CasadiLagrangian, EffortLagrangian
 from hovi.lagrangians import spline
 from hovi.legendre_transforms import legendre
 from hovi.rigid_body import casadi_functions
@@ -102,6 +103,33 @@ def extended_slope(scene: Scene, r: int, segments: int) -> float:
             ]
             errors.append(float(max(abs(a - b) for a, b in pairs)))
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+def nonlinear(k: int) -> CasadiLagrangian:
+    """A Lagrangian of order k with every kind of coupling, in the plane."""
+    jet = [ca.SX.sym(f"q{j}", 2) for j in range(k + 1)]
+    q, top = jet[0], jet[-1]
+    L = ca.sumsqr(top) / 2 * (2 + ca.cos(q[0])) + top[0] * top[1] * ca.sin(q[1])
+    return CasadiLagrangian(jet, L - ca.cos(q[0] + q[1]) + sum(ca.sumsqr(x) for x in jet[1:-1]))
+
+
+@pytest.mark.parametrize(
+    ("k", "r", "steps"),
+    [
+        (1, 0, [0.04, 0.02, 0.01]),
+        (1, 1, [0.1, 0.05, 0.025]),
+        (1, 2, [0.14, 0.1, 0.07]),
+        (2, 0, [0.1, 0.05, 0.025]),
+        (2, 1, [0.14, 0.1, 0.07]),
+        (3, 0, [0.14, 0.1, 0.07]),
+    ],
+)
+def test_galerkin_has_order_2_r_plus_k_for_lagrangians_of_any_order(
+    k: int, r: int, steps: list[float]
+) -> None:
+    starts = 0.7 * np.random.default_rng(k).normal(size=(2 * k, SEGMENTS, 2))
+    measured = variational_order(nonlinear(k), galerkin(r, k), steps, *starts)
+    assert measured.order == pytest.approx(2 * (r + k), abs=0.3)
 
 
 # The flow from momenta has the order of its L_d

@@ -30,7 +30,8 @@ LADDER = (4, 7, 10, 14, 19, 25, 32, 40)
 class ExactDiscreteLagrangian(SegmentLagrangian):
     """L_d^e to a tolerance, with all its derivatives.
 
-    lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the momenta, relative to the largest.
+    lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularised momenta (for
+        k = 2 h p and p~ - h p), relative to the largest.
     The solution that is followed is the one that exists for small h; where h has passed a
     conjugate point of it, InputError says so, as it does where the tolerance is not met.
     """
@@ -94,11 +95,16 @@ def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float)
 
 
 def _change(before: Segment, after: Segment) -> float:
-    """What one more degree changed: momenta, and the end where it is not given."""
-    changes = []
-    for old, new in ((before.p0, after.p0), (before.p1, after.p1)):
-        size = np.abs(new).max(axis=(1, 2), keepdims=True)
-        changes.append(np.max(np.abs(new - old) / np.where(size > 0, size, 1.0)))
+    """What a higher degree changed: derivatives of phi in (h x0, w), and the end not given.
+
+    Momenta are these derivatives with powers of 1/h, which would only magnify rounding here; w
+    itself would magnify it by the condition of d2L/dq^(k)2.
+    """
+    k = after.k
+    scale = np.concatenate([np.full(k, after.h), np.ones(k)])[:, None]
+    old, new = (scale * s.gradient[:, : 2 * k] for s in (before, after))
+    size = np.abs(new).max(axis=(1, 2), keepdims=True)
+    changes = [np.max(np.abs(new - old) / np.where(size > 0, size, 1.0))]
     for old, new in ((before.x0, after.x0), (before.x1, after.x1)):
         changes.append(np.max(np.abs(new - old)) / max(1.0, np.max(np.abs(new))))
     return float(max(changes))

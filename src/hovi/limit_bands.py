@@ -102,8 +102,8 @@ def _draw_bands(
         color = members[0].color if len(members) == 1 else _SHARED
         for k, member in enumerate(members):
             dashes = (_DASH, _DASH * max(0.5, len(members) - 1))
-            style = {"linewidth": 1.1, "linestyle": (-_DASH * k, dashes), "zorder": 1}
-            ax.axhline(bound, color=member.color, gid=LIMIT, **style)
+            look = (-_DASH * k, dashes)
+            ax.axhline(bound, color=member.color, linewidth=1.1, linestyle=look, gid=LIMIT)
         edge = bound + outward * thickness
         ax.axhspan(min(bound, edge), max(bound, edge), color=color, alpha=0.25, linewidth=0)
     ax.set_ylim(low - 2 * thickness, high + 2 * thickness)
@@ -112,6 +112,6 @@ def _draw_bands(
 def _far_sentence(names: Sequence[str], curves: Sequence[Curve]) -> str:
     distinct = list(dict.fromkeys(names))
     if len(distinct) == len(curves):
-        return "all limits are far"
+        return "far from all limits"
     shown = ", ".join(distinct) if len(distinct) <= 3 else f"{len(distinct)} joints"
-    return f"limits of {shown} are far"
+    return f"far from the limits of {shown}"

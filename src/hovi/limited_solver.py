@@ -33,6 +33,8 @@ SPLIT = 0.05
 """Excess, as a share of the range, beyond which the grid is halved instead of tightened."""
 OVERSHOOT = 1.5
 """How much further than the excess a bound is drawn in: motions lean on what is left to them."""
+ROOM = 5.0
+"""What a bound is drawn in besides, in tolerances, so that the last rounds are few."""
 SPARE = 1e-3
 """Unused share of a range beyond which a bound that was drawn in is let out again."""
 WARM_MU = 1e-7, 1e-4
@@ -195,7 +197,7 @@ class _Search:
     ) -> BoundedOutcome[DiscretePath]:
         """Solve again with the bounds drawn in by what the interpolant exceeds them."""
         sides = np.stack([excess.lower, excess.upper])
-        tighter = np.where(sides > 0, OVERSHOOT * sides + 0.5 * self.limits.tolerance, 0.0)
+        tighter = np.where(sides > 0, OVERSHOOT * sides + ROOM * self.limits.tolerance, 0.0)
         looser = np.where(np.isfinite(sides) & (sides < -SPARE), sides + 0.5 * SPARE, 0.0)
         self.margins = np.clip(self.margins + tighter + looser, 0.0, 0.45)
         objective = LimitedAction(self.problem, self.limits, self.margins)

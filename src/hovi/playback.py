@@ -275,8 +275,8 @@ def _bridged(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     k, ends = _BRIDGED_FRAMES, ((_BRIDGED_FRAMES,) * 2, (0, 0))
     windows = np.lib.stride_tricks.sliding_window_view
     wide = windows(np.pad(flags, ends), 2 * k + 1, axis=0).any(axis=-1)
-    closed = windows(np.pad(wide, ends, constant_values=True), 2 * k + 1, axis=0).all(axis=-1)
-    return np.asarray(closed)
+    closed = windows(np.pad(wide, ends), 2 * k + 1, axis=0).all(axis=-1)
+    return np.asarray(flags | closed)
 
 
 def _note(robot: Robot, highlights: Highlights | None) -> str:

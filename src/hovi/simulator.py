@@ -88,9 +88,11 @@ def simulate(
 ) -> Simulation:
     """The motion of a scene's robot from a state, by a symplectic integrator of order 2 (r + 1).
 
-    scene: what is simulated; potentials that effects add to a cost are no forces. start: a State, or a configuration of shape (nq,) at rest.
-    duration: in [s]. torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques
-    of a plan; none when not given.
+    scene: what is simulated; potentials that effects add to a cost are no forces.
+    start: a State, or a configuration of shape (nq,) at rest.
+    duration: in [s].
+    torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; none
+        when not given.
     intervals: N. inner_modes: r, from 0 (the midpoint rule).
     Raises InputError or SceneError for what does not fit, or for steps too long to be solved.
     """

@@ -46,7 +46,8 @@ class Solution:
     trajectory: the motion, the best so far where no minimum was found.
     cost: the discrete action of L~, 1/2 integral |tau|^2 where nothing else was asked.
     error_estimate: relative, in the cost; None where there is none.
-    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian.
+    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 where it
+        was not counted.
     minima: costs of all minima that a multi-start found, ascending.
     history: what each step did.
     setup_seconds, solve_seconds: wall time before and during the solve.
@@ -91,7 +92,10 @@ class Solution:
             old.goal if goal is None else as_state(goal),
         )
         origin = self if guess is None else guess
-        solution = solve(problem, follow(origin.trajectory.path, problem), **options)
+        path = origin.trajectory.path
+        if problem.limited:
+            return solve(problem, path, **options)
+        solution = solve(problem, follow(path, problem), **options)
         return dataclasses.replace(solution, nit=solution.nit + 1)
 
 
@@ -117,60 +121,84 @@ def solve(
     """
     began = time.perf_counter()
     path = guess_path(problem, guess)
-    objective = ActionObjective(problem, structure=problem.structure)
     options = Options(
         max_iterations=max_iterations, time_limit=time_limit, escape_saddles=escape_saddles
     )
     started = time.perf_counter()
-    if problem.limited:
-        return _solve_limited(problem, path, options, report, began)
-    outcome = minimize(objective, path, options, report)
-    n_neg, outcome = _certify(objective, outcome)
+    method = _with_limits if problem.limited else _without_limits
+    answer = method(problem, path, options, report)
     solved = time.perf_counter()
-    status, message = _verdict(outcome, n_neg)
-    trajectory = _trajectory(problem, outcome.x, outcome.value, status, n_neg)
     return Solution(
-        success=status is Status.MINIMUM,
-        status=status,
-        message=message,
-        trajectory=trajectory,
-        cost=outcome.value,
-        nit=outcome.iterations,
-        n_neg=n_neg,
-        minima=(outcome.value,) if status is Status.MINIMUM else (),
-        history=tuple(outcome.history),
-        problem=problem,
+        success=answer.status is Status.MINIMUM,
+        status=answer.status,
+        message=answer.message,
+        trajectory=answer.trajectory(),
+        cost=answer.value,
+        nit=answer.nit,
+        n_neg=answer.n_neg,
+        problem=answer.problem,
+        minima=(answer.value,) if answer.status is Status.MINIMUM else (),
+        history=tuple(answer.history),
         setup_seconds=started - began,
         solve_seconds=solved - started,
     )
 
 
-def _solve_limited(
-    problem: TrajectoryProblem,
-    path: DiscretePath,
-    options: Options,
-    report: Report | None,
-    began: float,
-) -> Solution:
-    """The same under limits, by an interior point."""
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """What a method found, before it is dressed as a Solution."""
+
+    problem: TrajectoryProblem
+    path: DiscretePath
+    value: float
+    status: Status
+    message: str
+    nit: int
+    n_neg: int
+    history: list[Iteration]
+
+    def trajectory(self) -> Trajectory:
+        """The motion with its momenta and where it came from."""
+        problem = self.problem
+        metadata: dict[str, Any] = {
+            "cost": self.value,
+            "status": str(self.status),
+            "n_neg": self.n_neg,
+        }
+        if problem.limits is not None and problem.limited:
+            metadata["limits"] = problem.limits.to_dict()
+        momenta = problem.ld.momenta(self.path)
+        return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
+
+
+def _without_limits(
+    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
+) -> _Answer:
+    """By a trust region."""
+    objective = ActionObjective(problem, structure=problem.structure)
+    outcome = minimize(objective, path, options, report)
+    n_neg, outcome = _certify(objective, outcome)
+    status, message = _verdict(outcome, n_neg)
+    nit, history = outcome.iterations, outcome.history
+    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history)
+
+
+def _with_limits(
+    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
+) -> _Answer:
+    """By an interior point."""
     assert problem.limits is not None
-    started = time.perf_counter()
     outcome = solve_limited(problem, problem.limits, path, options, report)
     status, message = _limited_verdict(outcome)
-    trajectory = _trajectory(outcome.problem, outcome.x, outcome.value, status, outcome.n_neg)
-    return Solution(
-        success=status is Status.MINIMUM,
-        status=status,
-        message=message,
-        trajectory=trajectory,
-        cost=outcome.value,
-        nit=outcome.iterations,
-        n_neg=outcome.n_neg,
-        problem=outcome.problem,
-        minima=(outcome.value,) if status is Status.MINIMUM else (),
-        history=tuple(outcome.history),
-        setup_seconds=started - began,
-        solve_seconds=time.perf_counter() - started,
+    return _Answer(
+        outcome.problem,
+        outcome.x,
+        outcome.value,
+        status,
+        message,
+        outcome.iterations,
+        outcome.n_neg,
+        outcome.history,
     )
 
 
@@ -263,12 +291,3 @@ def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
         f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
         f"best so far, of cost {outcome.value:.10g}.{left}"
     )
-
-
-def _trajectory(
-    problem: TrajectoryProblem, path: DiscretePath, cost: float, status: Status, n_neg: int
-) -> Trajectory:
-    metadata: dict[str, Any] = {"cost": cost, "status": str(status), "n_neg": n_neg}
-    if problem.limits is not None and problem.limited:
-        metadata["limits"] = problem.limits.to_dict()
-    return Trajectory(problem.grid, path, problem.ld.momenta(path), problem.scene, metadata)

@@ -22,6 +22,7 @@ from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import EffortLagrangian
 from hovi.legendre_transforms import hamiltonian
 from hovi.scene import Scene
+from hovi.schemes import require_regular
 from hovi.segment import Segment
 from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian
 from hovi.state import State
@@ -113,9 +114,12 @@ def flow(
     force: go on where the flow's own instability has made of the rounding of the start an error in
         q above `tolerance` (relative to the largest |q|, at least one); otherwise InputError says
         how far the motion can be known. Optimal control is unstable both ways in time.
-    Raises InputError also for shapes that do not fit and steps that have no solution.
+    Raises InputError also for shapes that do not fit and steps that have no solution, SchemeError
+    for a scheme that is not regular.
     """
     segment = SchemeLagrangian.of(ld) if isinstance(ld, DiscreteLagrangian) else ld
+    if isinstance(segment, SchemeLagrangian) and segment.k == 2:
+        require_regular(segment.scheme)
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")

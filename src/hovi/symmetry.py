@@ -80,6 +80,8 @@ def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 
     """The rotation of a whole robot about an axis of the world that gravity leaves free.
 
     axis: shape (3,). point: a point on it, shape (3,), in [m].
+    An effect on the first joints, such as a range kept by a potential, may break the symmetry all
+    the same: `Symmetry.defect` tells.
     Raises SceneError when gravity does not leave it free, or the robot's first joints cannot
     carry it out.
     """

@@ -409,6 +409,18 @@ def test_the_predicted_decrease_is_that_of_the_model(
         assert trial.decrease == pytest.approx(-model.change(trial.step), rel=0.1)
 
 
+@pytest.mark.parametrize("radius", [1.0, 10.0, 100.0])
+def test_a_step_along_negative_curvature_goes_downhill(radius: float) -> None:
+    for seed in range(20):
+        model = random_model(4, -1.0, seed)
+        inverse = np.linalg.inv(np.linalg.cholesky(model.metric))
+        lowest = inverse.T @ np.linalg.eigh(inverse @ model.hessian @ inverse.T)[1][:, 0]
+        for guess in (0.0, 2.0):
+            trial = solve_subproblem(model, radius, guess)
+            along = lowest @ model.metric @ trial.step
+            assert along * (lowest @ model.gradient) < 0
+
+
 def test_a_newton_step_within_the_radius_is_taken_whatever_the_last_shift() -> None:
     model = random_model(5, 1.0, 0)
     newton = np.linalg.solve(model.hessian, -model.gradient)

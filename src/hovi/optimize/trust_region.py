@@ -209,7 +209,7 @@ def _ratio(actual: float, predicted: float, noise: float) -> float:
 
 def next_shift(shift: float, norm: float, radius: float) -> float:
     """A first shift for another radius: it falls a little faster than the radius grows."""
-    return shift * (norm / radius) ** 1.2
+    return float(shift * (norm / radius) ** 1.2)
 
 
 def next_radius(radius: float, norm: float, ratio: float) -> float:

@@ -29,10 +29,11 @@ def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any
         LimitsTable.model_validate(given)
     except ValidationError as invalid:
         raise first_sentence(invalid, LimitsTable, toml, above=("limits",)) from None
+    limits = {key: _by_joint(value, robot) for key, value in given.items()}
     for kind in KINDS:
-        _check_kind(kind, given.get(kind, {}), robot, toml)
-    _check(("limits",), given, robot, toml)
-    return given
+        _check_kind(kind, limits.get(kind, {}), robot, toml)
+    _check(("limits",), limits, robot, toml)
+    return limits
 
 
 def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str | dict[str, Any]:
@@ -50,6 +51,14 @@ def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str 
         }
         table |= {kind: pairs} if pairs else {}
     return table
+
+
+def _by_joint(value: Any, robot: Robot) -> Any:
+    """A list that holds pairs as a table of joint names, numbers among the pairs and all."""
+    fits = isinstance(value, list) and len(value) == robot.nv
+    if fits and any(isinstance(each, list) for each in value):
+        return dict(zip(robot.coordinate_names, value, strict=True))
+    return value
 
 
 def _check_kind(kind: str, given: Any, robot: Robot, toml: TomlText) -> None:

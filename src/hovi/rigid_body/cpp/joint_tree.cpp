@@ -26,13 +26,13 @@ void JointTree::relate() {
   }
   related_.assign(n * n, -1);
   related_count_.assign(n, 0);
-  carriers_.assign((n + 1) * n, -1);
-  carrier_count_.assign(n + 1, 0);
+  carriers_.assign(n * n, -1);
+  carrier_count_.assign(n, 0);
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < n; ++k) {
       const int meeting = meeting_[i * n + k];
       if (meeting == i || meeting == k) related_[i * n + related_count_[i]++] = k;
-      if (meeting == k) carriers_[(i + 1) * n + carrier_count_[i + 1]++] = k;
+      if (meeting == k) carriers_[i * n + carrier_count_[i]++] = k;
     }
 }
 

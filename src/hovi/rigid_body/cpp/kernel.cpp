@@ -36,10 +36,17 @@ Workspace make_workspace(std::size_t size) {
   return Workspace(memory);
 }
 
-// More threads than packs or cores would only cost memory.
-std::size_t useful_threads(std::size_t asked, std::size_t packs) {
+// Roughly, with the larger vectors [ns].
+double point_cost(double n, const Expansion& out) {
+  if (out.hessian) return 15 * n * n;
+  return out.jacobian ? 30 * n + 2 * n * n : 20 * n;
+}
+
+// A thread is started in 20 to 50 us: not for less work than that.
+std::size_t useful_threads(std::size_t asked, double work) {
   const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
-  return std::max<std::size_t>(1, std::min({asked, packs, cores}));
+  const auto worthwhile = static_cast<std::size_t>(work / 50e3);
+  return std::max<std::size_t>(1, std::min({asked, cores, worthwhile}));
 }
 
 }  // namespace
@@ -65,7 +72,7 @@ void InverseDynamicsKernel::expand(Points points, Multipliers multipliers, Expan
   const std::lock_guard<std::mutex> lock(busy);
   const TreeView view = tree.view();
   const std::size_t packs = (points.count + packed.lanes - 1) / packed.lanes;
-  const std::size_t chunks = useful_threads(threads, packs);
+  const std::size_t chunks = useful_threads(threads, points.count * point_cost(view.n, out));
   while (workspaces.size() < chunks)
     workspaces.push_back(make_workspace(packed.workspace_size(view.n)));
   const auto run = [&](std::size_t chunk) {

@@ -1,5 +1,5 @@
 #define HOVI_LANES 4
-#include "packed_kernel.inl.hpp"
+#include "packed_expand.hpp"
 
 namespace hovi {
 

@@ -1,5 +1,5 @@
 #define HOVI_LANES 2
-#include "packed_kernel.inl.hpp"
+#include "packed_expand.hpp"
 
 namespace hovi {
 

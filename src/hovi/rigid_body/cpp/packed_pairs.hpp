@@ -28,7 +28,8 @@ inline void scatter(const Pack* values, const Lanes& where, std::size_t size, do
     for (std::size_t i = 0; i < size; ++i) array[where.point[lane] * size + i] = values[i][lane];
 }
 
-inline Pack* entry(Pack* J, int n, int i, int j) { return J + 3 * (i * n + j); }
+// dtau_i/d(q,v,a)_j: the columns of a joint lie together.
+inline Pack* entry(Pack* J, int n, int i, int j) { return J + 3 * (j * n + i); }
 
 // dtau_j/d(q,v,a)_i and dtau_i/d(q,v,a)_j where joint j carries joint i.
 __attribute__((noinline)) void jacobian(const TreeView& tree, Workspace& work) {
@@ -49,13 +50,16 @@ __attribute__((noinline)) void jacobian(const TreeView& tree, Workspace& work) {
   }
 }
 
+// In strips of rows, so that neither side jumps about.
 inline void scatter_jacobian(const Workspace& work, int n, const Lanes& where, double* out) {
-  for (int lane = 0; lane < lanes; ++lane) {
-    double* to = out + where.point[lane] * 3 * n * n;
-    for (int i = 0; i < n; ++i)
-      for (int k = 0; k < 3; ++k)
-        for (int j = 0; j < n; ++j) to[(3 * i + k) * n + j] = work.J[3 * (i * n + j) + k][lane];
-  }
+  for (int strip = 0; strip < n; strip += 4)
+    for (int j = 0; j < n; ++j)
+      for (int i = strip; i < n && i < strip + 4; ++i)
+        for (int k = 0; k < 3; ++k) {
+          const Pack value = entry(work.J, n, i, j)[k];
+          for (int lane = 0; lane < lanes; ++lane)
+            out[((where.point[lane] * n + i) * 3 + k) * n + j] = value[lane];
+        }
 }
 
 // The block of d2 phi in (q, v, a)_i and (q, v, a)_j. tau is affine in a and quadratic in v: the
@@ -96,25 +100,37 @@ inline void scatter_block(const Pack block[9], int n, int i, int j, const Lanes&
   }
 }
 
+// Both move the same bodies only when j carries i; the torques that depend on both are those of
+// their common carriers, and then also of what i carries.
+inline void hessian_block(const TreeView& tree, const Workspace& work, bool curved, int i, int j,
+                          Pack block[9]) {
+  const int n = tree.n, meeting = tree.meeting[i * n + j];
+  if (meeting == j) {
+    if (curved) curvature_block(work.joints[i], work.joints[j], block);
+    gauss_newton_block(work, n, i, j, tree.related + i * n, tree.related_count[i], block);
+  } else if (meeting >= 0) {
+    gauss_newton_block(work, n, i, j, tree.carriers + meeting * n, tree.carrier_count[meeting],
+                       block);
+  }
+}
+
+// In strips of i, so that what is written to the mirrored block lies together.
 __attribute__((noinline)) void hessian(const TreeView& tree, Workspace& work, bool curved,
                                        const Lanes& where, double* out) {
   const int n = tree.n;
-  for (int k = 0; k < n; ++k)
-    for (int c = 0; c < 3 * n; ++c)
-      work.weighted_J[3 * n * k + c] = work.weight[k] * work.J[3 * n * k + c];
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j <= i; ++j) {
-      Pack block[9] = {};
-      // Both move the same bodies only when one carries the other; the torques that depend on
-      // both are those of their common carriers, and then also of what the farther one carries.
-      const int meeting = tree.meeting[i * n + j];
-      const bool carried = meeting == j;
-      if (carried && curved) curvature_block(work.joints[i], work.joints[j], block);
-      const int* rows = carried ? tree.related + i * n : tree.carriers + (meeting + 1) * n;
-      const int count = carried ? tree.related_count[i] : tree.carrier_count[meeting + 1];
-      gauss_newton_block(work, n, i, j, rows, count, block);
-      scatter_block(block, n, i, j, where, out);
-    }
+  for (int j = 0; j < n; ++j)
+    for (int k = 0; k < n; ++k)
+      for (int c = 0; c < 3; ++c)
+        entry(work.weighted_J, n, k, j)[c] = work.weight[k] * entry(work.J, n, k, j)[c];
+  for (int strip = 0; strip < n; strip += 4) {
+    const int end = strip + 4 < n ? strip + 4 : n;
+    for (int j = 0; j < end; ++j)
+      for (int i = j < strip ? strip : j; i < end; ++i) {
+        Pack block[9] = {};
+        hessian_block(tree, work, curved, i, j, block);
+        scatter_block(block, n, i, j, where, out);
+      }
+  }
 }
 
 }  // namespace

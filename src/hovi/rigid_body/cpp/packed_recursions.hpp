@@ -40,7 +40,7 @@ struct Joint {
 struct Workspace {
   Joint* joints;
   Pack *q, *v, *a, *weight, *curvature;
-  Pack *tau, *J, *weighted_J;  // J(i, j, k): of tau_i in the k-th of (q, v, a)_j
+  Pack *tau, *J, *weighted_J;
 };
 
 // Where the joint is: R, p, S and the moments of its body.

@@ -24,8 +24,8 @@ struct TreeView {
   const int* meeting;        // (n, n): the last joint that carries both, or -1
   const int* related;        // (n, n): row i lists the joints that carry i, i, and those i carries
   const int* related_count;  // (n,)
-  const int* carriers;       // (n + 1, n): row i + 1 lists the joints that carry i, and i
-  const int* carrier_count;  // (n + 1,)
+  const int* carriers;       // (n, n): row i lists the joints that carry i, and i
+  const int* carrier_count;  // (n,)
 };
 
 }  // namespace hovi
