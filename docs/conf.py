@@ -15,7 +15,7 @@ import hovi
 TOP = Path(__file__).resolve().parents[1]
 
 project = "hovi"
-author = "the hovi developers"
+author = copyright = "the hovi developers"
 release = hovi.__version__
 extensions = [
     "myst_parser",
@@ -26,6 +26,8 @@ extensions = [
 exclude_patterns = ["_build", "tables", "gallery/**/*.ipynb", "gallery/**/*.py"]
 html_theme = "furo"
 html_title = "hovi"
+html_static_path = ["static"]
+html_css_files = ["wide.css"]
 
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_heading_anchors = 3
@@ -37,6 +39,7 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"/\d\d_",
     "ignore_pattern": r"^(?!\d\d_)",  # benchmarks are not examples
+    "default_thumb_file": str(TOP / "docs" / "images" / "swing_up_surface.png"),
     "within_subsection_order": "FileNameSortKey",
     "nested_sections": False,
     "download_all_examples": False,

@@ -39,7 +39,7 @@ assert solution.success
 
 # %%
 # The least-torque motion uses the arm's own swing and, without limits, is wild. Compare it with
-# what the URDF allows, which `plan` keeps to unless told otherwise; the ninth example does.
+# what the URDF allows, which `plan` keeps to unless told otherwise.
 
 trajectory = solution.trajectory
 motion = trajectory.sample(np.linspace(0.0, trajectory.duration, 641))

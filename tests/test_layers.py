@@ -42,7 +42,7 @@ FLOORS = [
     {"action_structure"},
     {"trajectory", "segment_lagrangian"},
     {"guess", "legendre_transforms"},
-    {"limit_check", "problem", "euler_lagrange", "exact_discrete_lagrangian", "symmetry"},
+    {"limit_check", "saturation", "limit_bands", "problem", "euler_lagrange", "exact_discrete_lagrangian", "symmetry"},
     {"trajectory_objective", "stepper", "variational_error", "contradictions"},
     {"limited_action"},
     {"limited_solver"},

@@ -46,22 +46,29 @@ def errors(solution: hovi.Solution, exact: hovi.Solution) -> dict[str, float]:
     return {name: float(np.max(abs(x - y)) / np.max(abs(y))) for name, (x, y) in pairs.items()}
 
 
+def print_slopes(slopes: dict[str, dict[str, str]], keys: tuple[str, ...]) -> None:
+    """Observed orders of some of the quantities."""
+    rows = [
+        [f"`{name}`", by_name(name).order, f"{sizes[0]} to {sizes[-1]}"]
+        + [slopes[name][key] for key in keys]
+        for name, sizes in GRIDS.items()
+    ]
+    print_table(["scheme", "order", "intervals", *keys], rows)
+
+
 def main() -> None:
     exact = motion(*REFERENCE)
-    print(
-        f"The two-link reach against `{REFERENCE[0]}` on {REFERENCE[1]} intervals, cost "
-        f"{exact.cost:.10f}: observed orders at the nodes and, in the four last columns, at five "
-        "places inside every interval.\n"
-    )
-    rows = []
-    columns: list[str] = []
+    print(f"Against `{REFERENCE[0]}` on {REFERENCE[1]} intervals, cost {exact.cost:.10f}.\n")
+    slopes = {}
     for name, sizes in GRIDS.items():
         found = [errors(motion(name, N, exact.trajectory), exact) for N in sizes]
-        columns = list(found[0])
-        slopes = [exponent(sizes, [each[key] for each in found]) for key in columns]
-        observed = [f"{-slope:.2f}" for slope in slopes]
-        rows.append([f"`{name}`", by_name(name).order, f"{sizes[0]} to {sizes[-1]}", *observed])
-    print_table(["scheme", "order", "intervals", *columns], rows)
+        slopes[name] = {
+            key: f"{-exponent(sizes, [each[key] for each in found]):.2f}" for key in found[0]
+        }
+    print("At the nodes:\n")
+    print_slopes(slopes, ("q", "v", "p, p~", "cost"))
+    print("At five places inside every interval:\n")
+    print_slopes(slopes, ("q between", "v between", "a between", "tau between"))
     last = errors(motion("galerkin-3", 32, exact.trajectory), exact)
     print(
         "`galerkin-3` on 32 intervals: relative errors "

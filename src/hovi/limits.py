@@ -158,7 +158,7 @@ def _entries(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, floa
                     f"{nearest(str(name), names)}"
                 )
         return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
-    if np.ndim(given) == 0:
+    if isinstance(given, float | int | np.number):
         given = [given] * robot.nv
     if not isinstance(given, Sequence | np.ndarray) or len(given) != robot.nv:
         raise InputError(

@@ -12,6 +12,8 @@ System = Callable[[Array], tuple[Array, Array]]
 
 SMALL = 1e-9
 """A relative step after which one more would only add rounding: Newton squares it."""
+STALLED = 1e-6
+"""Below this a step that hardly shrinks is rounding; a double root would halve it."""
 MOST_STEPS = 60
 
 
@@ -34,7 +36,7 @@ def newton(system: System, u: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         change = np.abs(step).max(axis=1, initial=0.0) / np.abs(u).max(axis=1, initial=1.0)
         if not np.isfinite(change).all():
             return u, np.isfinite(change) & (change <= SMALL)
-        if (settled := (change <= SMALL) | ((change < 1e-5) & (change > 0.25 * before))).all():
+        if (settled := (change <= SMALL) | ((change < STALLED) & (change > 0.6 * before))).all():
             return u, settled
         before = change
-    return u, np.asarray(change < 1e-5)
+    return u, np.asarray(change < STALLED)

@@ -17,6 +17,8 @@ WARM_INSIDE = 1e-5
 """The same for a start near a solution."""
 DUAL_SPREAD = 1e8
 """How far a multiplier may be from mu over its slack, as a factor."""
+TINY = 1e-300
+"""Least gap whose logarithm is taken."""
 KEEP = 0.99
 """Share of the way to a bound that a step may go while mu is large."""
 
@@ -161,8 +163,8 @@ def _inside(bounds: Bounds, share: float) -> tuple[Array, Array]:
 
 
 def _log(gap: Array) -> Array:
-    """log of a gap; 0 where there is no bound."""
-    return np.asarray(np.log(np.where(np.isfinite(gap), gap, 1.0)))
+    """log of a gap; 0 where there is no bound, far below zero where nothing is left."""
+    return np.asarray(np.log(np.maximum(np.where(np.isfinite(gap), gap, 1.0), TINY)))
 
 
 def _reach(gap: Array, change: Array) -> float:

@@ -12,7 +12,7 @@ inline std::size_t rounded(std::size_t bytes) {
   return (bytes + alignment - 1) / alignment * alignment;
 }
 
-inline std::size_t packs_of(std::size_t n) { return 6 * n + 6 * n * n; }
+inline std::size_t packs_of(std::size_t n) { return 6 * n + 6 * n * n + 9; }
 
 std::size_t workspace_size(std::size_t n) {
   return rounded(n * sizeof(Joint)) + packs_of(n) * sizeof(Pack);
@@ -23,7 +23,7 @@ Workspace divide(void* memory, std::size_t n) {
   Pack* packs = reinterpret_cast<Pack*>(bytes + rounded(n * sizeof(Joint)));
   Pack* J = packs + 6 * n;
   return {reinterpret_cast<Joint*>(bytes), packs, packs + n, packs + 2 * n, packs + 3 * n,
-          packs + 4 * n, packs + 5 * n, J, J + 3 * n * n};
+          packs + 4 * n, packs + 5 * n, J, J + 3 * n * n, J + 6 * n * n};
 }
 
 void expand_pack(const TreeView& tree, Workspace& work, const Multipliers& multipliers,

@@ -71,50 +71,64 @@ inline void curvature_block(const Joint& i, const Joint& j, Pack block[9]) {
   block[3] = dot(j.L, i.c_v) + dot(j.dS, i.k);                    // v_i q_j
   block[4] = dot(j.S, i.k);                                       // vv
   block[6] = dot(j.L, i.c_a);                                     // a_i q_j
+  block[5] = block[7] = block[8] = Pack{};
 }
 
-// Adds sum_k weight_k dtau_k/d(q,v,a)_i dtau_k/d(q,v,a)_j over the listed joints k.
+// block = start + sum_k weight_k dtau_k/d(q,v,a)_i dtau_k/d(q,v,a)_j over the listed joints k.
 inline void gauss_newton_block(const Workspace& work, int n, int i, int j, const int* rows,
-                               int count, Pack block[9]) {
+                               int count, const Pack start[9], Pack block[9]) {
+  const Pack* left_column = entry(work.weighted_J, n, 0, i);
+  const Pack* right_column = entry(work.J, n, 0, j);
   Pack sum[9];
-  for (int b = 0; b < 9; ++b) sum[b] = block[b];
+  for (int b = 0; b < 9; ++b) sum[b] = start[b];
   for (int row = 0; row < count; ++row) {
-    const Pack* left = entry(work.weighted_J, n, rows[row], i);
-    const Pack* right = entry(work.J, n, rows[row], j);
+    const Pack* left = left_column + 3 * rows[row];
+    const Pack* right = right_column + 3 * rows[row];
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) sum[3 * r + c] += left[r] * right[c];
   }
   for (int b = 0; b < 9; ++b) block[b] = sum[b];
 }
 
+// Both move the same bodies only when j carries i; the torques that depend on both are those of
+// their common carriers, and then also of what i carries. Returns where the block is.
+inline const Pack* hessian_block(const TreeView& tree, const Workspace& work, bool curved, int i,
+                                 int j, Pack block[9]) {
+  const int n = tree.n, meeting = tree.meeting[i * n + j];
+  if (meeting < 0) return work.zeros;
+  const bool carried = meeting == j;
+  if (carried && curved) curvature_block(work.joints[i], work.joints[j], block);
+  const int* rows = carried ? tree.related + i * n : tree.carriers + meeting * n;
+  const int count = carried ? tree.related_count[i] : tree.carrier_count[meeting];
+  const Pack* start = carried && curved ? block : work.zeros;
+  gauss_newton_block(work, n, i, j, rows, count, start, block);
+  return block;
+}
+
 // Both triangles from one, so that the result is symmetric to the last bit.
 inline void scatter_block(const Pack block[9], int n, int i, int j, const Lanes& where,
                           double* out) {
-  const std::size_t width = 3 * n;
+  const std::size_t width = 3 * n, next = n * width;
   for (int lane = 0; lane < lanes; ++lane) {
     double* H = out + where.point[lane] * width * width;
-    for (int r = 0; r < 3; ++r)
-      for (int c = i == j ? r : 0; c < 3; ++c)
-        H[(r * n + i) * width + c * n + j] = H[(c * n + j) * width + r * n + i] =
-            block[3 * r + c][lane];
+    double* direct = H + i * width + j;
+    double* mirrored = H + j * width + i;
+    for (int r = 0; r < 3; ++r, direct += next, mirrored += next)
+      for (int c = 0; c < 3; ++c) {
+        direct[c * n] = block[3 * r + c][lane];
+        mirrored[c * n] = block[3 * c + r][lane];
+      }
   }
 }
 
-// Both move the same bodies only when j carries i; the torques that depend on both are those of
-// their common carriers, and then also of what i carries.
-inline void hessian_block(const TreeView& tree, const Workspace& work, bool curved, int i, int j,
-                          Pack block[9]) {
-  const int n = tree.n, meeting = tree.meeting[i * n + j];
-  if (meeting == j) {
-    if (curved) curvature_block(work.joints[i], work.joints[j], block);
-    gauss_newton_block(work, n, i, j, tree.related + i * n, tree.related_count[i], block);
-  } else if (meeting >= 0) {
-    gauss_newton_block(work, n, i, j, tree.carriers + meeting * n, tree.carrier_count[meeting],
-                       block);
-  }
+inline void scatter_diagonal_block(const Pack block[9], int n, int i, const Lanes& where,
+                                   double* out) {
+  const Pack symmetric[9] = {block[0], block[1], block[2], block[1], block[4],
+                             block[5], block[2], block[5], block[8]};
+  scatter_block(symmetric, n, i, i, where, out);
 }
 
-// In strips of i, so that what is written to the mirrored block lies together.
+// In strips of i, so that what is written to the mirrored blocks lies together.
 __attribute__((noinline)) void hessian(const TreeView& tree, Workspace& work, bool curved,
                                        const Lanes& where, double* out) {
   const int n = tree.n;
@@ -122,13 +136,16 @@ __attribute__((noinline)) void hessian(const TreeView& tree, Workspace& work, bo
     for (int k = 0; k < n; ++k)
       for (int c = 0; c < 3; ++c)
         entry(work.weighted_J, n, k, j)[c] = work.weight[k] * entry(work.J, n, k, j)[c];
+  Pack room[9];
   for (int strip = 0; strip < n; strip += 4) {
     const int end = strip + 4 < n ? strip + 4 : n;
     for (int j = 0; j < end; ++j)
       for (int i = j < strip ? strip : j; i < end; ++i) {
-        Pack block[9] = {};
-        hessian_block(tree, work, curved, i, j, block);
-        scatter_block(block, n, i, j, where, out);
+        const Pack* block = hessian_block(tree, work, curved, i, j, room);
+        if (i == j)
+          scatter_diagonal_block(block, n, i, where, out);
+        else
+          scatter_block(block, n, i, j, where, out);
       }
   }
 }

@@ -41,6 +41,7 @@ struct Workspace {
   Joint* joints;
   Pack *q, *v, *a, *weight, *curvature;
   Pack *tau, *J, *weighted_J;
+  const Pack* zeros;  // nine of them
 };
 
 // Where the joint is: R, p, S and the moments of its body.
