@@ -16,7 +16,7 @@ FLAGS = (
 
 
 def main() -> None:
-    task = hovi.load_task(hovi.example("panda_reach"))
+    task = hovi.load_task(hovi.example("panda_reach_limited"))
     solution = hovi.plan(task.scene, task.start, task.goal, task.duration, limits=task.limits)
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "panda.html"

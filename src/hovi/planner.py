@@ -15,6 +15,7 @@ from hovi.errors import InputError
 from hovi.grid import Grid
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, default_processes, distinct, explore
+from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
 from hovi.solver import Solution, Status, guess_path
@@ -89,7 +90,7 @@ def plan(
     best, minima = search.run(guess, starts, seed)
     return dataclasses.replace(
         best,
-        problem=problem,
+        problem=_on_grid_of(problem, best),
         minima=minima,
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
@@ -142,6 +143,13 @@ class _Search:
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
         pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, self.deadline)
         return distinct(pool.solve_all(guesses))
+
+
+def _on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
+    """The problem on the grid that the solution needed, where limits split its intervals."""
+    grid = solution.trajectory.grid
+    same = grid.intervals == problem.grid.intervals
+    return problem if same else problem.on(grid)
 
 
 def _on_coarse_grid(found: list[Solution]) -> list[Solution]:

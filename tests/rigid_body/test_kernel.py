@@ -11,7 +11,8 @@ import pinocchio as pin
 import pytest
 
 from hovi.errors import InputError, ModelError
-from hovi.rigid_body import InverseDynamicsKernel, casadi_functions, joints_without_kernel
+from hovi.rigid_body import InverseDynamicsKernel, _core, casadi_functions, joints_without_kernel
+from hovi.rigid_body.extension import archive
 
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 ROBOTS = [  # name, joints locked, n
@@ -116,10 +117,61 @@ def chain(links: int) -> pin.Model:
     return model
 
 
+AXIS = np.array([0.48, -0.6, 0.64])
+KINDS = [
+    *(pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ()),
+    *(pin.JointModelPX(), pin.JointModelPY(), pin.JointModelPZ()),
+    *(pin.JointModelHX(0.2), pin.JointModelHY(-0.3), pin.JointModelHZ(0.1)),
+    pin.JointModelRevoluteUnaligned(AXIS),
+    pin.JointModelPrismaticUnaligned(AXIS),
+    pin.JointModelHelicalUnaligned(AXIS, 0.3),
+    pin.JointModelTranslation(),
+]
+
+
+def random_tree(joints: int, seed: int, roots: int) -> pin.Model:
+    """A tree of joints of every kind in any order; gravity points anywhere."""
+    rng = np.random.default_rng(seed)
+    pin.seed(seed)
+    model = pin.Model()
+    for i in range(joints):
+        parent = 0 if i < roots else int(rng.integers(1, i + 1))
+        kind = KINDS[rng.integers(len(KINDS))]
+        index = model.addJoint(parent, kind, pin.SE3.Random(), f"joint{i}")
+        model.appendBodyToJoint(index, pin.Inertia.Random(), pin.SE3.Random())
+    model.gravity.linear = rng.normal(size=3)
+    model.armature = rng.uniform(0.1, 1.0, model.nv)
+    return model
+
+
+@pytest.mark.parametrize(("joints", "roots"), [(1, 1), (4, 1), (7, 2), (12, 1), (12, 3)])
+@pytest.mark.parametrize("seed", range(3))
+def test_branching_trees_of_every_kind_of_joint_agree_with_casadi(joints, roots, seed) -> None:
+    assert_kernel_matches_oracle(random_tree(joints, seed, roots), points=5)
+
+
+def core_expansion(core: _core.InverseDynamicsKernel, n: int, points: int) -> list[np.ndarray]:
+    q, v, a, curvature = random_points(n, points)
+    shapes = (points, n), (points, n, 3 * n), (points, 3 * n, 3 * n)
+    out = [np.empty(shape) for shape in shapes]
+    core.expand(q, v, a, np.ones_like(q), curvature, *out, 1)
+    return out
+
+
+@pytest.mark.parametrize("model", [chain(7), random_tree(12, 5, 2)], ids=["chain", "tree"])
+def test_both_instruction_sets_give_the_same_to_rounding(model) -> None:
+    text, n = archive(model), model.nv
+    fast = core_expansion(_core.InverseDynamicsKernel(text), n, 7)
+    portable = core_expansion(_core.InverseDynamicsKernel(text, portable=True), n, 7)
+    for one, other in zip(fast, portable, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
+
+
+# Enough points that it is worth starting threads.
 @pytest.mark.parametrize(("name", "locked", "n"), [ROBOTS[3], ROBOTS[9]])
 def test_all_methods_and_thread_counts_give_the_same_bytes(load_model, name, locked, n) -> None:
     kernel = InverseDynamicsKernel(load_model(name, locked=locked))
-    q, v, a, curvature = random_points(n, 23)
+    q, v, a, curvature = random_points(n, 2003)
     weight = np.ones(n)
     expected = kernel.expand(q, v, a, weight, curvature, threads=1)
     for threads in (2, 5, 40):
@@ -131,16 +183,23 @@ def test_all_methods_and_thread_counts_give_the_same_bytes(load_model, name, loc
     assert kernel.torque(q, v, a).tobytes() == kernel.torque(q, v, a, threads=2).tobytes()
 
 
-def test_a_point_has_the_same_bytes_in_every_batch(load_model) -> None:
-    kernel = InverseDynamicsKernel(load_model("panda"))
-    q, v, a, curvature = random_points(9, 4)
-    whole = kernel.expand(q, v, a, np.ones(9), curvature)
-    for k in range(4):
-        single = kernel.expand(
-            q[k : k + 1], v[k : k + 1], a[k : k + 1], np.ones(9), curvature[k : k + 1]
-        )
-        for batch, alone in zip(whole, single, strict=True):
-            assert batch[k].tobytes() == alone[0].tobytes()
+@pytest.mark.parametrize("points", range(1, 10))
+@pytest.mark.parametrize("portable", [False, True])
+def test_a_point_has_the_same_bytes_in_every_batch(load_model, points, portable) -> None:
+    core = _core.InverseDynamicsKernel(archive(load_model("panda")), portable)
+    q, v, a, curvature = random_points(9, 9)
+
+    def expand(rows: slice) -> list[np.ndarray]:
+        inputs = [np.ascontiguousarray(x[rows]) for x in (q, v, a, np.ones_like(q), curvature)]
+        count = len(inputs[0])
+        out = [np.full((count, *shape), np.nan) for shape in ((9,), (9, 27), (27, 27))]
+        core.expand(*inputs, *out, 1)
+        return out
+
+    whole, head, tail = (expand(rows) for rows in (slice(9), slice(points), slice(-points, None)))
+    for all_points, first, last in zip(whole, head, tail, strict=True):
+        assert all_points[:points].tobytes() == first.tobytes()
+        assert all_points[-points:].tobytes() == last.tobytes()
 
 
 def test_hessians_are_symmetric_to_the_last_bit(load_model) -> None:

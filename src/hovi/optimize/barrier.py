@@ -17,8 +17,8 @@ WARM_INSIDE = 1e-5
 """The same for a start near a solution."""
 DUAL_SPREAD = 1e8
 """How far a multiplier may be from mu over its slack, as a factor."""
-TINY = 1e-300
-"""Least gap whose logarithm is taken."""
+LEAST_GAP = 1e-16
+"""Least gap between a slack and its bound: what rounding tells apart at a bound of one."""
 KEEP = 0.99
 """Share of the way to a bound that a step may go while mu is large."""
 
@@ -123,7 +123,7 @@ class Barrier:
     def with_reset_slacks(self, y: Array, penalty: float) -> Barrier:
         """s = y wherever that is inside and lowers the merit function."""
         below, above = _gaps(self.bounds, y)
-        inside = (below > 0) & (above > 0)
+        inside = (below > LEAST_GAP) & (above > LEAST_GAP)
         here_below, here_above = _gaps(self.bounds, self.s)
         here = penalty * np.abs(y - self.s) - self.mu * (_log(here_below) + _log(here_above))
         there = -self.mu * (_log(np.where(inside, below, 1)) + _log(np.where(inside, above, 1)))
@@ -154,8 +154,8 @@ class Barrier:
 
 
 def _gaps(bounds: Bounds, s: Array) -> tuple[Array, Array]:
-    """(s - lower, upper - s); infinite where there is no bound."""
-    return s - bounds.lower, bounds.upper - s
+    """(s - lower, upper - s), infinite where there is no bound, never less than rounding leaves."""
+    return np.maximum(s - bounds.lower, LEAST_GAP), np.maximum(bounds.upper - s, LEAST_GAP)
 
 
 def _inside(bounds: Bounds, share: float) -> tuple[Array, Array]:
@@ -163,8 +163,8 @@ def _inside(bounds: Bounds, share: float) -> tuple[Array, Array]:
 
 
 def _log(gap: Array) -> Array:
-    """log of a gap; 0 where there is no bound, far below zero where nothing is left."""
-    return np.asarray(np.log(np.maximum(np.where(np.isfinite(gap), gap, 1.0), TINY)))
+    """log of a gap; 0 where there is no bound."""
+    return np.asarray(np.log(np.where(np.isfinite(gap), gap, 1.0)))
 
 
 def _reach(gap: Array, change: Array) -> float:

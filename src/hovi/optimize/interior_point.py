@@ -231,9 +231,11 @@ class _Iteration(Generic[X]):
             return share * distance - smooth - rise
 
         shares = barrier.longest(ds) * FRACTIONS
-        decreases = [decrease(share) for share in shares]
-        best = int(np.argmax(decreases))
-        return _Step(trial, float(shares[best]), ds, dzl, dzu, decreases[best])
+        decreases = np.array([decrease(share) for share in shares])
+        # the longest share among those that rounding cannot tell from the best
+        noise = 1e-13 * abs(self.outcome.outputs.value)
+        best = int(np.argmax(decreases >= np.max(decreases) - noise))
+        return _Step(trial, float(shares[best]), ds, dzl, dzu, float(decreases[best]))
 
     def _try(self, step: _Step, model: QuadraticModel) -> bool:
         outcome, barrier = self.outcome, self.outcome.barrier

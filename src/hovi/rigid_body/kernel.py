@@ -1,7 +1,8 @@
 """Inverse dynamics in doubles over many points, with analytic derivatives, in C++.
 
-The fast sibling of `RigidBodyFunctions.inverse_dynamics`: Pinocchio's own derivatives of RNEA
-[CarpentierMansard2018] [SinghRussellWensing2022], contracted point by point.
+The fast sibling of `RigidBodyFunctions.inverse_dynamics`: closed-form derivatives of RNEA
+[CarpentierMansard2018] [SinghRussellWensing2022] for packs of points at once. The curvature enters
+before second derivatives are formed: no tensor of n^3 numbers arises.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from hovi.rigid_body.extension import archive
 
 Array = npt.NDArray[np.float64]
 
-# Joints along whose own motion the axes do not change: Pinocchio's second derivatives assume it.
+# Joints along whose own motion the axes do not change: the closed forms assume it.
 # "RevoluteUnbounded" and "FreeFlyer" have nq != nv; "SphericalZYX" and "Universal" bend their axes.
 _FIXED_AXES = frozenset(
     ["JointModelTranslation"]
@@ -39,9 +40,10 @@ class InverseDynamicsKernel:
     """tau = M(q) a + b(q, v) with its first and second derivatives over a batch of points.
 
     Points come as q, v, a of shape (P, n) in [rad], [rad/s], [rad/s^2] (metres for sliding joints).
-    The points are shared out over `threads` threads; their number does not change a bit of the
-    result. The GIL is released and nothing is allocated per point. One call at a time runs
-    on a kernel: calls from several Python threads wait for each other.
+    The points are shared out over at most `threads` threads, as many as are worth starting; their
+    number does not change a bit of the result. The GIL is released and nothing is allocated per
+    point. One call at a time runs on a kernel: calls from several Python threads wait for each
+    other.
     """
 
     def __init__(self, model: pin.Model) -> None:

@@ -44,7 +44,7 @@ double point_cost(double n, const Expansion& out) {
 
 // A thread is started in 20 to 50 us: not for less work than that.
 std::size_t useful_threads(std::size_t asked, double work) {
-  const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());
+  static const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());  // 6 us
   const auto worthwhile = static_cast<std::size_t>(work / 50e3);
   return std::max<std::size_t>(1, std::min({asked, cores, worthwhile}));
 }
