@@ -29,6 +29,8 @@ Report = Callable[[int, float], None]
 
 ROUNDS = 20
 """Times that limits are tightened or intervals split before giving up."""
+HALVINGS = 4
+"""Times that a grid is halved when limits do not hold between its points."""
 SPLIT = 0.05
 """Excess, as a share of the range, beyond which the grid is halved instead of tightened."""
 OVERSHOOT = 1.5
@@ -105,6 +107,7 @@ class _Search:
     report: Report | None
     guess: DiscretePath
     iterations: int = 0
+    halvings: int = 0
 
     def __post_init__(self) -> None:
         self.history: list[Iteration] = []
@@ -141,12 +144,14 @@ class _Search:
             excess = excess_along(self._trajectory(outcome.x), self.limits)
             if excess.worst <= tolerance or rounds == ROUNDS:
                 break
-            coarse = excess.worst > SPLIT
-            again = self._halved() if coarse else self._again(outcome, excess)
-            if not (again.feasible and again.stop is Stop.STATIONARY):
-                outcome = again
+            again = None if excess.worst > SPLIT else self._again(outcome, excess)
+            if (again is None or not _solved(again)) and self.halvings < HALVINGS:
+                again = self._halved()
+            if again is None:
                 break
             outcome = again
+            if not _solved(again):
+                break
         reason = ""
         if excess.worst > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
             reason = (
@@ -184,6 +189,7 @@ class _Search:
         A motion that far exceeds a limit between the points lives in the gaps between them: it is
         no guess for a finer grid.
         """
+        self.halvings += 1
         grid = self.problem.grid
         curve = stretched(self._trajectory(self.guess), grid.duration)
         problem = self.problem.on(grid.halved(np.ones(grid.intervals, dtype=bool)))
@@ -271,6 +277,10 @@ class PenalisedAction(Objective[DiscretePath]):
     def _outside(self, x: DiscretePath) -> Array:
         y, bounds = self.limited.outputs(x).y, self.limited.bounds
         return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
+
+
+def _solved(outcome: BoundedOutcome[DiscretePath]) -> bool:
+    return outcome.feasible and outcome.stop is Stop.STATIONARY
 
 
 def _density(outcome: BoundedOutcome[DiscretePath], objective: LimitedAction) -> float:
