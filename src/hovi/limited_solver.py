@@ -27,8 +27,10 @@ from hovi.trajectory import Trajectory
 Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
 
-ROUNDS = 20
-"""Times that limits are tightened or intervals split before giving up."""
+ROUNDS = 40
+"""Times that limits are tightened or intervals halved before giving up."""
+PATIENCE = 9
+"""Times that limits are tightened on one grid."""
 HALVINGS = 4
 """Times that a grid is halved when limits do not hold between its points."""
 SPLIT = 0.05
@@ -138,15 +140,17 @@ class _Search:
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
-        first_value = outcome.outputs.value
+        first_value, tightened = outcome.outputs.value, 0
         tolerance = self.limits.tolerance
         for rounds in range(ROUNDS + 1):
             excess = excess_along(self._trajectory(outcome.x), self.limits)
             if excess.worst <= tolerance or rounds == ROUNDS:
                 break
-            again = None if excess.worst > SPLIT else self._again(outcome, excess)
+            tightened += 1
+            coarse = excess.worst > SPLIT or tightened > PATIENCE
+            again = None if coarse else self._again(outcome, excess)
             if (again is None or not _solved(again)) and self.halvings < HALVINGS:
-                again = self._halved()
+                again, tightened = self._halved(), 0
             if again is None:
                 break
             outcome = again

@@ -5,6 +5,21 @@
 
 namespace hovi {
 
+namespace {
+
+void append(std::vector<Run>& runs, int joint) {
+  if (runs.empty() || runs.back().end != joint) runs.push_back({joint, joint});
+  ++runs.back().end;
+}
+
+std::vector<JointSet> sets(const std::vector<std::vector<Run>>& lists) {
+  std::vector<JointSet> sets;
+  for (const auto& runs : lists) sets.push_back({runs.data(), static_cast<int>(runs.size())});
+  return sets;
+}
+
+}  // namespace
+
 JointTree::JointTree(std::vector<TreeJoint> joints, const double* gravity)
     : joints_(std::move(joints)) {
   std::copy_n(gravity, 6, gravity_);
@@ -24,16 +39,16 @@ void JointTree::relate() {
     for (int j = 0; j < i && parent >= 0; ++j)
       meeting_[i * n + j] = meeting_[j * n + i] = meeting_[parent * n + j];
   }
-  related_.assign(n * n, -1);
-  related_count_.assign(n, 0);
-  carriers_.assign(n * n, -1);
-  carrier_count_.assign(n, 0);
+  related_runs_.resize(n);
+  carrier_runs_.resize(n);
   for (int i = 0; i < n; ++i)
     for (int k = 0; k < n; ++k) {
       const int meeting = meeting_[i * n + k];
-      if (meeting == i || meeting == k) related_[i * n + related_count_[i]++] = k;
-      if (meeting == k) carriers_[i * n + carrier_count_[i]++] = k;
+      if (meeting == i || meeting == k) append(related_runs_[i], k);
+      if (meeting == k) append(carrier_runs_[i], k);
     }
+  related_ = sets(related_runs_);
+  carriers_ = sets(carrier_runs_);
 }
 
 TreeView JointTree::view() const {
@@ -43,9 +58,7 @@ TreeView JointTree::view() const {
   std::copy_n(gravity_, 6, view.gravity);
   view.meeting = meeting_.data();
   view.related = related_.data();
-  view.related_count = related_count_.data();
   view.carriers = carriers_.data();
-  view.carrier_count = carrier_count_.data();
   return view;
 }
 

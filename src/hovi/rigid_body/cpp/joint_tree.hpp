@@ -12,14 +12,21 @@ class JointTree {
   // gravity: the spatial acceleration of free fall, linear then angular part.
   JointTree(std::vector<TreeJoint> joints, const double* gravity);
 
+  JointTree(JointTree&&) = default;
+  JointTree(const JointTree&) = delete;
+
   TreeView view() const;
 
  private:
+  using RunLists = std::vector<std::vector<Run>>;
+
   void relate();
 
   std::vector<TreeJoint> joints_;
   double gravity_[6];
-  std::vector<int> meeting_, related_, related_count_, carriers_, carrier_count_;
+  std::vector<int> meeting_;
+  RunLists related_runs_, carrier_runs_;
+  std::vector<JointSet> related_, carriers_;  // views of these lists
 };
 
 }  // namespace hovi

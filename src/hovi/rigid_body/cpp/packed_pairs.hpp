@@ -74,18 +74,18 @@ inline void curvature_block(const Joint& i, const Joint& j, Pack block[9]) {
   block[5] = block[7] = block[8] = Pack{};
 }
 
-// block = start + sum_k weight_k dtau_k/d(q,v,a)_i dtau_k/d(q,v,a)_j over the listed joints k.
-inline void gauss_newton_block(const Workspace& work, int n, int i, int j, const int* rows,
-                               int count, const Pack start[9], Pack block[9]) {
-  const Pack* left_column = entry(work.weighted_J, n, 0, i);
-  const Pack* right_column = entry(work.J, n, 0, j);
+// block = start + sum_k weight_k dtau_k/d(q,v,a)_i dtau_k/d(q,v,a)_j over the given joints k.
+inline void gauss_newton_block(const Workspace& work, int n, int i, int j, const JointSet& rows,
+                               const Pack start[9], Pack block[9]) {
   Pack sum[9];
   for (int b = 0; b < 9; ++b) sum[b] = start[b];
-  for (int row = 0; row < count; ++row) {
-    const Pack* left = left_column + 3 * rows[row];
-    const Pack* right = right_column + 3 * rows[row];
-    for (int r = 0; r < 3; ++r)
-      for (int c = 0; c < 3; ++c) sum[3 * r + c] += left[r] * right[c];
+  for (int run = 0; run < rows.count; ++run) {
+    const Pack* left = entry(work.weighted_J, n, rows.runs[run].begin, i);
+    const Pack* right = entry(work.J, n, rows.runs[run].begin, j);
+    const Pack* end = entry(work.J, n, rows.runs[run].end, j);
+    for (; right != end; left += 3, right += 3)
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) sum[3 * r + c] += left[r] * right[c];
   }
   for (int b = 0; b < 9; ++b) block[b] = sum[b];
 }
@@ -98,10 +98,9 @@ inline const Pack* hessian_block(const TreeView& tree, const Workspace& work, bo
   if (meeting < 0) return work.zeros;
   const bool carried = meeting == j;
   if (carried && curved) curvature_block(work.joints[i], work.joints[j], block);
-  const int* rows = carried ? tree.related + i * n : tree.carriers + meeting * n;
-  const int count = carried ? tree.related_count[i] : tree.carrier_count[meeting];
+  const JointSet& rows = carried ? tree.related[i] : tree.carriers[meeting];
   const Pack* start = carried && curved ? block : work.zeros;
-  gauss_newton_block(work, n, i, j, rows, count, start, block);
+  gauss_newton_block(work, n, i, j, rows, start, block);
   return block;
 }
 

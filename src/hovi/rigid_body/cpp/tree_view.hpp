@@ -17,15 +17,24 @@ struct TreeJoint {
   double subtree_mass;    // of this body and all that it carries [kg]
 };
 
+// The joints [begin, end).
+struct Run {
+  int begin, end;
+};
+
+// Some joints, in ascending order.
+struct JointSet {
+  const Run* runs;
+  int count;
+};
+
 struct TreeView {
   int n;
   const TreeJoint* joints;
   double gravity[6];         // spatial acceleration of free fall: linear, angular
   const int* meeting;        // (n, n): the last joint that carries both, or -1
-  const int* related;        // (n, n): row i lists the joints that carry i, i, and those i carries
-  const int* related_count;  // (n,)
-  const int* carriers;       // (n, n): row i lists the joints that carry i, and i
-  const int* carrier_count;  // (n,)
+  const JointSet* related;   // (n,): the joints that carry i, i, and those that i carries
+  const JointSet* carriers;  // (n,): the joints that carry i, and i
 };
 
 }  // namespace hovi
