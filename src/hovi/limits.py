@@ -127,6 +127,8 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
         return limits
     if isinstance(limits, str):
         return _by_word(robot, limits)
+    if not isinstance(limits, Mapping):
+        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {limits!r}.")
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
@@ -136,13 +138,20 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
     for row, kind in enumerate(KINDS):
         for i, (low, high) in _entries(robot, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
-    chosen = Limits(lower, upper, float(limits.get("tolerance", TOLERANCE)))
-    return chosen.with_margin(float(limits.get("margin", 0.0)))
+    chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
+    return chosen.with_margin(_number(limits, "margin", 0.0))
 
 
-def _by_word(robot: Robot, word: str) -> Limits:
+def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
+    value = limits.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, float | int | np.number):
+        raise InputError(f"limits.{key} is a number, got {value!r}.")
+    return float(value)
+
+
+def _by_word(robot: Robot, word: Any) -> Limits:
     words = {"urdf": urdf_limits, "none": no_limits}
-    if word not in words:
+    if not isinstance(word, str) or word not in words:
         raise InputError(f"limits are 'urdf', 'none' or given by kind, not {word!r}.")
     return words[word](robot)
 

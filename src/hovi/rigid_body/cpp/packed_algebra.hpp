@@ -32,7 +32,9 @@ struct Mat {
 
 inline Mat operator+(const Mat& A, const Mat& B) { return {A.x + B.x, A.y + B.y, A.z + B.z}; }
 inline Vec operator*(const Mat& A, const Vec& b) { return b.x * A.x + b.y * A.y + b.z * A.z; }
-inline Vec transposed(const Mat& A, const Vec& b) { return {dot(A.x, b), dot(A.y, b), dot(A.z, b)}; }
+inline Vec transposed(const Mat& A, const Vec& b) {
+  return {dot(A.x, b), dot(A.y, b), dot(A.z, b)};
+}
 inline Vec rotate(const Mat& R, const double* b) { return b[0] * R.x + b[1] * R.y + b[2] * R.z; }
 
 // v(A)_i = sum_jk epsilon_ijk A_kj: of u x^T it is x x u.
@@ -45,7 +47,9 @@ struct Sym {
 inline Sym operator+(const Sym& A, const Sym& B) {
   return {A.xx + B.xx, A.xy + B.xy, A.xz + B.xz, A.yy + B.yy, A.yz + B.yz, A.zz + B.zz};
 }
-inline Mat full(const Sym& A) { return {{A.xx, A.xy, A.xz}, {A.xy, A.yy, A.yz}, {A.xz, A.yz, A.zz}}; }
+inline Mat full(const Sym& A) {
+  return {{A.xx, A.xy, A.xz}, {A.xy, A.yy, A.yz}, {A.xz, A.yz, A.zz}};
+}
 
 struct Motion {
   Vec w, u;  // angular, linear
@@ -75,6 +79,10 @@ struct Moments {
   Vec h;
   Sym sigma;
 };
+
+inline Moments operator+(const Moments& a, const Moments& b) {
+  return {a.h + b.h, a.sigma + b.sigma};
+}
 
 // B(I, V) x = 1/2 (V x* I - I V x + (I V) x*) x, linear in I and V [SinghRussellWensing2022].
 // In the world's frame it is (C w, w x p): C = -(W Sigma + H U) with W, H, U the cross matrices of

@@ -1,14 +1,17 @@
 // Inverse dynamics and its derivatives over a pack of points, everything in the world's frame.
 //
-// phi = curvature^T tau = sum_b w_b^T f_b, with w_b the sum of curvature_k S_k over the joints k
-// that carry body b, and f_b = I_b A_b + V_b x* I_b V_b. Turning joint j by dq_j moves all that it
-// carries by S_j dq_j. Seen from there, for every body and joint that j carries, j included,
-//   dV = dS_j dq_j,  dA = (ddS_j + dS_j x V) dq_j,  dw = L_j dq_j,
-//   dS = V_p x S,  ddS = A_p x S + V_p x dS,  L = w_p x S  (V_p, A_p, w_p: of the parent),
-// and a change of its speed gives dV = S_j dv_j, dA = (S_j x V + 2 dS_j) dv_j. So tau, the gradient
-// of phi and the changes of both are sums over the bodies that the farther joint carries: of I_b,
-// B(I_b, V_b), B(I_b, w_b), f_b and 2 B(I_b, V_b)^T w_b.
-// First derivatives: [SinghRussellWensing2022]; the contraction: in the spirit of
+// phi = curvature^T tau = sum_b w_b . f_b, with w_b the sum of curvature_k S_k over the joints k
+// that carry body b, and f_b = I_b A_b + V_b x* I_b V_b. So no tensor of n^3 numbers arises: phi's
+// gradient and Hessian are sums over the bodies b that a joint i carries,
+//   I = sum I_b,  B_V = sum B(I_b, V_b),  B_w = sum B(I_b, w_b),
+//   f = sum f_b,  y = sum 2 B(I_b, V_b)^T w_b,  z = sum I_b w_b;
+//   dphi/da_i = S . z,  dphi/dv_i = S . y + 2 dS . z,  dphi/dq_i = dS . y + ddS . z + L . f
+// with V, A, w of the parent in dS = V x S, ddS = A x S + V x dS, L = w x S.
+// Turning joint j moves all that it carries by S_j. Seen from there, for what j carries and itself,
+//   dV = dS_j,  dA = ddS_j + dS_j x V,  dw = L_j  per dq_j,
+//   dV = S_j,   dA = S_j x V + 2 dS_j,  dw = 0    per dv_j,
+//   dA = S_j                                      per da_j.
+// First derivatives: [SinghRussellWensing2022]; multipliers that enter before differentiation:
 // [NgangaWensing2021].
 #pragma once
 
@@ -127,7 +130,7 @@ __attribute__((noinline)) void inverse_dynamics(const TreeView& tree, Workspace&
   }
 }
 
-// What the first derivatives need of each joint. To be called after inverse_dynamics.
+// ddS, and B_V of each body. After inverse_dynamics.
 __attribute__((noinline)) void first_order(const TreeView& tree, Workspace& work) {
   const double* g = tree.gravity;
   const Motion fall{{broadcast(-g[3]), broadcast(-g[4]), broadcast(-g[5])},
@@ -143,7 +146,7 @@ __attribute__((noinline)) void first_order(const TreeView& tree, Workspace& work
   }
 }
 
-// From the bodies' own quantities to the sums over all that a joint carries.
+// c_a = I S,  c_v = 2 (B_V S + I dS),  c_q = 2 B_V dS + I ddS + S x* f,  r = 2 B_V^T S.
 __attribute__((noinline)) void add_first_order(const TreeView& tree, Workspace& work) {
   for (int i = tree.n - 1; i >= 0; --i) {
     const TreeJoint& model = tree.joints[i];
@@ -156,12 +159,13 @@ __attribute__((noinline)) void add_first_order(const TreeView& tree, Workspace& 
     joint.r = 2.0 * transposed(joint.B_V, joint.S);
     if (model.parent < 0) continue;
     Joint& parent = work.joints[model.parent];
-    parent.moments = {parent.moments.h + joint.moments.h, parent.moments.sigma + joint.moments.sigma};
+    parent.moments = parent.moments + joint.moments;
     parent.B_V = parent.B_V + joint.B_V;
   }
 }
 
-// What the second derivatives of phi need: between first_order and add_first_order.
+// L, and B_w and y of each body. Between first_order, which finds B_V, and add_first_order, which
+// adds up the moments.
 __attribute__((noinline)) void second_order(const TreeView& tree, Workspace& work) {
   const Vec zero = zero_vec();
   const Motion rest{zero, zero};
@@ -176,7 +180,8 @@ __attribute__((noinline)) void second_order(const TreeView& tree, Workspace& wor
   }
 }
 
-// After add_first_order.
+// e = S x* z + I L,  k = 2 (S x* z - B_w S),  h = S x* y + 2 dS x* z - 2 B_w dS + 2 B_V^T L: what
+// the changes of the gradient at i by its carriers are products with. After add_first_order.
 __attribute__((noinline)) void add_second_order(const TreeView& tree, Workspace& work) {
   for (int i = tree.n - 1; i >= 0; --i) {
     const TreeJoint& model = tree.joints[i];

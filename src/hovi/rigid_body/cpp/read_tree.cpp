@@ -68,7 +68,7 @@ JointTree read_tree(const std::string& archive) {
       const Vector3d linear = S.col(k).head<3>(), angular = S.col(k).tail<3>();
       TreeJoint joint{};
       joint.parent = frame.joint;
-      joint.turn = angular.isZero() ? 0 : angular.norm();
+      joint.turn = angular.isZero() ? 0 : 1;
       const Matrix3d Q = frame_along((joint.turn ? angular : linear).normalized());
       joint.slide = Q.col(2).dot(linear);
       set_placement(frame.Q.transpose() * placement.rotation() * Q,
