@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hovi.contradictions import contradiction, static_sentence
 from hovi.grid import DiscretePath
-from hovi.guess import path_on_grid, stretched
+from hovi.guess import path_on_grid, stretched, with_bump
 from hovi.limit_check import Excess, excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
 from hovi.limits import Limits
@@ -43,8 +43,12 @@ SPARE = 1e-3
 """Unused share of a range beyond which a bound that was drawn in is let out again."""
 WARM_MU = 1e-7, 1e-4
 """Range of the first barrier parameter of a tightened problem, relative to the mean density."""
-PENALTIES = 1e4, 1e6
+PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the same, when the interior point finds no way."""
+PENALTY_STEPS = 150
+"""Steps with each penalty."""
+BUMPED_GUESSES = 3
+"""Perturbed guesses that are tried before limits are called infeasible."""
 HELD = 1e-3
 """Violation, as a share of the range, below which the larger penalty counts as having found one."""
 
@@ -124,19 +128,41 @@ class _Search:
     def restored(
         self, outcome: BoundedOutcome[DiscretePath]
     ) -> tuple[BoundedOutcome[DiscretePath], str]:
-        """A second try from a motion that violates little, or the reason why there is none."""
+        """More tries, from motions that violate little, or the reason why there is none."""
         objective = LimitedAction(self.problem, self.limits)
-        path = outcome.x
+        density = _density(outcome, objective)
+        least = np.inf
+        for guess in self._guesses():
+            path, violation = self._penalised(objective, guess, density)
+            if violation <= HELD:
+                options = self._options()
+                again = self._count(minimize_bounded(objective, path, options, self.report))
+                if again.feasible:
+                    return again, ""
+            if violation < least:
+                least, outcome.x = violation, path
+        outcome.outputs = objective.outputs(outcome.x)
+        return outcome, self._why(outcome.x)
+
+    def _guesses(self) -> Iterator[DiscretePath]:
+        """The guess, and perturbations of it."""
+        yield self.guess
+        problem = self.problem
+        T = problem.grid.duration
+        base = stretched(self._trajectory(self.guess), T)
+        for seed in range(BUMPED_GUESSES):
+            curve = with_bump(base, problem.robot, T, seed)
+            yield path_on_grid(curve, problem.grid, problem.boundary, problem.robot)
+
+    def _penalised(
+        self, objective: LimitedAction, path: DiscretePath, density: float
+    ) -> tuple[DiscretePath, float]:
+        """A motion of little violation, by penalties that grow, and its violation."""
         for penalty in PENALTIES:
-            penalised = PenalisedAction(objective, penalty * _density(outcome, objective))
-            path = minimize(penalised, path, self._options(), None).x
-        if penalised.violation(path) <= HELD:
-            again = self._count(minimize_bounded(objective, path, self._options(), self.report))
-            if again.feasible:
-                return again, ""
-        outcome.x = path
-        outcome.outputs = objective.outputs(path)
-        return outcome, self._why(path)
+            penalised = PenalisedAction(objective, penalty * density)
+            options = dataclasses.replace(self._options(), max_iterations=PENALTY_STEPS)
+            path = minimize(penalised, path, options, None).x
+        return path, penalised.violation(path)
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""

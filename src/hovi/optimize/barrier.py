@@ -118,7 +118,14 @@ class Barrier:
         keep = self._keep()
         dual = min(1.0, keep * min(_reach(self.zl, dzl), _reach(self.zu, dzu)))
         zl, zu = self.zl + dual * dzl, self.zu + dual * dzu
-        return dataclasses.replace(self, s=self.s + share * ds, zl=zl, zu=zu)._masked()
+        return dataclasses.replace(self.with_slacks(ds, share), zl=zl, zu=zu)._masked()
+
+    def with_slacks(self, ds: Array, share: float) -> Barrier:
+        """Slacks moved by a share of ds, each as far as it leaves a little of its gaps."""
+        below, above = _gaps(self.bounds, self.s)
+        keep = self._keep()
+        step = np.clip(share * ds, -keep * below, keep * above)
+        return dataclasses.replace(self, s=self.s + step)
 
     def with_reset_slacks(self, y: Array, penalty: float) -> Barrier:
         """s = y wherever that is inside and lowers the merit function."""

@@ -46,6 +46,8 @@ FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
 """Shares of the longest step inside the bounds among which the model chooses."""
 INFEASIBLE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
+SETTLED = 1e-9
+"""Largest |y - s| of an output whose slack may not be cut off from it any more."""
 STALL = 12
 """Steps in a row that hardly move before the bounds are called into question."""
 
@@ -223,14 +225,16 @@ class _Iteration(Generic[X]):
             self.penalty = max(self.penalty, 1.2 * largest)
         square = -float(np.vdot(model.gradient, trial.step)) - trial.shift * trial.norm**2
         square -= float(np.sum(weights * barrier.sigma * dy**2))
-        distance = self.penalty * float(np.sum(weights * np.abs(residual)))
+        y = self.outcome.outputs.y
+        settled = np.abs(residual) <= SETTLED
+        before = barrier.merit(weights, y, self.penalty)
 
         def decrease(share: float) -> float:
             smooth = share * slope + 0.5 * share**2 * square
-            rise = barrier.value(weights, barrier.s + share * ds) - barrier.value(weights)
-            return share * distance - smooth - rise
+            after = barrier.with_slacks(ds, share).merit(weights, y + share * dy, self.penalty)
+            return before - after - smooth
 
-        shares = barrier.longest(ds) * FRACTIONS
+        shares = barrier.longest(np.where(settled, ds, 0.0)) * FRACTIONS
         decreases = np.array([decrease(share) for share in shares])
         # the longest share among those that rounding cannot tell from the best
         noise = 1e-13 * abs(self.outcome.outputs.value)

@@ -62,8 +62,8 @@ inline void scatter_jacobian(const Workspace& work, int n, const Lanes& where, d
         }
 }
 
-// The block of d2 phi in (q, v, a)_i and (q, v, a)_j where joint j carries joint i. tau is affine in
-// a and quadratic in v: the blocks va and aa vanish.
+// The block of d2 phi in (q, v, a)_i and (q, v, a)_j where joint j carries joint i. tau is affine
+// in a and quadratic in v: the blocks va and aa vanish.
 inline void curvature_block(const Joint& i, const Joint& j, Pack block[9]) {
   block[0] = dot(j.L, i.c_q) + dot(j.ddS, i.e) + dot(j.dS, i.h);  // qq
   block[1] = dot(j.S, i.h) + 2.0 * dot(j.dS, i.e);                // q_i v_j
