@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_limits
 
 
 def alone(function: Callable[..., Any], *arguments: Any, threads: int = 1) -> Any:
@@ -25,7 +25,12 @@ def alone(function: Callable[..., Any], *arguments: Any, threads: int = 1) -> An
     os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = str(threads)
     print(f"{function.__name__}{arguments}, {threads} thread(s)", file=sys.stderr, flush=True)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(function, *arguments).result()
+        return pool.submit(_limited, threads, function, arguments).result()
+
+
+def _limited(threads: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    with threadpool_limits(threads):
+        return function(*arguments)
 
 
 def best_time(work: Callable[[], Any], seconds: float = 0.5, least: int = 3) -> float:
@@ -51,11 +56,6 @@ def peak_memory() -> float:
 def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
     """p of values ~ sizes^p, by least squares in logarithms."""
     return float(np.polyfit(np.log(sizes), np.log(values), 1)[0])
-
-
-def blas_threads() -> int:
-    """Threads that NumPy's BLAS uses in this process."""
-    return max((pool["num_threads"] for pool in threadpool_info()), default=1)
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:

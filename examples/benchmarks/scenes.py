@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from measuring import alone, best_time, blas_threads, peak_memory, print_machine, print_table
+from measuring import alone, best_time, peak_memory, print_machine, print_table
 from sampling import PARTS, shares
 
 import hovi
@@ -36,7 +36,7 @@ def measure(scene: str) -> dict[str, float]:
     result |= {"success": solution.success, "cost": solution.cost}
     result["warm"] = best_time(lambda: hovi.solve(problem), seconds=1.0)
     result["memory"] = peak_memory()
-    return result | shares(lambda: hovi.solve(problem)) | {"threads": blas_threads()}
+    return result | shares(lambda: hovi.solve(problem))
 
 
 def main() -> None:
@@ -64,8 +64,7 @@ def main() -> None:
         "that follows before the solve. Both are timed once, in a process that has only imported "
         "hovi.\n"
     )
-    threads = {run["threads"] for run in runs.values()}
-    print_machine(threads=int(max(threads)))
+    print_machine(threads=1)
 
 
 if __name__ == "__main__":

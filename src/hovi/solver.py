@@ -25,6 +25,10 @@ from hovi.trajectory_objective import ActionObjective, follow
 Report = Callable[[int, float], None]
 
 
+DECREASE = 1e-9
+"""Relative decrease that the last step but one may predict; the last has the exact Hessian."""
+
+
 class Status(StrEnum):
     """What a solve ended in."""
 
@@ -122,7 +126,10 @@ def solve(
     began = time.perf_counter()
     path = guess_path(problem, guess)
     options = Options(
-        max_iterations=max_iterations, time_limit=time_limit, escape_saddles=escape_saddles
+        decrease=DECREASE,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        escape_saddles=escape_saddles,
     )
     started = time.perf_counter()
     method = _with_limits if problem.limited else _without_limits

@@ -171,7 +171,7 @@ def test_both_instruction_sets_give_the_same_to_rounding(model) -> None:
 @pytest.mark.parametrize(("name", "locked", "n"), [ROBOTS[3], ROBOTS[9]])
 def test_all_methods_and_thread_counts_give_the_same_bytes(load_model, name, locked, n) -> None:
     kernel = InverseDynamicsKernel(load_model(name, locked=locked))
-    q, v, a, curvature = random_points(n, 2003)
+    q, v, a, curvature = random_points(n, 4003)
     weight = np.ones(n)
     expected = kernel.expand(q, v, a, weight, curvature, threads=1)
     for threads in (2, 5, 40):

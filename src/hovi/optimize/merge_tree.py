@@ -9,6 +9,7 @@ eliminated blocks give the inertia. [ColomboFerraroMartin2016, section 2]
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,23 +19,22 @@ from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 
 Array = npt.NDArray[np.float64]
 
+CHUNK = 512
+"""Intervals or pairs that are eliminated at a time."""
+
 
 @dataclass(frozen=True, eq=False)
 class MergeLevel:
     """One round of merging neighbouring pairs.
 
-    left, right: child coordinates (4) over the parent's (q0, H v0, Z0, Z1, Y0, Y1), (P, 4, 6).
-    odd: whether a last interval stays alone in this round.
+    left, right: child coordinates (4) over the parent's (q0, H v0, Z0, Z1, Y0, Y1), shape
+        (P, 4, 6), or (1, 4, 6) where all pairs are cut alike.
+    pairs: number P of parents. A last interval without a partner stays as it is.
     """
 
     left: Array
     right: Array
-    odd: bool
-
-    @property
-    def pairs(self) -> int:
-        """Number P of parents."""
-        return len(self.left)
+    pairs: int
 
     def merge(self, children: Array) -> Array:
         """Sum of the children's covectors on their parents, (P, 6, n)."""
@@ -49,9 +49,15 @@ class MergeLevel:
         total = np.zeros((P, 36, n * n))
         for T, first in ((self.left, 0), (self.right, 1)):
             child = children[first : 2 * P : 2]
-            pairs = np.einsum("pxi,pyj->pijxy", T, T).reshape(P, 36, 16)
+            pairs = np.einsum("pxi,pyj->pijxy", T, T).reshape(len(T), 36, 16)
             total += np.matmul(pairs, child.reshape(P, 16, n * n))
         return total.reshape(P, 6, 6, n, n)
+
+    def chunk(self, first: int, last: int) -> MergeLevel:
+        """The round of some of the pairs alone."""
+        one = len(self.left) == 1
+        left, right = (T if one else T[first:last] for T in (self.left, self.right))
+        return MergeLevel(left, right, last - first)
 
     def split(self, parents: Array) -> Array:
         """Coordinates of the children (C, 4, n) from those of the parents (P, 6, n)."""
@@ -68,8 +74,9 @@ def merge_levels(steps: Array) -> list[MergeLevel]:
     while len(lengths) > 1:
         P = len(lengths) // 2
         joint = lengths[0 : 2 * P : 2] + lengths[1 : 2 * P : 2]
-        left, right = _split_tables(lengths[0 : 2 * P : 2] / joint)
-        levels.append(MergeLevel(left, right, len(lengths) % 2 == 1))
+        share = lengths[0 : 2 * P : 2] / joint
+        left, right = _split_tables(share[:1] if np.ptp(share) == 0 else share)
+        levels.append(MergeLevel(left, right, P))
         lengths = np.concatenate([joint, lengths[2 * P :]])
     return levels
 
@@ -173,24 +180,27 @@ class MergeTreeModel(QuadraticModel):
         return self._eliminate(0.0, definite=False)[1]
 
     def _eliminate(self, shift: float, definite: bool) -> tuple[list[_Elimination], int]:
-        A = self._shifted(shift)
         r, n = self.tree.inner_modes, self.tree.dof
-        eliminations = []
-        S, elimination, negative = _condense(A, r, n, definite)
-        eliminations.append(elimination)
+        chunks = (self._shifted(shift, part) for part in _chunks(self.tree.intervals))
+        S, elimination, negative = _condense_all(chunks, r, n, definite)
+        eliminations = [elimination]
         for level in self.tree.levels:
-            merged, elimination, count = _condense(level.merge_hessian(S), 2, n, definite)
+            chunks = (
+                level.chunk(part.start, part.stop).merge_hessian(S[2 * part.start : 2 * part.stop])
+                for part in _chunks(level.pairs)
+            )
+            merged, elimination, count = _condense_all(chunks, 2, n, definite)
             eliminations.append(elimination)
             negative += count
             S = np.concatenate([merged, S[2 * level.pairs :]])
         return eliminations, negative
 
-    def _shifted(self, shift: float) -> Array:
-        A = self.intervals.hessian.copy()
+    def _shifted(self, shift: float, part: slice) -> Array:
+        A = self.intervals.hessian[part].copy()
         if shift:
             diagonal = np.arange(self.tree.dof)
-            A[:, :, :, diagonal, diagonal] += shift * self.intervals.metric[..., None]
-        i, j = np.nonzero(~self.tree.present)
+            A[:, :, :, diagonal, diagonal] += shift * self.intervals.metric[part][..., None]
+        i, j = np.nonzero(~self.tree.present[part])
         A[i, 4 + j, 4 + j] += np.eye(self.tree.dof)
         return A
 
@@ -230,6 +240,27 @@ def _descend(level: MergeLevel, x: Array, Y: Array) -> Array:
     """Children of a round: from the parents' coordinates and Y, the odd one carried over."""
     children = level.split(np.concatenate([x[: level.pairs], Y], axis=1))
     return np.concatenate([children, x[level.pairs :]])
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    """Parts of a round that stay in the processor's cache."""
+    for first in range(0, count, CHUNK):
+        yield slice(first, min(first + CHUNK, count))
+
+
+def _condense_all(
+    chunks: Iterable[Array], k: int, n: int, definite: bool
+) -> tuple[Array, _Elimination, int]:
+    """`_condense` of one round, chunk by chunk."""
+    schur, eliminations, negative = [], [], 0
+    for chunk in chunks:
+        S, elimination, count = _condense(chunk, k, n, definite)
+        schur.append(S)
+        eliminations.append(elimination)
+        negative += count
+    inverse = np.concatenate([e.inverse for e in eliminations])
+    coupling = np.concatenate([e.coupling for e in eliminations])
+    return np.concatenate(schur), _Elimination(inverse, coupling), negative
 
 
 def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimination, int]:

@@ -42,10 +42,10 @@ double point_cost(double n, const Expansion& out) {
   return out.jacobian ? 30 * n + 2 * n * n : 20 * n;
 }
 
-// A thread is started in 20 to 50 us: not for less work than that.
+// To start and join a thread takes 20 to 90 us: not for little more work than that.
 std::size_t useful_threads(std::size_t asked, double work) {
   static const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());  // 6 us
-  const auto worthwhile = static_cast<std::size_t>(work / 50e3);
+  const auto worthwhile = static_cast<std::size_t>(work / 150e3);
   return std::max<std::size_t>(1, std::min({asked, cores, worthwhile}));
 }
 
