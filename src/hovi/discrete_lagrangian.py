@@ -20,6 +20,8 @@ from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Jet = tuple[Array, Array, Array]
+"""(q, v, a) at points, each of shape (P, n)."""
 Coordinates = Literal["nodal", "regular"]
 COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
 
@@ -101,19 +103,21 @@ class DiscreteLagrangian:
     lagrangian: Lagrangian
     grid: Grid
 
-    def values(self, path: DiscretePath) -> Array:
-        """L_d of every interval, shape (N,)."""
+    def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
+        """L_d of every interval, shape (N,).
+
+        jets: what `jets` gave for this path, where it is known already.
+        """
         values = np.empty(self.grid.intervals)
-        for batch in self._batches:
-            jet = _jet(batch, path)
+        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
             point_values = self.lagrangian.value(*jet, t=batch.t)
             weights = batch.h[:, None] * batch.scheme.weights
             values[batch.index] = np.sum(point_values.reshape(weights.shape) * weights, axis=1)
         return values
 
-    def action(self, path: DiscretePath) -> float:
-        """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1})."""
-        return float(np.sum(self.values(path)))
+    def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
+        """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
+        return float(np.sum(self.values(path, jets)))
 
     def expand(
         self,
@@ -121,19 +125,22 @@ class DiscreteLagrangian:
         coordinates: Coordinates = "nodal",
         multipliers: list[Array] | None = None,
         terms: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
     ) -> Expansion:
         """Value, gradient and Hessian of every L_d: see Expansion.
 
         multipliers: weights of the curvature of tau, one array per batch, as `predict` gives
             them; the torque itself when None.
         terms: what limits add at the points, one per batch; the values stay those of L_d.
+        jets: as for `values`.
         """
         parts = []
+        known = jets or self.jets(path)
         for i, batch in enumerate(self._batches):
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
             value, point_gradient, point_hessian, torque = self._evaluate(
-                batch, path, multiplier, term
+                batch, known[i], multiplier, term
             )
             gradient = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
             hessian = _contract_hessian(batch, coordinates, point_hessian)
@@ -180,7 +187,7 @@ class DiscreteLagrangian:
             steps.append(jet.reshape(len(batch.t), -1))
         return steps
 
-    def jets(self, path: DiscretePath) -> list[tuple[Array, Array, Array]]:
+    def jets(self, path: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
         return [_jet(batch, path) for batch in self._batches]
 
@@ -230,10 +237,9 @@ class DiscreteLagrangian:
         return list(_split(self.grid))
 
     def _evaluate(
-        self, batch: _Batch, path: DiscretePath, multiplier: Array | None, terms: PointTerms | None
+        self, batch: _Batch, jet: Jet, multiplier: Array | None, terms: PointTerms | None
     ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
         """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
-        jet = _jet(batch, path)
         weights = batch.h[:, None] * batch.scheme.weights
         if isinstance(self.lagrangian, EffortLagrangian):
             value, gradient, hessian, tau, J = self.lagrangian.expand(

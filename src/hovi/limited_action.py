@@ -54,7 +54,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         """The discrete action, and the bounded outputs in units of their ranges."""
         value, rows = 0.0, []
         for jet, t, weights in zip(
-            self.ld.jets(x), self.ld.point_times, self.ld.point_weights, strict=True
+            self.action.jets(x), self.ld.point_times, self.ld.point_weights, strict=True
         ):
             tau = self.lagrangian.torques.torque(*jet, t)
             value += float(weights @ self.lagrangian.value_of(tau, jet, t))
@@ -108,7 +108,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         """R tau as foreseen, or as it is at x."""
         if self._predicted is not None:
             return self._predicted[batch]
-        jet, t = self.ld.jets(x)[batch], self.ld.point_times[batch]
+        jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
         return self.lagrangian.weight * self.lagrangian.torques.torque(*jet, t)
 
     @cached_property

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
-from hovi.discrete_lagrangian import Coordinates, Expansion
+from hovi.discrete_lagrangian import Coordinates, Expansion, Jet
 from hovi.grid import DiscretePath
 from hovi.guess import moved
 from hovi.lagrangian import PointTerms
@@ -46,6 +46,7 @@ class ActionObjective(Objective[DiscretePath]):
         small = problem.grid.intervals <= BAND_INTERVALS
         self.algebra: LinearAlgebra = algebra or ("band" if small else "tree")
         self._expansion: Expansion | None = None
+        self._last: tuple[DiscretePath, list[Jet]] | None = None
 
     @property
     def expansion(self) -> Expansion:
@@ -61,7 +62,13 @@ class ActionObjective(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The discrete action."""
-        return self.ld.action(x)
+        return self.ld.action(x, self.jets(x))
+
+    def jets(self, x: DiscretePath) -> list[Jet]:
+        """(q, v, a) at the quadrature points, remembered for the last path."""
+        if self._last is None or self._last[0] is not x:
+            self._last = x, self.ld.jets(x)
+        return self._last[1]
 
     def model(
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
@@ -80,7 +87,7 @@ class ActionObjective(Objective[DiscretePath]):
         terms: list[PointTerms] | None,
     ) -> QuadraticModel:
         """The model at x with given curvature weights and with what limits add at the points."""
-        self._expansion = self.ld.expand(x, self.coordinates, multipliers, terms)
+        self._expansion = self.ld.expand(x, self.coordinates, multipliers, terms, self.jets(x))
         intervals = IntervalSum(
             self._expansion.gradient,
             self._expansion.hessian,
