@@ -27,6 +27,7 @@ from headless_browser import CHROMIUM, Tab, headless_browser
 from hovi import playback
 from hovi.chain_urdf import chain
 from hovi.errors import DisplayError
+from hovi.highlights import _bridged
 from hovi.limits import as_limits
 from hovi.playback import Replay, replay
 from hovi.robot import Robot, load_robot
@@ -192,10 +193,10 @@ def test_links_look_as_before_at_the_end(limited_motion: Trajectory, tmp_path: P
 def test_short_gaps_do_not_flicker() -> None:
     flags = np.zeros((60, 1), dtype=bool)
     flags[[10, 14, 15, 19, 40]] = True
-    bridged = playback._bridged(flags)[:, 0]
+    bridged = _bridged(flags)[:, 0]
     np.testing.assert_array_equal(np.flatnonzero(bridged), [*range(10, 20), 40])
     edges = np.ones((5, 1), dtype=bool)
-    np.testing.assert_array_equal(playback._bridged(edges), edges)
+    np.testing.assert_array_equal(_bridged(edges), edges)
 
 
 def test_a_motion_that_is_never_at_a_limit_is_drawn_once(

@@ -23,6 +23,8 @@ SCRIPTS = (
     "replanning",
     "dimensions",
     "peers",
+    "limits",
+    "random_reaches",
     "growth",
 )
 

@@ -27,7 +27,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
 
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Which end a torque limit does not even hold at rest, as the end of a sentence, or ""."""
+    """Which end takes more than a torque limit at rest, as the end of a sentence, or ""."""
     q0, v0, q1, v1 = problem.boundary
     zero = np.zeros((1, problem.robot.nv))
     for end, q, v in (("start", q0, v0), ("goal", q1, v1)):
@@ -54,8 +54,8 @@ def _outside(end: str, row: int, values: Array, limits: Limits, names: tuple[str
     kind = KINDS[row]
     return (
         f"the {end}'s {NAMES[kind]} of joint {names[i]!r} is {values[i]:.6g} {UNITS[kind]}, "
-        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the {end} or "
-        "widen them"
+        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
+        f"{end} or widen them"
     )
 
 
@@ -70,6 +70,6 @@ def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...
         return ""
     return (
         f"joint {names[i]!r} has {abs(distance[i]):.4g} rad to go, which takes {needed[i]:.4g} s "
-        f"at its velocity limit of {fastest[i]:.4g} rad/s, more than the duration of {T:.4g} s; allow "
-        "more time or a higher velocity"
+        f"at its velocity limit of {fastest[i]:.4g} rad/s, more than the duration of {T:.4g} s; "
+        "allow more time or a higher velocity"
     )

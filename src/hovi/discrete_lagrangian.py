@@ -266,7 +266,7 @@ def _split(grid: Grid) -> Iterator[_Batch]:
             yield _Batch(scheme, chosen, h, t.ravel())
 
 
-def _jet(batch: _Batch, path: DiscretePath) -> tuple[Array, Array, Array]:
+def _jet(batch: _Batch, path: DiscretePath) -> Jet:
     """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n).
 
     The chart of an interval is the identity: q = q0 + x.

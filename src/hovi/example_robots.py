@@ -21,7 +21,11 @@ BUILT_IN_CODE = ("human", "talos_legs")
 
 @dataclass(frozen=True)
 class ExampleRobot:
-    """One entry of the table. `srdf` is set where the rotor inertias are to be read from it."""
+    """One entry of the table.
+
+    package_dir: folder in which `package://` meshes are looked up. free_flyer: the base floats.
+    srdf: set where the rotor inertias are to be read from it.
+    """
 
     name: str
     urdf: Path

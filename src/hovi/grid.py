@@ -19,6 +19,7 @@ class Grid:
 
     steps: lengths of the intervals, shape (N,), in [s].
     schemes: one per interval.
+    groups: each scheme with the numbers of its intervals.
     """
 
     steps: Array

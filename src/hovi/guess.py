@@ -16,8 +16,7 @@ from hovi.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
-"""(q0, v0, q1, v1)."""
-
+"""(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
 
 BUMP_MODES = 8
 BUMP_AMPLITUDES = (0.2, 1.5)
@@ -32,7 +31,10 @@ class Curve(Protocol):
 
 
 def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The cubic through both ends: the least motion in the sense of 1/2 |a|^2."""
+    """The cubic through both ends: the least motion in the sense of 1/2 |a|^2.
+
+    boundary: (q0, v0, q1, v1). duration: T, in [s].
+    """
     q0, v0, q1, v1 = boundary
     T = duration
     x1 = robot.difference(q0, q1)
@@ -47,7 +49,7 @@ def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
 
 
 def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The quintic through both ends whose accelerations vanish there."""
+    """The quintic through both ends whose accelerations vanish there; arguments as for `cubic`."""
     q0, v0, q1, v1 = boundary
     T = duration
     dq = robot.difference(q0, q1)
@@ -77,6 +79,8 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
 
     x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed, falling
     like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
+
+    base: the curve. duration: T, in [s]. seed: of the coefficients.
     """
     random = np.random.default_rng(seed)
     j = np.arange(1, BUMP_MODES + 1)

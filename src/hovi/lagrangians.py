@@ -19,11 +19,13 @@ from hovi.torque_model import times
 
 Array = npt.NDArray[np.float64]
 Torque = Callable[[Array], Array]
+"""u(t): times (P,) in [s] -> joint efforts (P, nv) in [N m] or [N]."""
 
 
 def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
     """L = 1/2 |q^(k)|^2 on R^n: cubic splines for k = 2, quintic ones (least jerk) for k = 3.
 
+    n: dimension, 1 or more. derivatives: k, 1 or more. Raises InputError otherwise.
     [ColomboFerraroMartin2016, examples of sections 3 and 4]
     """
     if n < 1 or derivatives < 1:
@@ -33,9 +35,10 @@ def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
 
 
 def mechanics(scene: Scene) -> CasadiLagrangian:
-    """L = K(q, v) - V(q) on TQ: the scene's robot under its gravity, k = 1.
+    """L = 1/2 v^T M(q) v - V(q) on TQ, in [J]: the scene's robot under its gravity, k = 1.
 
     What effects add to the torques is not in it: see `scene_force`.
+    Raises SceneError for joints whose configurations are not vectors.
     """
     functions = casadi_functions(scene.model)
     q, v = _symbols(scene, 2)
@@ -47,6 +50,7 @@ def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
 
     With D_t v = M^-1 (M a + C(q, v) v), the acceleration that needs no torque taken away.
     Effects count only as far as they change the masses (armature).
+    Raises SceneError for joints whose configurations are not vectors.
     [NoakesHeinzingerPaden1989; ColomboFerraroMartin2016, equation of special Lagrangians]
     """
     model = scene.model.copy()
@@ -87,15 +91,14 @@ def scene_force(scene: Scene, torque: Torque | None = None) -> Force:
     torque: u(t), times (P,) -> (P, nv); none when not given.
     Raises SceneError for an effect whose torque depends on the acceleration.
     """
-    nq, nv = scene.robot.nq, scene.robot.nv
-    symbols = SceneSymbols(
-        ca.SX.sym("q", nq), ca.SX.sym("v", nv), ca.SX.sym("a", nv), ca.SX.sym("t")
-    )
+    nv, symbols = scene.robot.nv, SceneSymbols.of(scene.robot)
     added = [(e, e.torque(scene.robot, symbols)) for e in scene.effects]
     named = [(effect, term) for effect, term in added if term is not None]
     for effect, term in named:
         if ca.depends_on(term, symbols.a):
-            raise SceneError(f"effect {effect.key!r} depends on the acceleration: not simulated.")
+            raise SceneError(
+                f"effect {effect.key!r} depends on the acceleration: not simulated; leave it out."
+            )
     if not named:
         return Force(nv, torque)
     total = sum((term for _, term in named[1:]), named[0][1])

@@ -28,6 +28,7 @@ _DASH = 6.0
 class Curve:
     """One line of a plot, in the units of the plot.
 
+    name: of the joint coordinate. color: as Matplotlib takes it.
     t, y: its points, NaN where it is broken. lower, upper: its bounds, infinite without one.
     active: where it stands at a bound, of y's shape.
     """

@@ -112,7 +112,7 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
 def closeness(trajectory: Trajectory, limits: Limits) -> Array:
     """Share of its range that each output stays away from its nearest bound, (4, nv).
 
-    Negative where a limit is exceeded, infinite where there is none.
+    Negative where a limit is exceeded, infinite where there is none. Kinds as in limits.KINDS.
     """
     excess = excess_along(trajectory, limits)
     return np.asarray(-np.maximum(excess.lower.max(axis=0), excess.upper.max(axis=0)))

@@ -70,12 +70,10 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         weight = self._unscaled(sigma, 2)
         force = self._unscaled(multipliers, 1)
         terms, curvatures = [], []
+        k = 3 * self.lagrangian.nv  # (q, v, a) first, then tau
         for i, part in enumerate(self._parts):
-            jet_part, effort_part = gradient[part], weight[part]
-            k = 3 * self.lagrangian.nv
-            terms.append(
-                PointTerms(jet_part[:, :k], effort_part[:, :k], jet_part[:, k:], effort_part[:, k:])
-            )
+            slope, curve = gradient[part], weight[part]
+            terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
             curvatures.append(self._effort(x, i) + force[part, k:])
         return self.action.model_with(x, curvatures, terms)
 

@@ -31,10 +31,12 @@ ROUNDS = 40
 """Times that limits are tightened or intervals halved before giving up."""
 PATIENCE = 9
 """Times that limits are tightened on one grid."""
-HALVINGS = 4
-"""Times that a grid is halved when limits do not hold between its points."""
+HALVINGS = 8
+"""Times that intervals are halved when limits do not hold between their points."""
 SPLIT = 0.05
-"""Excess, as a share of the range, beyond which the grid is halved instead of tightened."""
+"""Excess, as a share of the range, beyond which intervals are halved instead of tightened."""
+SPLIT_TOO = 0.01
+"""Excess beyond which an interval is halved together with the worst."""
 OVERSHOOT = 1.5
 """How much further than the excess a bound is drawn in: motions lean on what is left to them."""
 ROOM = 5.0
@@ -176,7 +178,7 @@ class _Search:
             coarse = excess.worst > SPLIT or tightened > PATIENCE
             again = None if coarse else self._again(outcome, excess)
             if (again is None or not _solved(again)) and self.halvings < HALVINGS:
-                again, tightened = self._halved(), 0
+                again, tightened = self._halved(excess), 0
             if again is None:
                 break
             outcome = again
@@ -213,16 +215,20 @@ class _Search:
             first_value,
         )
 
-    def _halved(self) -> BoundedOutcome[DiscretePath]:
-        """Solve again from the guess with every interval halved.
+    def _halved(self, excess: Excess) -> BoundedOutcome[DiscretePath]:
+        """Solve again with the intervals halved in which a limit is exceeded, and their neighbours.
 
-        A motion that far exceeds a limit between the points lives in the gaps between them: it is
-        no guess for a finer grid.
+        From the first guess: a motion that far exceeds a limit between the points lives in the
+        gaps between them, and leads the interior point astray on a finer grid.
         """
         self.halvings += 1
         grid = self.problem.grid
+        by_interval = excess.by_interval
+        chosen = by_interval > min(SPLIT_TOO, 0.5 * float(by_interval.max()))
+        chosen[1:] |= chosen[:-1].copy()
+        chosen[:-1] |= chosen[1:].copy()
         curve = stretched(self._trajectory(self.guess), grid.duration)
-        problem = self.problem.on(grid.halved(np.ones(grid.intervals, dtype=bool)))
+        problem = self.problem.on(grid.halved(chosen))
         self.guess = path_on_grid(curve, problem.grid, problem.boundary, problem.robot)
         self.problem = problem
         self.margins = np.zeros((2, problem.grid.intervals, *self.limits.lower.shape))
@@ -249,8 +255,7 @@ class _Search:
 
     def _options(self) -> Options:
         left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
-        most = max(self.options.max_iterations - self.iterations, 1)
-        return dataclasses.replace(self.options, time_limit=left, max_iterations=most)
+        return dataclasses.replace(self.options, time_limit=left)
 
     def _inertia(self, outcome: BoundedOutcome[DiscretePath]) -> int:
         """n_neg of the condensed system, which is positive definite at a minimum."""

@@ -45,7 +45,7 @@ class Limits:
         for k, i in np.argwhere(self.lower >= self.upper):
             raise InputError(
                 f"the {NAMES[KINDS[k]]} limits of joint coordinate {i} leave no room: "
-                f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]."
+                f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; widen them."
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
@@ -125,10 +125,8 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
     """
     if isinstance(limits, Limits):
         return limits
-    if isinstance(limits, str):
-        return _by_word(robot, limits)
     if not isinstance(limits, Mapping):
-        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {limits!r}.")
+        return _by_word(robot, limits)
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:

@@ -33,13 +33,14 @@ SAME_COST = 1e-6
 """Relative difference in cost below which two minima count as one."""
 
 Progress = Callable[[str, float], None]
+"""What is told how far a search is: a line of text and the fraction done."""
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
     """What a worker process needs to solve a problem: it builds its own functions.
 
-    weight: R of the effort, one number per joint.
+    weight: R of the effort, one number per joint. max_iterations: of one solve.
     """
 
     scene: Scene
@@ -59,7 +60,10 @@ class Job:
 
 @dataclass(eq=False)
 class Pool:
-    """Solves a job from many guesses, here or in worker processes."""
+    """Solves a job from many guesses, here or in worker processes.
+
+    deadline: by the monotonic clock, in [s]; none when None.
+    """
 
     job: Job
     processes: int

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hovi.errors import InputError
 from hovi.grid import Grid
 from hovi.limits import Limits, as_limits
-from hovi.multistart import Job, Pool, default_processes, distinct, explore
+from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
@@ -26,11 +26,8 @@ COARSE_INTERVALS = 60
 """Grids with more than twice as many intervals are first solved on a grid of this many."""
 REFINED = 6
 """Coarse minima that are refined and ranked on the grid that was asked for."""
-
 EXPLORING = 0.7
 """Share of a time limit that the search may take when its minima are refined afterwards."""
-
-Progress = Callable[[str, float], None]
 
 
 def plan(
@@ -172,6 +169,3 @@ def _count(name: str, number: float, least: int) -> int:
     if not (np.isfinite(number) and number == int(number) and number >= least):
         raise InputError(f"{name} must be a whole number of {least} or more, got {number}.")
     return int(number)
-
-
-__all__ = ["Status", "plan"]

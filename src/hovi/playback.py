@@ -18,12 +18,11 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import DisplayError, InputError
-from hovi.limits import KINDS
+from hovi.errors import DisplayError
+from hovi.highlights import AT_LIMIT_NOTE, Highlights, node_name
 from hovi.meshcat_page import Page
 from hovi.meshcat_server import ServedPage
 from hovi.robot import Robot
-from hovi.saturation import at_limit, imposed_limits
 from hovi.skeleton import skeleton
 from hovi.trajectory import Trajectory
 from hovi.whole_file import reason, whole_file
@@ -40,55 +39,13 @@ Array = npt.NDArray[np.float64]
 
 _FIELD_OF_VIEW = math.radians(75.0)  # meshcat's camera, vertically
 _ELEVATION = 0.25
-_MARGIN = 1.0
 _TRACE_COLOR = (0.80, 0.47, 0.65)
 _TRACE_WIDTH = 0.006  # of the picture's size
-_AT_LIMIT_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light beside blue, orange and grey
-_BRIDGED_FRAMES = 4
-_AT_LIMIT_NAME = " at its limit"
-_AT_LIMIT_NOTE = "a yellow link: its joint is at a limit"
 _FRAME_RATE = 60.0
 _MAX_FRAMES = 20_000
 _VIEW_SAMPLES = 60
 _TRACE_SAMPLES = 2_000
 _BROWSER_SECONDS = 20.0
-
-
-@dataclass(frozen=True, eq=False)
-class Highlights:
-    """Which links stand out when: those of joints at a limit of position, velocity or torque.
-
-    A link that ever stands out is drawn twice, and one of the two is hidden at any time: its own
-    look comes back whatever it is.
-
-    times: (M,), in [s]. flags: (M, joints), by number of the joint in the model; none at the end
-        of the motion.
-    """
-
-    times: Array
-    flags: npt.NDArray[np.bool_]
-
-    def at(self, t: float) -> npt.NDArray[np.bool_]:
-        """Flags by joint at a time, shape (joints,)."""
-        index = int(np.searchsorted(self.times, t, side="right")) - 1
-        return np.asarray(self.flags[max(index, 0)])
-
-    def show(self, visualizer: MeshcatVisualizer, t: float) -> None:
-        """Make the page show the links as they are at a time."""
-        flags = self.at(t)
-        for plain, bright, joint in _pairs(visualizer):
-            for node, visible in ((plain, not flags[joint]), (bright, bool(flags[joint]))):
-                visualizer.viewer[node].set_property("visible", visible)
-
-    def tracks(self, visualizer: MeshcatVisualizer) -> dict[str, meshcat.animation.AnimationTrack]:
-        """A track of visibility for each object that is drawn twice, by its node's name."""
-        tracks = {}
-        for plain, bright, joint in _pairs(visualizer):
-            flag = self.flags[:, joint]
-            keys = np.flatnonzero(np.concatenate([[True], flag[1:] != flag[:-1]]))
-            for node, visible in ((plain, ~flag[keys]), (bright, flag[keys])):
-                tracks[node] = _track("visible", "bool", self.times[keys], list(visible))
-        return tracks
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +56,7 @@ class Replay:
     visualizer: Pinocchio's, for whoever wants to draw more (`visualizer.viewer` is meshcat's).
     url: the page's address.
     page: what the page shows; a ServedPage while a server answers at `url`.
+    highlights: links that stand out at limits; None where none ever does.
     """
 
     trajectory: Trajectory
@@ -189,7 +147,7 @@ def replay(
     if html is not None:
         return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
     robot = _robot(trajectory)
-    highlights = _highlights(trajectory, robot)
+    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
     page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)
     try:
         visualizer = _draw(trajectory, robot, page, trace, highlights)
@@ -220,7 +178,7 @@ def write_html(
     """
     _check_positive("speed", speed)
     robot = _robot(trajectory)
-    highlights = _highlights(trajectory, robot)
+    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
     page = Page(_title(trajectory, robot), _note(robot, highlights))
     visualizer = _draw(trajectory, robot, page, trace, highlights)
     page.keep(_animation(trajectory, visualizer, loop, highlights))
@@ -250,66 +208,9 @@ def _open(page: ServedPage) -> None:
         raise DisplayError(f"no browser showed the page in {_BROWSER_SECONDS:.0f} s; {advice}")
 
 
-def _highlights(trajectory: Trajectory, robot: Robot) -> Highlights | None:
-    """When which links stand out; None where no joint is ever at a limit."""
-    limits = imposed_limits(trajectory)
-    if limits is None:
-        return None
-    times = _frame_times(trajectory)
-    try:
-        motion = trajectory.sample(times)
-    except InputError:  # joints for which there are no velocities between the nodes
-        return None
-    by_kind = at_limit(limits, motion, robot)[:, [KINDS.index(k) for k in ("q", "v", "tau")]]
-    by_coordinate: npt.NDArray[np.bool_] = np.any(by_kind, axis=1)  # (M, nv)
-    by_coordinate = _bridged(by_coordinate)
-    by_coordinate[-1] = False
-    flags = np.zeros((len(times), robot.model.njoints), dtype=bool)
-    for joint in list(robot.model.joints)[1:]:
-        flags[:, joint.id] = by_coordinate[:, joint.idx_v : joint.idx_v + joint.nv].any(axis=1)
-    return Highlights(times, flags) if flags.any() else None
-
-
-def _bridged(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Flags (M, n) without gaps that are too short to be seen as more than a flicker."""
-    k, ends = _BRIDGED_FRAMES, ((_BRIDGED_FRAMES,) * 2, (0, 0))
-    windows = np.lib.stride_tricks.sliding_window_view
-    wide = windows(np.pad(flags, ends), 2 * k + 1, axis=0).any(axis=-1)
-    closed = windows(np.pad(wide, ends), 2 * k + 1, axis=0).all(axis=-1)
-    return np.asarray(flags | closed)
-
-
 def _note(robot: Robot, highlights: Highlights | None) -> str:
-    notes = [robot.visual_problem, "" if highlights is None else _AT_LIMIT_NOTE]
+    notes = [robot.visual_problem, "" if highlights is None else AT_LIMIT_NOTE]
     return " ".join(note for note in notes if note)
-
-
-def _with_bright_copies(visual: pin.GeometryModel, highlights: Highlights) -> pin.GeometryModel:
-    """The drawn objects, and a yellow copy of those that ever stand out."""
-    both = visual.copy()
-    for item in list(visual.geometryObjects):
-        if highlights.flags[:, item.parentJoint].any():
-            bright = item.copy()
-            bright.name = item.name + _AT_LIMIT_NAME
-            bright.meshColor, bright.overrideMaterial = _AT_LIMIT_COLOR, True
-            bright.meshPath = ""  # its triangles alone take less room than its file
-            both.addGeometryObject(bright)
-    return both
-
-
-def _pairs(visualizer: MeshcatVisualizer) -> list[tuple[str, str, int]]:
-    """Nodes of an object and of its bright copy, and the joint that carries them."""
-    items = list(visualizer.visual_model.geometryObjects)
-    node = {item.name: _node(visualizer, item) for item in items}
-    return [
-        (node[item.name], node[item.name + _AT_LIMIT_NAME], item.parentJoint)
-        for item in items
-        if item.name + _AT_LIMIT_NAME in node
-    ]
-
-
-def _node(visualizer: MeshcatVisualizer, item: pin.GeometryObject) -> str:
-    return str(visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL))
 
 
 def _draw(
@@ -320,7 +221,7 @@ def _draw(
     if visual is None or visual.ngeoms == 0:
         visual = skeleton(robot.model)
     if highlights is not None:
-        visual = _with_bright_copies(visual, highlights)
+        visual = highlights.with_bright_copies(visual)
     visualizer = MeshcatVisualizer(robot.model, None, visual)
     visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
     visualizer.loadViewerModel(rootNodeName="robot")
@@ -379,7 +280,7 @@ def _set_the_stage(visualizer: MeshcatVisualizer, lower: Array, upper: Array) ->
     aside = np.array([size[1], -size[0], 0.0])
     direction = aside / max(float(np.linalg.norm(aside)), 1e-12) + np.array([0, 0, _ELEVATION])
     diagonal = max(float(np.linalg.norm(size)), 1e-3)
-    distance = _MARGIN * 0.5 * diagonal / math.sin(_FIELD_OF_VIEW / 2)
+    distance = 0.5 * diagonal / math.sin(_FIELD_OF_VIEW / 2)
     x, y, z = distance * direction / np.linalg.norm(direction)
     viewer = visualizer.viewer
     camera = viewer["/Cameras/default/rotated/<object>"]
@@ -421,7 +322,7 @@ def _animation(
 ) -> dict[str, object]:
     """The message that makes a page play the motion: tracks by drawn object, in seconds."""
     times = _frame_times(trajectory)
-    visible = {} if highlights is None else highlights.tracks(visualizer)
+    visible = {} if highlights is None else highlights.changes(visualizer)
     placements = _placements(visualizer, trajectory.configurations(times))
     animation = meshcat.animation.Animation()
     for number, item in enumerate(visualizer.visual_model.geometryObjects):
@@ -431,9 +332,10 @@ def _animation(
             "position": _track("position", "vector3", times, [p.translation for p in places]),
             "quaternion": _track("quaternion", "quaternion", times, turns),
         }
-        name = _node(visualizer, item)
+        name = node_name(visualizer, item)
         if name in visible:
-            tracks["visible"] = visible[name]
+            keys, flags = visible[name]
+            tracks["visible"] = _track("visible", "bool", keys, list(flags))
         node = visualizer.viewer[name]
         animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
     repetitions = math.inf if loop else 1

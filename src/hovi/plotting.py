@@ -18,6 +18,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+
+# mpl_toolkits ships no types
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
@@ -49,7 +51,7 @@ _METADATA: dict[str, dict[str, str | None]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class _Curve:
+class _SampledMotion:
     """A motion sampled interval by interval, its ends included: m points in each of N."""
 
     t: Array  # (N, m)
@@ -179,7 +181,7 @@ def _robot(trajectory: Trajectory) -> Robot:
     if trajectory.robot is None:
         raise DisplayError(
             "this motion was saved without its robot, which was a bare Pinocchio model: its links "
-            "cannot be drawn."
+            "cannot be drawn; load the robot from a URDF and plan again."
         )
     return trajectory.robot
 
@@ -216,7 +218,7 @@ def _chain(robot: Robot, q: Array) -> Array:
     return points
 
 
-def _sampled(trajectory: Trajectory) -> _Curve:
+def _sampled(trajectory: Trajectory) -> _SampledMotion:
     N = trajectory.grid.intervals
     s = np.linspace(0.0, 1.0, max(3, -(-_POINTS // N) + 1))
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
@@ -225,10 +227,10 @@ def _sampled(trajectory: Trajectory) -> _Curve:
     active: Mask = np.zeros((N, len(s), 4, motion.v.shape[1]), dtype=bool)
     if limits is not None:
         active = at_limit(limits, motion, trajectory.robot).reshape(active.shape)
-    return _Curve(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)), limits, active)
+    return _SampledMotion(t, Sample(*(x.reshape(N, len(s), -1) for x in motion)), limits, active)
 
 
-def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _Curve, y: Array) -> None:
+def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion, y: Array) -> None:
     """One line per coordinate; linear ones on an axis of their own, at the right if need be."""
     robot = trajectory.robot
     if robot is None:  # nobody knows which coordinates are angles: no conversion
@@ -250,7 +252,7 @@ def _lines(
     ax: Axes,
     trajectory: Trajectory,
     kind: int,
-    curve: _Curve,
+    curve: _SampledMotion,
     y: Array,
     scale: float,
     members: npt.NDArray[np.intp],

@@ -80,6 +80,7 @@ class PointFunction:
                 self._mapped(points) if threads == 1 else self._mapped(points, "thread", threads)
             )
         buffer, trigger = mapped.buffer()
+        # CasADi's stubs do not know that buffers take a memoryview
         for i, argument in enumerate(arguments):
             if argument.size:
                 buffer.set_arg(i, memoryview(argument.reshape(-1)))  # type: ignore[call-arg,arg-type]

@@ -35,6 +35,7 @@ class TrajectoryProblem:
     ld: the discrete Lagrangian of a scene's effort on a grid.
     start, goal: states at t = 0 and t = T.
     limits: bounds that hold along the motion; none when None.
+    boundary: (q0, v0, q1, v1) of the two states.
     Raises InputError, ModelError or SchemeError when no motion can be planned.
     """
 

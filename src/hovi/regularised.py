@@ -62,6 +62,11 @@ class Regularised:
         return np.asarray(self.scale[:, None] * self.gamma)
 
     @cached_property
+    def back(self) -> Array:
+        """gamma^T S T^-T, by which forces along the interval enter the equations of w, (k, k)."""
+        return np.asarray(self.gamma.T @ (self.scale[:, None] * self.inverse_taylor.T))
+
+    @cached_property
     def from_ends(self) -> Array:
         """Matrix of w = A (x0, x1), shape (k, 2 k)."""
         unscaled = self.inverse_gamma / self.scale

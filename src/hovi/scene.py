@@ -63,7 +63,7 @@ class Scene:
 
         Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
         """
-        symbols = self._symbols()
+        symbols = SceneSymbols.of(self.robot)
         added = self._added_torque(symbols)
         if self.analytic:
             more = None
@@ -129,14 +129,9 @@ class Scene:
             effects.append(REGISTRY[key](**values))
         return cls(Robot.from_dict(data["robot"]), effects)
 
-    def _symbols(self) -> SceneSymbols:
-        nq, nv = self.robot.nq, self.robot.nv
-        sym = ca.SX.sym
-        return SceneSymbols(sym("q", nq), sym("v", nv), sym("a", nv), sym("t"))
-
     @cached_property
     def _potential(self) -> PotentialTerm | None:
-        symbols = self._symbols()
+        symbols = SceneSymbols.of(self.robot)
         terms = [effect.potential(self.robot, symbols) for effect in self.effects]
         named = [term for term in terms if term is not None]
         if not named:

@@ -141,10 +141,8 @@ class Segment:
 
     @property
     def _back(self) -> Array:
-        """gamma^T S T^-T (x) I: how forces along the interval enter the equations of w."""
-        R = self.regularised
-        back = R.gamma.T @ (R.scale[:, None] * R.inverse_taylor.T)
-        return np.asarray(np.kron(back, np.eye(self.x0.shape[2])))
+        """`Regularised.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularised.back, np.eye(self.x0.shape[2])))
 
 
 def flat(blocks: Array) -> Array:

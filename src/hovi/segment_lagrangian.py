@@ -124,7 +124,7 @@ class SchemeLagrangian(SegmentLagrangian):
     ) -> Segment:
         """Newton on (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
         B, m = len(x0), self.k * self.n
-        back, given = self._back_n, (self._back / self.h @ p0).reshape(B, m)
+        back, given = self._back, (self.regularised.back / self.h @ p0).reshape(B, m)
 
         def system(u: Array) -> tuple[Array, Array]:
             gradient, H = self._system(x0, *self._split(u, B), t0)
@@ -218,12 +218,8 @@ class SchemeLagrangian(SegmentLagrangian):
 
     @cached_property
     def _back(self) -> Array:
-        R = self.regularised
-        return np.asarray(R.gamma.T @ (R.scale[:, None] * R.inverse_taylor.T))
-
-    @cached_property
-    def _back_n(self) -> Array:
-        return np.asarray(np.kron(self._back, np.eye(self.n)))
+        """`Regularised.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularised.back, np.eye(self.n)))
 
     def _split(self, u: Array, B: int) -> tuple[Array, Array]:
         modes = u.reshape(B, -1, self.n)

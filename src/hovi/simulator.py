@@ -113,5 +113,8 @@ def _torque(torque: Torque | Trajectory | None) -> Torque | None:
         return torque
     plan = torque
     if plan.robot is None:
-        raise InputError("the torques of a motion without a scene cannot be simulated.")
+        raise InputError(
+            "the torques of a motion without a scene cannot be simulated; hand in a function of "
+            "the times instead."
+        )
     return lambda t: plan.sample(np.clip(t, 0.0, plan.duration)).tau

@@ -23,7 +23,7 @@ from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective, follow
 
 Report = Callable[[int, float], None]
-
+"""What is told the number of each step and the least cost so far."""
 
 DECREASE = 1e-9
 """Relative decrease that the last step but one may predict; the last has the exact Hessian."""
@@ -116,7 +116,8 @@ def solve(
 
     problem: the boundary data and the discrete Lagrangian.
     guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
-    max_iterations: steps. time_limit: in [s]. Both return the best motion so far.
+    max_iterations: steps; with limits, of every round of tightening. time_limit: in [s]. Both
+        return the best motion so far.
     escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
     report: called with the number of each step and the least cost so far.
     With limits, `cost` is that of the motion that holds them everywhere, and intervals may have
@@ -209,15 +210,23 @@ def _with_limits(
     )
 
 
+_UNFINISHED = {
+    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
+    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
+    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
+    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
+}
+
+
 def _limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
     """Status and sentence of an outcome under limits."""
     if outcome.reason:
         return Status.INFEASIBLE, f"no motion within the limits was found: {outcome.reason}."
     if outcome.stop is not Stop.STATIONARY:
-        status, reason = _LIMITS[outcome.stop]
+        status, reason = _UNFINISHED[outcome.stop]
         return status, (
             f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
-            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}"
+            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}."
         )
     held = (
         f"limits hold to {max(outcome.excess, 0.0):.1e} of their ranges everywhere, on "
@@ -228,7 +237,11 @@ def _limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
             Status.MINIMUM,
             f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps; {held}.",
         )
-    return Status.SADDLE, f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} ways down."
+    return (
+        Status.SADDLE,
+        f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} directions of negative "
+        "curvature; solve again with another guess.",
+    )
 
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
@@ -266,14 +279,6 @@ def _certify(
     return 0, outcome
 
 
-_LIMITS = {
-    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
-    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
-    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
-    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
-}
-
-
 def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
     """Status and sentence of an outcome."""
     if not np.isfinite(outcome.value):
@@ -291,9 +296,9 @@ def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
         return (
             Status.SADDLE,
             f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
-            f"solve again with escape_saddles=True or another guess.",
+            "solve again with escape_saddles=True or another guess.",
         )
-    status, reason = _LIMITS[outcome.stop]
+    status, reason = _UNFINISHED[outcome.stop]
     return status, (
         f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
         f"best so far, of cost {outcome.value:.10g}.{left}"

@@ -23,6 +23,7 @@ from hovi.lagrangian import EffortLagrangian
 from hovi.legendre_transforms import hamiltonian
 from hovi.scene import Scene
 from hovi.schemes import require_regular
+from hovi.schemes.galerkin_table import MAX_INNER_MODES
 from hovi.segment import Segment
 from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian
 from hovi.state import State
@@ -216,7 +217,9 @@ def _start(
 def _records(
     ld: SegmentLagrangian, x: Array, p: Array, steps: int
 ) -> tuple[Array, Array, Array, Array]:
-    modes = ld.scheme.inner_modes if isinstance(ld, SchemeLagrangian) else 40
+    """Room for x, p, z and inner modes of all steps, the start filled in."""
+    # an exact L_d may need as many inner modes as there are
+    modes = ld.scheme.inner_modes if isinstance(ld, SchemeLagrangian) else MAX_INNER_MODES
     nodes, momenta = np.empty((steps + 1, *x.shape)), np.empty((steps + 1, *p.shape))
     nodes[0], momenta[0] = x, p
     return nodes, momenta, np.empty((steps, *x.shape)), np.zeros((steps, modes, ld.n))

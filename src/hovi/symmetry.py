@@ -88,7 +88,10 @@ def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 
     w = _unit(axis)
     g = np.array(scene.model.gravity.linear)
     if np.abs(np.cross(w, g)).max() > 1e-12 * max(1.0, float(np.abs(g).max())):
-        raise SceneError(f"gravity {g.tolist()} changes under a rotation about {w.tolist()}.")
+        raise SceneError(
+            f"gravity {g.tolist()} changes under a rotation about {w.tolist()}; take an axis along "
+            "gravity."
+        )
     return _base_motion(scene, np.concatenate([np.cross(np.asarray(point, float), w), w]))
 
 
@@ -100,7 +103,10 @@ def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
     d = _unit(direction)
     g = np.array(scene.model.gravity.linear)
     if abs(d @ g) > 1e-12 * max(1.0, float(np.abs(g).max())):
-        raise SceneError(f"gravity {g.tolist()} does work under a translation along {d.tolist()}.")
+        raise SceneError(
+            f"gravity {g.tolist()} does work under a translation along {d.tolist()}; take a "
+            "direction across gravity."
+        )
     return _base_motion(scene, np.concatenate([d, np.zeros(3)]))
 
 

@@ -32,9 +32,11 @@ def check_output(path: Path, *endings: str) -> Path:
         raise InputError(f"the output file must end in {' or '.join(endings)}, not {path.name!r}.")
     folder = path.parent
     if not folder.is_dir():
-        raise InputError(f"the folder {str(folder)!r} of the output file does not exist.")
+        raise InputError(
+            f"the folder {str(folder)!r} of the output file does not exist; make it first."
+        )
     if path.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"{str(path)!r} cannot be written.")
+        raise InputError(f"{str(path)!r} cannot be written; choose another place.")
     return path
 
 

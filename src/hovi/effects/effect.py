@@ -26,6 +26,12 @@ class SceneSymbols:
     a: ca.SX
     t: ca.SX
 
+    @classmethod
+    def of(cls, robot: Robot) -> SceneSymbols:
+        """New symbols for a robot."""
+        sym = ca.SX.sym
+        return cls(sym("q", robot.nq), sym("v", robot.nv), sym("a", robot.nv), sym("t"))
+
     def columns(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         """(q, v, a, t)."""
         return self.q, self.v, self.a, self.t
@@ -45,11 +51,11 @@ class Effect(ABC):
         """Change the scene's own copy of the model, for what Pinocchio simulates itself."""
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """What the effect adds to the torque balance u = M a + C + g + ..., or None."""
+        """What it adds to tau = M a + C + g + ..., a column of nv in [N m] or [N]; or None."""
         return None
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """What the effect adds to the cost L~ = 1/2 |u|^2 + V, or None."""
+        """What it adds to the cost, V of L~ = 1/2 |tau|^2 + V, a number; or None."""
         return None
 
     @abstractmethod

@@ -24,6 +24,9 @@ class BandLayout:
 
     unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
         column is fixed.
+    size: number of unknowns. bandwidth: of the lower triangle, the diagonal not counted.
+    entries: which entries of the intervals' Hessians, laid out flat, the band takes.
+    positions: where each of them goes in the band, laid out flat.
     scales: column = scale * unknown, shape (N, m), so that neighbours of different length share
         an unknown; None where every scale is one.
     """

@@ -116,7 +116,7 @@ class _Elimination:
 class MergeTree:
     """The shape of the elimination: inner modes first, then the nodes round by round.
 
-    steps: lengths of the intervals, shape (N,). inner_modes: r. dof: n.
+    levels: the rounds. intervals: N. inner_modes: r. dof: n.
     present: which inner modes exist, shape (N, r); others are held at zero.
     """
 

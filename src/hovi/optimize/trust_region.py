@@ -23,7 +23,7 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
-PASS_SHIFTS = 30
+MOST_FACTORS = 30
 """Factorisations that one subproblem may take."""
 
 
@@ -64,7 +64,9 @@ class Options:
     decrease: stop with a Newton step that predicts less than this, relative to the value; what is
         left after it is of the square of that.
     step: stop when a Newton step changes less than this, relative to the data.
+    max_iterations: steps, rejected ones included. time_limit: in [s]; none when None.
     radius: first radius of the trust region, in the metric's norm.
+    escape_saddles: leave a saddle along negative curvature; False stops there.
     """
 
     decrease: float = 1e-11
@@ -77,7 +79,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Iteration:
-    """One accepted or rejected step."""
+    """One accepted or rejected step.
+
+    value: the objective where it led. decrease: what the model foresaw. ratio: actual over foreseen
+        decrease. shift: multiplier of the radius. radius: before the step.
+    """
 
     value: float
     decrease: float
@@ -88,7 +94,11 @@ class Iteration:
 
 @dataclass
 class Outcome(Generic[X]):
-    """Where the iteration ended."""
+    """Where the iteration ended.
+
+    value: the objective at x. iterations: steps tried, each with an entry in history.
+    saddles_left: values of the saddles that were left along negative curvature.
+    """
 
     x: X
     value: float
@@ -102,7 +112,8 @@ class Outcome(Generic[X]):
 class Trial:
     """A solution of the subproblem min g.s + 1/2 s.H s, |s| <= radius.
 
-    shift: multiplier of the radius; 0 for a Newton step. definite: whether H itself is.
+    decrease: what the model foresees. shift: multiplier of the radius; 0 for a Newton step.
+    norm: |s| in the metric. along_negative_curvature: whether the gradient has no part in it.
     """
 
     step: Array
@@ -235,7 +246,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
     search = _ShiftSearch(model, radius, guess)
     shift = guess
     last: tuple[Factor, Trial] | None = None
-    for _ in range(PASS_SHIFTS):
+    for _ in range(MOST_FACTORS):
         factor = model.factor(shift)
         if factor is None:
             if last is not None and last[1].norm < radius and search.is_hard_case(last[1].shift):
@@ -243,7 +254,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
             shift = search.after_failure(shift)
             continue
         trial, slope = search.step_at(factor, shift)
-        if trial.norm <= 1.25 * radius and (shift == 0.0 or trial.norm >= 0.75 * radius):
+        if search.fits(trial):
             return trial
         if trial.norm < radius and search.is_hard_case(shift):
             return search.complete(factor, trial)
@@ -284,7 +295,7 @@ class _ShiftSearch:
         if not np.isfinite(decrease) or (decrease == 0.0 and g.any()):
             raise ArithmeticError("the model has numbers that are not finite")
         trial = Trial(s, decrease, shift, float(np.sqrt(norm2)))
-        if trial.norm <= 1.25 * self.radius and (shift == 0.0 or trial.norm >= 0.75 * self.radius):
+        if self.fits(trial):
             return trial, 0.0
         return trial, float(np.vdot(Ds, factor.solve(Ds)))
 
@@ -310,6 +321,11 @@ class _ShiftSearch:
         if not np.isfinite(scale):
             raise ArithmeticError("the model has numbers that are not finite")
         return scale or float(np.max(np.abs(self.model.gradient))) / self.radius
+
+    def fits(self, trial: Trial) -> bool:
+        """Whether a step is within a quarter of the radius, or a shorter Newton step."""
+        within = trial.norm <= 1.25 * self.radius
+        return within and (trial.newton or trial.norm >= 0.75 * self.radius)
 
     def is_short(self, trial: Trial) -> bool:
         """Whether a step ends inside the radius although H has negative curvature."""

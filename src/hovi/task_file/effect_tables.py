@@ -75,7 +75,7 @@ def _strict(hint: Any) -> Any:
     if origin in (Union, types.UnionType):
         return functools.reduce(operator.or_, inner)
     if isinstance(origin, type):
-        return Annotated[origin[inner], Strict(False)]  # type: ignore[index]
+        return Annotated[origin[inner], Strict(False)]  # type: ignore[index]  # any generic class
     return hint
 
 

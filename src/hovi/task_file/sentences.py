@@ -78,7 +78,8 @@ def first_sentence(
     expected = _expected(model, keys, details)
     if kind == "missing":
         return toml.error(above + keys[:-1], f"`{key}` is missing; it must be {expected}")
-    return toml.error(above + keys, f"`{key}` must be {expected}, but it is {shown(details)}")
+    came = in_toml(details["input"])
+    return toml.error(above + keys, f"`{key}` must be {expected}, but it is {came}")
 
 
 def spelled(keys: Iterable[str | int]) -> str:
@@ -87,11 +88,6 @@ def spelled(keys: Iterable[str | int]) -> str:
     for key in keys:
         text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
     return text
-
-
-def shown(details: ErrorDetails) -> str:
-    """What came, short enough for a sentence."""
-    return in_toml(details["input"])
 
 
 def in_toml(value: Any) -> str:
