@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hovi.legendre_transforms import legendre as legendre
     from hovi.legendre_transforms import legendre_minus as legendre_minus
     from hovi.legendre_transforms import legendre_plus as legendre_plus
+    from hovi.limits import Limits as Limits
     from hovi.model_files import example as example
     from hovi.planner import plan as plan
     from hovi.playback import replay as replay
@@ -69,6 +70,7 @@ _PLACES = {
     "Flow": "hovi.stepper",
     "Grid": "hovi.grid",
     "HoviError": "hovi.errors",
+    "Limits": "hovi.limits",
     "Robot": "hovi.robot",
     "Scene": "hovi.scene",
     "SchemeLagrangian": "hovi.segment_lagrangian",

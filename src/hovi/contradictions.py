@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.limits import KINDS, NAMES, UNITS, Limits
+from hovi.limits import KINDS, NAMES, Limits, unit_of
 from hovi.problem import TrajectoryProblem
+from hovi.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +21,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     names = problem.robot.coordinate_names
     for end, state in (("start", (q0, v0)), ("goal", (q1, v1))):
         for row in (0, 1):
-            sentence = _outside(end, row, state[row], limits, names)
+            sentence = _outside(problem.robot, end, row, state[row], limits)
             if sentence:
                 return sentence
     return _too_short(problem, limits, names)
@@ -45,15 +46,15 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
     return ""
 
 
-def _outside(end: str, row: int, values: Array, limits: Limits, names: tuple[str, ...]) -> str:
+def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits) -> str:
     outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
     outside = outside / limits.ranges[row]
     i = int(np.argmax(outside))
     if outside[i] <= limits.tolerance:
         return ""
-    kind = KINDS[row]
+    kind, name = KINDS[row], robot.coordinate_names[i]
     return (
-        f"the {end}'s {NAMES[kind]} of joint {names[i]!r} is {values[i]:.6g} {UNITS[kind]}, "
+        f"the {end}'s {NAMES[kind]} of joint {name!r} is {values[i]:.6g} {unit_of(robot, kind, i)}, "
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
         f"{end} or widen them"
     )
@@ -68,8 +69,9 @@ def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...
     i = int(np.argmax(needed))
     if needed[i] <= T:
         return ""
+    way, speed = unit_of(problem.robot, "q", i), unit_of(problem.robot, "v", i)
     return (
-        f"joint {names[i]!r} has {abs(distance[i]):.4g} rad to go, which takes {needed[i]:.4g} s "
-        f"at its velocity limit of {fastest[i]:.4g} rad/s, more than the duration of {T:.4g} s; "
+        f"joint {names[i]!r} has {abs(distance[i]):.4g} {way} to go, which takes {needed[i]:.4g} s "
+        f"at its velocity limit of {fastest[i]:.4g} {speed}, more than the duration of {T:.4g} s; "
         "allow more time or a higher velocity"
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.limits import KINDS, NAMES, UNITS, Limits
+from hovi.limits import KINDS, NAMES, Limits, unit_of
 from hovi.robot import Robot
 from hovi.trajectory import Trajectory
 
@@ -103,9 +103,10 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
     value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
     bound = (limits.upper if above else limits.lower)[kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
+    unit = unit_of(robot, KINDS[kind], int(joint))
     return (
         f"the {NAMES[KINDS[kind]]} of joint {robot.coordinate_names[joint]!r} reaches {value:.4g} "
-        f"{UNITS[KINDS[kind]]} at t = {t:.3g} s, its limit is {bound:.4g}"
+        f"{unit} at t = {t:.3g} s, its limit is {bound:.4g}"
     )
 
 

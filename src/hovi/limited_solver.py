@@ -225,8 +225,9 @@ class _Search:
         grid = self.problem.grid
         by_interval = excess.by_interval
         chosen = by_interval > min(SPLIT_TOO, 0.5 * float(by_interval.max()))
-        chosen[1:] |= chosen[:-1].copy()
-        chosen[:-1] |= chosen[1:].copy()
+        worst = chosen.copy()
+        chosen[1:] |= worst[:-1]
+        chosen[:-1] |= worst[1:]
         curve = stretched(self._trajectory(self.guess), grid.duration)
         problem = self.problem.on(grid.halved(chosen))
         self.guess = path_on_grid(curve, problem.grid, problem.boundary, problem.robot)

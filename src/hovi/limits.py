@@ -18,7 +18,7 @@ Range = tuple[Array, Array]
 KINDS = ("q", "v", "a", "tau")
 """What can be limited, in the order in which outputs are stacked."""
 NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
-UNITS = {"q": "rad", "v": "rad/s", "a": "rad/s^2", "tau": "N m"}
+_SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
 UNLIMITED = 1e15
 """Bounds beyond this mean that there is none."""
 TOLERANCE = 1e-6
@@ -186,3 +186,14 @@ def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
     raise InputError(
         f"limits.{kind} of {name!r} is a positive number or a rising pair, got {value!r}."
     )
+
+
+def unit_of(robot: Robot, kind: str, i: int) -> str:
+    """Unit of q, v, a or tau at a joint coordinate: radians and N m, or metres and N.
+
+    kind: one of KINDS. i: place in v.
+    """
+    joint = next(j for j in list(robot.model.joints)[1:] if j.idx_v <= i < j.idx_v + j.nv)
+    sliding = joint.shortname().startswith(_SLIDING)
+    angle, effort = ("m", "N") if sliding else ("rad", "N m")
+    return {"q": angle, "v": f"{angle}/s", "a": f"{angle}/s^2", "tau": effort}[kind]
