@@ -145,7 +145,7 @@ def test_ipopt_finds_the_same_minimum(name: str) -> None:
     )
     solution = solve(problem)
     assert solution.status is Status.MINIMUM
-    cost, nodes = least_action(problem, solution.trajectory)
+    cost, nodes = least_action(problem, solution.trajectory.path)
     assert solution.cost == pytest.approx(cost, rel=1e-7)
     ours = np.hstack([solution.trajectory.q, solution.trajectory.v])[1:-1]
     np.testing.assert_allclose(ours, nodes, rtol=0, atol=1e-5 * np.abs(ours).max())

@@ -54,7 +54,8 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits) ->
         return ""
     kind, name = KINDS[row], robot.coordinate_names[i]
     return (
-        f"the {end}'s {NAMES[kind]} of joint {name!r} is {values[i]:.6g} {unit_of(robot, kind, i)}, "
+        f"the {end}'s {NAMES[kind]} of joint {name!r} is {values[i]:.6g} "
+        f"{unit_of(robot, kind, i)}, "
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
         f"{end} or widen them"
     )

@@ -27,6 +27,8 @@ from hovi.trajectory import Trajectory
 Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
 
+ENDED = Stop.TIME_LIMIT, Stop.INTERRUPTED
+"""What ends a search whatever is left to try."""
 ROUNDS = 40
 """Times that limits are tightened or intervals halved before giving up."""
 PATIENCE = 9
@@ -97,7 +99,7 @@ def solve_limited(
     deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
     search = _Search(problem, limits, options, deadline, report, path)
     outcome = search.first(path)
-    if not outcome.feasible and outcome.stop in (Stop.DIVERGED, Stop.ITERATION_LIMIT):
+    if not outcome.feasible and outcome.stop is Stop.DIVERGED:
         outcome, reason = search.restored(outcome)
     if reason or outcome.stop is not Stop.STATIONARY:
         return search.finished(outcome, reason, 0.0, 0, outcome.outputs.value)
@@ -135,11 +137,14 @@ class _Search:
         density = _density(outcome, objective)
         least = np.inf
         for guess in self._guesses():
-            path, violation = self._penalised(objective, guess, density)
+            path, violation, stop = self._penalised(objective, guess, density)
+            if stop in ENDED:
+                outcome.stop = stop
+                return outcome, ""
             if violation <= HELD:
                 options = self._options()
                 again = self._count(minimize_bounded(objective, path, options, self.report))
-                if again.feasible:
+                if again.feasible or again.stop in ENDED:
                     return again, ""
             if violation < least:
                 least, outcome.x = violation, path
@@ -158,13 +163,17 @@ class _Search:
 
     def _penalised(
         self, objective: LimitedAction, path: DiscretePath, density: float
-    ) -> tuple[DiscretePath, float]:
-        """A motion of little violation, by penalties that grow, and its violation."""
+    ) -> tuple[DiscretePath, float, Stop]:
+        """A motion of little violation, by penalties that grow, its violation, and why it ended."""
         for penalty in PENALTIES:
             penalised = PenalisedAction(objective, penalty * density)
             options = dataclasses.replace(self._options(), max_iterations=PENALTY_STEPS)
-            path = minimize(penalised, path, options, None).x
-        return path, penalised.violation(path)
+            result = minimize(penalised, path, options, None)
+            path = result.x
+            self.iterations += result.iterations
+            if result.stop in ENDED:
+                break
+        return path, penalised.violation(path), result.stop
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
@@ -177,7 +186,8 @@ class _Search:
             tightened += 1
             coarse = excess.worst > SPLIT or tightened > PATIENCE
             again = None if coarse else self._again(outcome, excess)
-            if (again is None or not _solved(again)) and self.halvings < HALVINGS:
+            lost = again is None or not (_solved(again) or again.stop in ENDED)
+            if lost and self.halvings < HALVINGS:
                 again, tightened = self._halved(excess), 0
             if again is None:
                 break
