@@ -144,9 +144,10 @@ class Barrier:
     def complementarity(self) -> float:
         """The largest |z s - mu|."""
         below, above = _gaps(self.bounds, self.s)
-        lower = np.where(self.bounds.has_lower, np.abs(self.zl * below - self.mu), 0.0)
-        upper = np.where(self.bounds.has_upper, np.abs(self.zu * above - self.mu), 0.0)
-        return float(max(lower.max(initial=0.0), upper.max(initial=0.0)))
+        has = np.stack([self.bounds.has_lower, self.bounds.has_upper])
+        gaps = np.where(has, np.stack([below, above]), 0.0)
+        products = np.stack([self.zl, self.zu]) * gaps
+        return float(np.max(np.abs(products - self.mu), where=has, initial=0.0))
 
     def _keep(self) -> float:
         return max(KEEP, 1.0 - self.mu / self.scale)

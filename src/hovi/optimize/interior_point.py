@@ -44,6 +44,8 @@ LAST_MU = 1e-10
 """Last barrier parameter, relative to the same."""
 FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
 """Shares of the longest step inside the bounds among which the model chooses."""
+SMALL_DENSITY = 1e-9
+"""Mean density of a first objective below which it says nothing about its scale."""
 INFEASIBLE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
 SETTLED = 1e-9
@@ -145,7 +147,9 @@ def minimize_bounded(
     start: slacks and multipliers of an earlier solution nearby.
     """
     outputs = objective.outputs(x)
-    density = max(abs(outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))
+    density = abs(outputs.value) / float(np.sum(objective.bounds.weights))
+    if density < SMALL_DENSITY:
+        density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, FIRST_MU * density)
     outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
@@ -237,7 +241,7 @@ class _Iteration(Generic[X]):
         shares = barrier.longest(np.where(settled, ds, 0.0)) * FRACTIONS
         decreases = np.array([decrease(share) for share in shares])
         # the longest share among those that rounding cannot tell from the best
-        noise = 1e-13 * abs(self.outcome.outputs.value)
+        noise = 1e-13 * self._scale()
         best = int(np.argmax(decreases >= np.max(decreases) - noise))
         return _Step(trial, float(shares[best]), ds, dzl, dzu, float(decreases[best]))
 
@@ -270,13 +274,18 @@ class _Iteration(Generic[X]):
         outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
         return True
 
+    def _scale(self) -> float:
+        """Size of the objective, by which decreases are judged; never quite zero."""
+        total = float(np.sum(self.objective.bounds.weights))
+        return max(abs(self.outcome.outputs.value), LAST_MU * self.density * total)
+
     def _advance(self, step: _Step) -> bool:
         """Lower mu where its problem is solved; True where the last one is."""
         outcome, barrier = self.outcome, self.outcome.barrier
         total = float(np.sum(self.objective.bounds.weights))
         last = LAST_MU * self.density
         newton = step.trial.newton and step.fraction == 1.0
-        scale = abs(outcome.outputs.value)
+        scale = self._scale()
         if barrier.mu <= last:
             return newton and outcome.feasible and step.decrease <= self.options.decrease * scale
         share = barrier.mu / self.density
