@@ -20,6 +20,7 @@ from hovi.errors import SceneError
 from hovi.task_file import Task, load_task, save_task
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 print(hovi.example("two_link_reach").read_text())
 task = load_task(hovi.example("two_link_reach"))
 

@@ -49,6 +49,7 @@ CART_POLE = """
 """
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 urdf = folder / "cart_pole.urdf"
 urdf.write_text(CART_POLE.strip())
 robot = hovi.load_robot(urdf)

@@ -20,6 +20,7 @@ import hovi
 from hovi.effects import Gravity, JointLimitPotential
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 robot = hovi.load_robot(hovi.example("two_link.urdf"))
 free = hovi.Scene(robot, effects=[Gravity(9.8)])
 elbow = JointLimitPotential({"elbow": (0.0, radians(170.0))}, slope=1000.0, width=1e-3)

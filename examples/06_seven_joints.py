@@ -18,6 +18,7 @@ import numpy as np
 import hovi
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 robot = hovi.load_robot("panda", locked=["panda_finger_joint1", "panda_finger_joint2"])
 print(robot.describe())
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import hovi
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 robot = hovi.load_robot(hovi.example("two_link.urdf"))
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
 start, goal = hovi.State([-pi / 2, 0.0]), hovi.State([0.3, 0.7], [0.5, -0.4])

@@ -20,6 +20,7 @@ import hovi
 from hovi import plotting
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 robot = hovi.load_robot("ur5")
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity()])
 start, goal = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]

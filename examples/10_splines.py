@@ -23,6 +23,7 @@ import numpy as np
 import hovi
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 taylor = hovi.schemes.by_name("taylor-trapezoid")
 exact = hovi.schemes.galerkin(inner_modes=0)
 

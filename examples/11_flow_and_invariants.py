@@ -19,6 +19,7 @@ import numpy as np
 import hovi
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
 robot = hovi.load_robot(hovi.example("two_link.urdf"))
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
 

@@ -23,7 +23,7 @@ class Grid:
     """
 
     steps: Array
-    schemes: tuple[Scheme, ...]
+    schemes: tuple[Scheme, ...] = field(repr=False)
     groups: tuple[tuple[Scheme, npt.NDArray[np.intp]], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

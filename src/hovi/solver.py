@@ -61,7 +61,7 @@ class Solution:
     success: bool
     status: Status
     message: str
-    trajectory: Trajectory
+    trajectory: Trajectory = field(repr=False)
     cost: float
     nit: int
     n_neg: int
@@ -228,10 +228,8 @@ def _limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
             f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
             f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}."
         )
-    held = (
-        f"limits hold to {max(outcome.excess, 0.0):.1e} of their ranges everywhere, on "
-        f"{outcome.problem.grid.intervals} intervals"
-    )
+    share = f" to {outcome.excess:.1e} of their ranges" if outcome.excess > 0 else ""
+    held = f"limits hold everywhere{share}, on {outcome.problem.grid.intervals} intervals"
     if outcome.n_neg == 0:
         return (
             Status.MINIMUM,

@@ -59,9 +59,9 @@ class Trajectory:
     """
 
     grid: Grid
-    path: DiscretePath
-    momenta: Array
-    scene: Scene | None
+    path: DiscretePath = field(repr=False)
+    momenta: Array = field(repr=False)
+    scene: Scene | None = field(repr=False)
     metadata: Mapping[str, Any] = field(default_factory=dict)
     torque: StoredTorque | None = None
 

@@ -23,13 +23,14 @@ def save_task(task: Task, path: str | Path) -> Path:
     """Write a task as TOML; returns the path.
 
     task: what to write.
-    path: the file, replaced whole or not at all. The URDF of a robot that came from a file is
+    path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that came from a file is
         written beside it when it is not there yet.
     Raises SceneError when the robot has no file, or when another URDF of the same name is there.
     """
     path = Path(path)
     source = task.scene.robot.source
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         _keep_urdf_beside(source, path)
         _write(path, tomlkit.dumps(_document(task, path.parent)).encode("utf-8"))
     except OSError as refused:
