@@ -36,9 +36,9 @@ def test_outputs_are_measured_in_ranges_from_the_lower_bound(limited: LimitedAct
     (q, v, a), *_ = limited.ld.jets(x)
     tau = limited.problem.scene.inverse_dynamics(q, v, a)
     y = limited.outputs(x).y
-    np.testing.assert_allclose(y[:, :2], (q + [4, 3]) / [8, 6], atol=1e-13)
+    np.testing.assert_allclose(y[:, :2], (q + np.array([4, 3])) / [8, 6], atol=1e-13)
     np.testing.assert_allclose(y[:, 2:4], (v + 7) / 14, atol=1e-13)
-    np.testing.assert_allclose(y[:, 4:], (tau + [9, 4]) / [18, 8], atol=1e-13)
+    np.testing.assert_allclose(y[:, 4:], (tau + np.array([9, 4])) / [18, 8], atol=1e-13)
     assert limited.outputs(x).value == pytest.approx(limited.ld.action(x), rel=1e-14)
 
 
