@@ -23,8 +23,8 @@ def save_task(task: Task, path: str | Path) -> Path:
     """Write a task as TOML; returns the path.
 
     task: what to write.
-    path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that came from a file is
-        written beside it when it is not there yet.
+    path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that
+        came from a file is written beside it when it is not there yet.
     Raises SceneError when the robot has no file, or when another URDF of the same name is there.
     """
     path = Path(path)
