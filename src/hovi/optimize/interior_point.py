@@ -30,6 +30,7 @@ from hovi.optimize.trust_region import (
     Options,
     Stop,
     Trial,
+    decrease_ratio,
     next_radius,
     next_shift,
     solve_subproblem,
@@ -254,7 +255,7 @@ class _Iteration(Generic[X]):
         moved = moved.with_reset_slacks(outputs.y, self.penalty)
         old = outcome.outputs.value + barrier.merit(weights, outcome.outputs.y, self.penalty)
         new = outputs.value + moved.merit(weights, outputs.y, self.penalty)
-        ratio = _ratio(old, new, step.decrease)
+        ratio = decrease_ratio(old - new, step.decrease, 1e-13 * abs(old))
         outcome.iterations += 1
         trial = step.trial
         outcome.history.append(
@@ -300,13 +301,3 @@ class _Iteration(Generic[X]):
             outcome.barrier = barrier.with_mu(mu)
             self.penalty = 0.0
         return False
-
-
-def _ratio(old: float, new: float, predicted: float) -> float:
-    """Actual over predicted decrease of the merit; 1 where both drown in rounding."""
-    actual, noise = old - new, 1e-13 * abs(old)
-    if not np.isfinite(actual):
-        return -1.0
-    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
-        return 1.0
-    return actual / predicted if predicted > 0 else -1.0

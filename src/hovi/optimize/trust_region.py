@@ -170,7 +170,7 @@ def _iterate(
         candidate = objective.retract(outcome.x, trial.step, model)
         value = objective.value(candidate)
         noise = 1e-14 * abs(outcome.value)
-        ratio = _ratio(outcome.value - value, trial.decrease, noise)
+        ratio = decrease_ratio(outcome.value - value, trial.decrease, noise)
         outcome.iterations += 1
         outcome.history.append(Iteration(value, trial.decrease, ratio, trial.shift, radius))
         if report is not None:
@@ -209,11 +209,11 @@ def _is_stationary(
     return objective.relative_size(outcome.x, trial.step, model) <= options.step
 
 
-def _ratio(actual: float, predicted: float, noise: float) -> float:
+def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
     """Actual over predicted decrease; 1 where both drown in rounding, -1 where not finite."""
     if not np.isfinite(actual):
         return -1.0
-    if abs(actual) <= noise and predicted <= 10 * noise:
+    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
         return 1.0
     return actual / predicted if predicted > 0 else -1.0
 
