@@ -64,8 +64,6 @@ class LimitedOutcome:
     problem: the problem as solved, with the intervals that had to be split.
     reason: why there is no motion, in a sentence without its end; "" where there is one.
     excess: largest share of a range by which a limit is exceeded anywhere.
-    rounds: how many times limits were tightened between the points.
-    first_value: the action before any tightening.
     """
 
     problem: TrajectoryProblem
@@ -77,8 +75,6 @@ class LimitedOutcome:
     n_neg: int
     reason: str = ""
     excess: float = 0.0
-    rounds: int = 0
-    first_value: float = 0.0
 
 
 def solve_limited(
@@ -102,7 +98,7 @@ def solve_limited(
     if not outcome.feasible and outcome.stop is Stop.DIVERGED:
         outcome, reason = search.restored(outcome)
     if reason or outcome.stop is not Stop.STATIONARY:
-        return search.finished(outcome, reason, 0.0, 0, outcome.outputs.value)
+        return search.finished(outcome, reason, 0.0)
     return search.tightened(outcome)
 
 
@@ -177,8 +173,7 @@ class _Search:
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
-        first_value, tightened = outcome.outputs.value, 0
-        tolerance = self.limits.tolerance
+        tightened, tolerance = 0, self.limits.tolerance
         for rounds in range(ROUNDS + 1):
             excess = excess_along(self._trajectory(outcome.x), self.limits)
             if excess.worst <= tolerance or rounds == ROUNDS:
@@ -200,15 +195,10 @@ class _Search:
                 f"{self._why(outcome.x)}, between the points where limits are imposed; use more "
                 "intervals"
             )
-        return self.finished(outcome, reason, excess.worst, rounds, first_value)
+        return self.finished(outcome, reason, excess.worst)
 
     def finished(
-        self,
-        outcome: BoundedOutcome[DiscretePath],
-        reason: str,
-        excess: float,
-        rounds: int,
-        first_value: float,
+        self, outcome: BoundedOutcome[DiscretePath], reason: str, excess: float
     ) -> LimitedOutcome:
         """The result of the stages."""
         return LimitedOutcome(
@@ -221,8 +211,6 @@ class _Search:
             self._inertia(outcome),
             reason,
             excess,
-            rounds,
-            first_value,
         )
 
     def _halved(self, excess: Excess) -> BoundedOutcome[DiscretePath]:
