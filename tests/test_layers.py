@@ -13,7 +13,7 @@ SOURCE = Path(hovi.__file__).parent
 
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
-    {"errors", "newton", "whole_file", "skeleton", "meshcat_page"},
+    {"errors", "newton", "conditions", "whole_file", "skeleton", "meshcat_page"},
     {
         "schemes",
         "optimize",
@@ -37,6 +37,9 @@ FLOORS = [
     {"robot_geometry", "robot_reading"},
     {"robot"},
     {"state", "lagrangian", "effects", "limits"},
+    {"frame_goal"},
+    {"inverse_kinematics"},
+    {"goals"},
     {"scene"},
     {"discrete_lagrangian", "lagrangians"},
     {"action_structure"},
@@ -47,12 +50,14 @@ FLOORS = [
         "saturation",
         "limit_bands",
         "problem",
+        "budget",
         "euler_lagrange",
         "exact_discrete_lagrangian",
         "symmetry",
     },
-    {"trajectory_objective", "stepper", "variational_error", "contradictions", "highlights"},
-    {"limited_action"},
+    {"multipliers", "stepper", "variational_error", "contradictions", "highlights"},
+    {"trajectory_objective"},
+    {"limited_action", "equality_rounds"},
     {"limited_solver"},
     {"solver", "task_file", "simulator"},
     {"multistart"},

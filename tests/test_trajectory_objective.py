@@ -206,7 +206,6 @@ def test_the_exact_model_counts_the_same_inertia_in_any_algebra(
 ) -> None:
     path = random_path(grid, 2, seed=7)
     counts = {
-        objective(arm_scene, grid, path, algebra).merge_model(path).negative_eigenvalues()
-        for algebra in ALGEBRAS
+        objective(arm_scene, grid, path, algebra).negative_eigenvalues(path) for algebra in ALGEBRAS
     }
     assert len(counts) == 1

@@ -15,6 +15,7 @@ from hovi.optimize.merge_tree import MergeTree, merge_levels
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +23,13 @@ class ActionStructure:
     """Unknowns, metric and elimination order of a grid, each worked out when first asked for.
 
     grid: the intervals. dof: n, the degrees of freedom.
+    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, n); none when
+        None.
     """
 
     grid: Grid
     dof: int
+    free_ends: Mask | None = None
 
     @cached_property
     def metric(self) -> dict[Coordinates, Array]:
@@ -35,7 +39,7 @@ class ActionStructure:
     @cached_property
     def layout(self) -> BandLayout:
         """The places of nodes and inner modes in a banded matrix."""
-        return BandLayout.of(unknowns(self.grid, self.dof), self._scales())
+        return BandLayout.of(unknowns(self.grid, self.dof, self.free_ends), self._scales())
 
     @cached_property
     def metric_band(self) -> Array:
@@ -73,22 +77,20 @@ def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
     return metric
 
 
-def unknowns(grid: Grid, n: int) -> Index:
+def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
     """Numbers of the unknowns of every interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
 
-    Nodes and inner modes alternate along the motion; both ends are fixed. Shape (N, m, n).
+    Nodes and inner modes alternate along the motion. Shape (N, m, n).
+    free_ends: as in ActionStructure.
     """
     N, r = grid.intervals, grid.inner_modes
     modes = np.zeros(N, dtype=np.intp)
     for scheme, index in grid.groups:
         modes[index] = scheme.inner_modes
-    node_sizes = np.full(N + 1, 2 * n)
-    node_sizes[[0, -1]] = 0
-    sizes = np.zeros(2 * N + 1, dtype=np.intp)
-    sizes[0::2], sizes[1::2] = node_sizes, modes * n
-    first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    nodes = first[0::2, None] + np.arange(2 * n)
-    nodes[[0, -1]] = -1
-    inner = first[1::2, None] + np.arange(r * n)
-    inner[np.arange(r * n) >= (modes * n)[:, None]] = -1
-    return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1).reshape(N, 4 + r, n)
+    free = np.ones((2 * N + 1, max(2, r), n), dtype=bool)  # nodes and inner modes by turns
+    free[0::2, 2:] = False
+    free[[0, -1], :2] = False if free_ends is None else free_ends
+    free[1::2] = np.arange(max(2, r))[:, None] < modes[:, None, None]
+    numbers = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
+    nodes, inner = numbers[0::2, :2], numbers[1::2, :r]
+    return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1)

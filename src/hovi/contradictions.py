@@ -10,6 +10,7 @@ from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
@@ -19,9 +20,12 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     """
     q0, v0, q1, v1 = problem.boundary
     names = problem.robot.coordinate_names
-    for end, state in (("start", (q0, v0)), ("goal", (q1, v1))):
+    if problem.unreachable:
+        return problem.unreachable
+    for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
         for row in (0, 1):
-            sentence = _outside(problem.robot, end, row, state[row], limits)
+            held = ~problem.free_ends[i, row]
+            sentence = _outside(problem.robot, end, row, state[row], limits, held)
             if sentence:
                 return sentence
     return _too_short(problem, limits, names)
@@ -46,9 +50,10 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
     return ""
 
 
-def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits) -> str:
+def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, held: Mask) -> str:
+    """Which held component of an end's q or v is outside its limits; "" where none is."""
     outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
-    outside = outside / limits.ranges[row]
+    outside = np.where(held, outside / limits.ranges[row], -np.inf)
     i = int(np.argmax(outside))
     if outside[i] <= limits.tolerance:
         return ""
@@ -67,6 +72,7 @@ def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...
     T = problem.grid.duration
     fastest = np.where(distance >= 0, limits.upper[1], -limits.lower[1])
     needed = np.abs(distance) / np.maximum(fastest, 1e-300)
+    needed[problem.free_ends[:, 0].any(axis=0)] = 0.0
     i = int(np.argmax(needed))
     if needed[i] <= T:
         return ""

@@ -207,25 +207,32 @@ class DiscreteLagrangian:
         numbers = np.arange(self.grid.intervals)
         return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self._batches]
 
-    def momenta(self, path: DiscretePath) -> Array:
+    def momenta(self, path: DiscretePath, forces: list[Array] | None = None) -> Array:
         """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
 
         p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k (F-), and
         p_N = D3 L_d, p~_N = D4 L_d of the last (F+). [ColomboFerraroMartin2016, section 3, with F+
         and F- the other way round, as the paper's later text uses them]
+        forces: as for `derivatives`.
         """
-        g = self.derivatives(path)
+        g = self.derivatives(path, forces)
         return np.concatenate([-g[:, :2], g[-1:, 2:]])
 
-    def derivatives(self, path: DiscretePath) -> Array:
+    def derivatives(self, path: DiscretePath, forces: list[Array] | None = None) -> Array:
         """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
 
         At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
+        forces: multipliers of the torques at the quadrature points, (P, nv) per batch, whose work
+            belongs to L_d where torques have to vanish.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
         g = np.empty((N, 4, n))
-        for batch in self._batches:
-            gradient = self.lagrangian.gradient(*_jet(batch, path), t=batch.t)
+        for i, batch in enumerate(self._batches):
+            jet = _jet(batch, path)
+            if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
+                gradient = self.lagrangian.gradient(*jet, t=batch.t, force=forces[i])
+            else:
+                gradient = self.lagrangian.gradient(*jet, t=batch.t)
             regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
             g[batch.index] = regular[:, :4]
         h = self.grid.steps[:, None]

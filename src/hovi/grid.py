@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -76,6 +77,36 @@ class Grid:
     def duration(self) -> float:
         """T, in [s]."""
         return float(self.t[-1])
+
+    def node_at(self, time: float) -> int:
+        """The number of the inner node at a time, in [s]. Raises InputError where there is none."""
+        k = int(np.argmin(np.abs(self.t - time)))
+        if not 0 < k < self.intervals or abs(self.t[k] - time) > 1e-9 * self.duration:
+            raise InputError(
+                f"there is no node inside the motion at {time:g} s, as a via point needs; the "
+                f"nearest is at {self.t[k]:g} s of {self.duration:g} s."
+            )
+        return k
+
+    def with_nodes(self, times: Sequence[float]) -> Grid:
+        """The grid with the nearest inner nodes moved to given times, in [s], ascending.
+
+        The intervals between two moved nodes keep the proportions of their lengths.
+        Raises InputError where the grid has too few nodes for it.
+        """
+        nodes = self.t
+        fixed = [0]
+        for time in times:
+            k = int(np.clip(np.argmin(np.abs(nodes - time)), fixed[-1] + 1, self.intervals))
+            if not 0 < time < self.duration or k >= self.intervals:
+                raise InputError(
+                    f"a via point at {time:g} s does not fit between its neighbors on "
+                    f"{self.intervals} intervals of {self.duration:g} s; use more intervals."
+                )
+            fixed.append(k)
+        places = [0.0, *times, self.duration]
+        t = np.interp(nodes, nodes[[*fixed, self.intervals]], places)
+        return Grid(np.diff(t), self.schemes)
 
     @property
     def inner_modes(self) -> int:

@@ -81,6 +81,12 @@ class PointTerms:
     effort_gradient: Array
     effort_weight: Array
 
+    @classmethod
+    def of_effort(cls, gradient: Array) -> PointTerms:
+        """A force on the torques alone, shape (P, nv)."""
+        jet = np.zeros((len(gradient), 3 * gradient.shape[1]))
+        return cls(jet, jet, gradient, np.zeros_like(gradient))
+
 
 @dataclass(frozen=True, eq=False)
 class EffortLagrangian(Lagrangian):
@@ -132,11 +138,17 @@ class EffortLagrangian(Lagrangian):
             value = value + self.potential.value(*jet, t=t)
         return np.asarray(value)
 
-    def gradient(self, *jet: Array, t: Array | None = None) -> Array:
-        """The gradient J^T R tau + dV, shape (P, 3, nv)."""
+    def gradient(self, *jet: Array, t: Array | None = None, force: Array | None = None) -> Array:
+        """The gradient J^T (R tau + force) + dV, shape (P, 3, nv).
+
+        force: multipliers of the torques, shape (P, nv); none when None.
+        """
         q, v, a = jet
         tau, J = self.torques.linearize(q, v, a, t)
-        gradient = np.matmul((self.weight * tau)[:, None], J)[:, 0]
+        effort = self.weight * tau
+        if force is not None:
+            effort = effort + force
+        gradient = np.matmul(effort[:, None], J)[:, 0]
         if self.potential is not None:
             gradient = gradient + self.potential.expand(q, v, a, t=t)[1]
         return np.asarray(gradient.reshape(len(tau), 3, self.nv))

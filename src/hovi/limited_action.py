@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.grid import DiscretePath
-from hovi.lagrangian import EffortLagrangian, PointTerms
+from hovi.lagrangian import PointTerms
 from hovi.limits import Limits
+from hovi.multipliers import Multipliers
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.interior_point import BoundedObjective, Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -27,7 +28,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
     limits: the bounds.
     margins: by which share of its range each bound is drawn in, below and above, in each
         interval, shape (2, N, 4, nv); none when None.
-    algebra: as for ActionObjective.
+    algebra, multipliers: as for ActionObjective.
     """
 
     def __init__(
@@ -36,14 +37,13 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         limits: Limits,
         margins: Array | None = None,
         algebra: LinearAlgebra | None = None,
+        multipliers: Multipliers | None = None,
     ) -> None:
         self.problem = problem
         self.limits = limits
-        self.action = ActionObjective(problem, algebra, problem.structure)
-        self.ld = problem.ld
-        if not isinstance(self.ld.lagrangian, EffortLagrangian):
-            raise TypeError("limits need the effort Lagrangian of a scene")
-        self.lagrangian: EffortLagrangian = self.ld.lagrangian
+        self.action = ActionObjective(problem, algebra, problem.structure, multipliers)
+        self.ld = self.action.ld
+        self.lagrangian = self.action.lagrangian
         self.columns = np.flatnonzero(limits.bounded.ravel())
         self.bounds = self._bounds(margins)
         self._predicted: list[Array] | None = None
@@ -52,14 +52,10 @@ class LimitedAction(BoundedObjective[DiscretePath]):
 
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs in units of their ranges."""
-        value, rows = 0.0, []
-        for jet, t, weights in zip(
-            self.action.jets(x), self.ld.point_times, self.ld.point_weights, strict=True
-        ):
-            tau = self.lagrangian.torques.torque(*jet, t)
-            value += float(weights @ self.lagrangian.value_of(tau, jet, t))
-            rows.append(np.concatenate([*jet, tau], axis=1))
-        return Outputs(value, self._scaled(np.concatenate(rows)))
+        torques = self.action.torques(x)
+        pairs = zip(self.action.jets(x), torques, strict=True)
+        rows = [np.concatenate([*jet, tau], axis=1) for jet, tau in pairs]
+        return Outputs(self.action.value_of(x, torques), self._scaled(np.concatenate(rows)))
 
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
@@ -95,7 +91,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         """The torques that the step taken foresees weight the next curvature."""
         pairs = zip(self.action.expansion.torque, self._linear, strict=True)
         self._predicted = [
-            self.lagrangian.weight * (tau + fraction * dtau) for (tau, _), dtau in pairs
+            self.action.effort(tau + fraction * dtau, i) for i, ((tau, _), dtau) in enumerate(pairs)
         ]
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
@@ -107,7 +103,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         if self._predicted is not None:
             return self._predicted[batch]
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
-        return self.lagrangian.weight * self.lagrangian.torques.torque(*jet, t)
+        return self.action.effort(self.lagrangian.torques.torque(*jet, t), batch)
 
     @cached_property
     def _ranges(self) -> Array:

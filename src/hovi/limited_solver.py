@@ -11,11 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.contradictions import contradiction, static_sentence
+from hovi.equality_rounds import first_multipliers, satisfy
 from hovi.grid import DiscretePath
-from hovi.guess import path_on_grid, stretched, with_bump
+from hovi.guess import stretched, with_bump
 from hovi.limit_check import Excess, excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
 from hovi.limits import Limits
+from hovi.multipliers import Multipliers
+from hovi.optimize.band import BandModel
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
@@ -73,6 +76,7 @@ class LimitedOutcome:
     iterations: int
     history: list[Iteration]
     n_neg: int
+    momenta: Array
     reason: str = ""
     excess: float = 0.0
 
@@ -90,13 +94,14 @@ def solve_limited(
     """
     reason = contradiction(problem, limits)
     if reason:
-        value = problem.ld.action(path)
-        return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason)
+        value, momenta = problem.ld.action(path), problem.ld.momenta(path)
+        return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, momenta, reason)
     deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
     search = _Search(problem, limits, options, deadline, report, path)
     outcome = search.first(path)
     if not outcome.feasible and outcome.stop is Stop.DIVERGED:
         outcome, reason = search.restored(outcome)
+    reason = reason or search.unmet
     if reason or outcome.stop is not Stop.STATIONARY:
         return search.finished(outcome, reason, 0.0)
     return search.tightened(outcome)
@@ -114,6 +119,8 @@ class _Search:
     guess: DiscretePath
     iterations: int = 0
     halvings: int = 0
+    multipliers: Multipliers | None = None
+    unmet: str = ""
 
     def __post_init__(self) -> None:
         self.history: list[Iteration] = []
@@ -122,14 +129,44 @@ class _Search:
 
     def first(self, path: DiscretePath) -> BoundedOutcome[DiscretePath]:
         """The interior point from a guess, at the quadrature points."""
-        objective = LimitedAction(self.problem, self.limits)
-        return self._count(minimize_bounded(objective, path, self._options(), self.report))
+        return self._interior_point(path)
+
+    def _interior_point(
+        self, path: DiscretePath, start: Barrier | None = None
+    ) -> BoundedOutcome[DiscretePath]:
+        """Between the bounds as they are drawn in, in rounds where equations have to be met."""
+        if not self.problem.constrained:
+            objective = self._objective(None)
+            return self._count(
+                minimize_bounded(objective, path, self._options(), self.report, start)
+            )
+
+        def round_(
+            known: Multipliers, x: DiscretePath, decrease: float
+        ) -> BoundedOutcome[DiscretePath]:
+            nonlocal start
+            objective = self._objective(known)
+            options = dataclasses.replace(
+                self._options(), decrease=max(decrease, self.options.decrease)
+            )
+            outcome = self._count(minimize_bounded(objective, x, options, self.report, start))
+            mu = WARM_MU[1] * _density(outcome, objective)
+            start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
+            return outcome
+
+        rounds = satisfy(self.problem, path, round_, self.multipliers)
+        self.multipliers, self.unmet = rounds.multipliers, rounds.reason
+        return rounds.result
+
+    def _objective(self, known: Multipliers | None) -> LimitedAction:
+        return LimitedAction(self.problem, self.limits, self.margins, multipliers=known)
 
     def restored(
         self, outcome: BoundedOutcome[DiscretePath]
     ) -> tuple[BoundedOutcome[DiscretePath], str]:
         """More tries, from motions that violate little, or the reason why there is none."""
-        objective = LimitedAction(self.problem, self.limits)
+        known = first_multipliers(self.problem, outcome.x) if self.problem.constrained else None
+        objective = self._objective(known)
         density = _density(outcome, objective)
         least = np.inf
         for guess in self._guesses():
@@ -138,8 +175,8 @@ class _Search:
                 outcome.stop = stop
                 return outcome, ""
             if violation <= HELD:
-                options = self._options()
-                again = self._count(minimize_bounded(objective, path, options, self.report))
+                self.multipliers = None
+                again = self._interior_point(path)
                 if again.feasible or again.stop in ENDED:
                     return again, ""
             if violation < least:
@@ -155,7 +192,7 @@ class _Search:
         base = stretched(self._trajectory(self.guess), T)
         for seed in range(BUMPED_GUESSES):
             curve = with_bump(base, problem.robot, T, seed)
-            yield path_on_grid(curve, problem.grid, problem.boundary, problem.robot)
+            yield problem.path(curve)
 
     def _penalised(
         self, objective: LimitedAction, path: DiscretePath, density: float
@@ -201,15 +238,17 @@ class _Search:
         self, outcome: BoundedOutcome[DiscretePath], reason: str, excess: float
     ) -> LimitedOutcome:
         """The result of the stages."""
+        action = self._objective(self.multipliers).action
         return LimitedOutcome(
             self.problem,
             outcome.x,
-            outcome.outputs.value,
+            self.problem.ld.action(outcome.x),
             outcome.stop,
             self.iterations,
             self.history,
             self._inertia(outcome),
-            reason,
+            action.momenta(outcome.x),
+            reason or self.unmet,
             excess,
         )
 
@@ -228,8 +267,9 @@ class _Search:
         chosen[:-1] |= worst[1:]
         curve = stretched(self._trajectory(self.guess), grid.duration)
         problem = self.problem.on(grid.halved(chosen))
-        self.guess = path_on_grid(curve, problem.grid, problem.boundary, problem.robot)
+        self.guess = problem.path(curve)
         self.problem = problem
+        self.multipliers = None
         self.margins = np.zeros((2, problem.grid.intervals, *self.limits.lower.shape))
         return self.first(self.guess)
 
@@ -241,11 +281,10 @@ class _Search:
         tighter = np.where(sides > 0, OVERSHOOT * sides + ROOM * self.limits.tolerance, 0.0)
         looser = np.where(np.isfinite(sides) & (sides < -SPARE), sides + 0.5 * SPARE, 0.0)
         self.margins = np.clip(self.margins + tighter + looser, 0.0, 0.45)
-        objective = LimitedAction(self.problem, self.limits, self.margins)
+        objective = self._objective(self.multipliers)
         mu = float(np.clip(1e-2 * excess.worst, *WARM_MU)) * _density(outcome, objective)
         start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
-        options = self._options()
-        return self._count(minimize_bounded(objective, outcome.x, options, self.report, start))
+        return self._interior_point(outcome.x, start)
 
     def _count(self, outcome: BoundedOutcome[DiscretePath]) -> BoundedOutcome[DiscretePath]:
         self.iterations += outcome.iterations
@@ -262,6 +301,8 @@ class _Search:
             return -1
         if outcome.model.factor(0.0) is not None:
             return 0
+        if not self.problem.plain and isinstance(outcome.model, BandModel):
+            return outcome.model.negative_eigenvalues()
         objective = LimitedAction(self.problem, self.limits, self.margins, "tree")
         barrier: Barrier = outcome.barrier
         model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)

@@ -17,7 +17,7 @@ from joblib import Parallel, delayed, parallel_config
 
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import path_on_grid, stretched, with_bump
+from hovi.guess import stretched, with_bump
 from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
@@ -157,7 +157,7 @@ def _round(
 ) -> list[DiscretePath]:
     """Guesses of the next round: bumps on the best minima, in the first round on the guess."""
     problem = job.problem()
-    T, robot, boundary = job.grid.duration, problem.robot, problem.boundary
+    T, robot = job.grid.duration, problem.robot
     origin = Trajectory(job.grid, first, problem.ld.momenta(first), job.scene)
     bases = [origin]
     if done > ROUND:
@@ -166,7 +166,7 @@ def _round(
     for i in range(done, min(done + ROUND, starts)):
         base = stretched(bases[i % len(bases)], T)
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
-        guesses.append(path_on_grid(curve, job.grid, boundary, robot))
+        guesses.append(problem.path(curve))
     return guesses
 
 

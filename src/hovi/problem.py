@@ -9,10 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
+from hovi.conditions import NodeCondition
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, ModelError
-from hovi.grid import Grid
-from hovi.guess import Boundary
+from hovi.frame_goal import FrameGoal
+from hovi.goals import Via, met, via_conditions
+from hovi.grid import DiscretePath, Grid
+from hovi.guess import Boundary, Curve, path_on_grid
 from hovi.lagrangian import EffortLagrangian
 from hovi.limits import Limits
 from hovi.robot import Robot
@@ -22,6 +25,7 @@ from hovi.schemes import require_regular
 from hovi.state import State
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,40 +37,98 @@ class TrajectoryProblem:
     [ColomboFerraroMartin2016, section 3]
 
     ld: the discrete Lagrangian of a scene's effort on a grid.
-    start, goal: states at t = 0 and t = T.
+    start: state at t = 0. goal: state at t = T, or a goal of a frame.
     limits: bounds that hold along the motion; none when None.
-    boundary: (q0, v0, q1, v1) of the two states.
+    via: what the motion passes through, at nodes of the grid.
+    boundary: (q0, v0, q1, v1) of the two ends, first guesses where they are free.
+    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, nv).
+    conditions: what has to hold at nodes besides. unreachable: why the goal cannot be met, or "".
     Raises InputError, ModelError or SchemeError when no motion can be planned.
     """
 
     ld: DiscreteLagrangian
     start: State
-    goal: State
+    goal: State | FrameGoal
     limits: Limits | None = None
+    via: tuple[Via, ...] = ()
     boundary: Boundary = field(init=False, repr=False)
+    free_ends: Mask = field(init=False, repr=False)
+    conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
+    unreachable: str = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
         require_plannable(self.scene)
-        start, goal = self.start.on(self.robot, "start"), self.goal.on(self.robot, "goal")
+        robot, N = self.robot, self.grid.intervals
+        start = self.start.on(robot, "start")
+        end = met(self.goal, "goal", robot, start[0], self.limits)
+        goal = end.state.on(robot, "goal")
+        conditions = [NodeCondition(N, condition) for condition in end.conditions]
+        unreachable = end.reason
+        for via in self.via:
+            passed = met(via.goal, "via", robot, start[0], self.limits)
+            node = self.grid.node_at(via.time)
+            conditions += [NodeCondition(node, each) for each in via_conditions(via, passed, robot)]
+            unreachable = unreachable or passed.reason
+        free = self.start.free_on(robot, "start"), end.state.free_on(robot, "goal")
         object.__setattr__(self, "boundary", (*start, *goal))
+        object.__setattr__(self, "free_ends", np.stack(free))
+        object.__setattr__(self, "conditions", tuple(conditions))
+        object.__setattr__(self, "unreachable", unreachable)
 
     @cached_property
     def structure(self) -> ActionStructure:
         """What the action's Hessian looks like on this grid."""
-        return ActionStructure(self.grid, self.robot.nv)
+        free = self.free_ends if self.free_ends.any() else None
+        return ActionStructure(self.grid, self.robot.nv, free)
 
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         ld = DiscreteLagrangian(self.ld.lagrangian, grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via)
 
-    def between(self, start: State, goal: State) -> TrajectoryProblem:
+    def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""
-        problem = TrajectoryProblem(self.ld, start, goal, self.limits)
-        object.__setattr__(problem, "structure", self.structure)
+        problem = TrajectoryProblem(self.ld, start, goal, self.limits, self.via)
+        if np.array_equal(problem.free_ends, self.free_ends):
+            object.__setattr__(problem, "structure", self.structure)
         return problem
+
+    def path(self, curve: Curve) -> DiscretePath:
+        """A curve on the grid, its ends those of the problem as far as they are not free."""
+        q, v, _ = curve(np.array([0.0, self.grid.duration]))
+        return path_on_grid(curve, self.grid, self.ends(q, v), self.robot)
+
+    def ends(self, q: Array, v: Array) -> Boundary:
+        """The boundary data, with what is free taken from two states (2, nq) and (2, nv)."""
+        q0, v0, q1, v1 = self.boundary
+        if not self.free_ends.any():
+            return self.boundary
+        robot, free = self.robot, self.free_ends
+        q = np.stack(
+            [
+                robot.integrate(a, np.where(free[i, 0], robot.difference(a, b), 0.0))
+                for i, (a, b) in enumerate(((q0, q[0]), (q1, q[1])))
+            ]
+        )
+        v = np.where(free[:, 1], v, np.stack([v0, v1]))
+        return q[0], v[0], q[1], v[1]
+
+    @property
+    def passive(self) -> npt.NDArray[np.intp]:
+        """Places in v of the joints that carry no torque."""
+        return self.scene.passive_coordinates
+
+    @property
+    def constrained(self) -> bool:
+        """Whether the motion has to meet equations besides its boundary data."""
+        return bool(self.conditions) or len(self.passive) > 0
+
+    @property
+    def plain(self) -> bool:
+        """Whether both ends are fixed and no equation has to be met."""
+        return not self.constrained and not self.free_ends.any()
 
     @property
     def limited(self) -> bool:

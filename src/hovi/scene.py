@@ -29,6 +29,7 @@ class Scene:
 
     robot: the robot.
     effects: at most one of each kind.
+    passive: joints that carry no torque, by name; every coordinate of a joint.
     compile: compile what is evaluated by CasADi to machine code, once: the libraries stay in the
         user's cache folder. It takes a C compiler and seconds, and changes no result.
     model: the scene's own copy of the robot's model, with gravity and armature as the effects
@@ -39,6 +40,7 @@ class Scene:
 
     robot: Robot
     effects: Sequence[Effect] = ()
+    passive: Sequence[str] = field(default=(), kw_only=True)
     compile: bool = field(default=False, kw_only=True)
     model: pin.Model = field(init=False, repr=False)
 
@@ -55,6 +57,7 @@ class Scene:
             effect.check(self.robot)
             effect.configure(model)
         object.__setattr__(self, "effects", effects)
+        object.__setattr__(self, "passive", _passive(self.robot, self.passive))
         object.__setattr__(self, "model", model)
 
     @cached_property
@@ -74,6 +77,13 @@ class Scene:
         tau = tau if added is None else tau + added
         return CasadiTorque(symbols.columns(), tau, self.compile)
 
+    @cached_property
+    def passive_coordinates(self) -> npt.NDArray[np.intp]:
+        """Places in v of the joints that carry no torque, ascending."""
+        joints = [self.robot.model.joints[self.robot.model.getJointId(j)] for j in self.passive]
+        places = [np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in joints]
+        return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *places]))
+
     @property
     def analytic(self) -> bool:
         """Whether RNEA's derivatives are Pinocchio's analytic ones."""
@@ -82,15 +92,18 @@ class Scene:
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V on T^(2)Q.
 
-        weight: R, shape (nv,), all ones when not given. [ColomboFerraroMartin2016, section 5]
+        weight: R, shape (nv,), all ones when not given; that of passive joints, whose torque
+            vanishes, does not count and is set to zero. [ColomboFerraroMartin2016, section 5]
         Raises ModelError for joints whose configurations are not vectors.
         """
         require_vector_joints(self.robot)
         R = np.ones(self.robot.nv) if weight is None else np.asarray(weight, dtype=np.float64)
-        if R.shape != (self.robot.nv,) or not (np.isfinite(R).all() and (R > 0).all()):
+        passive = np.isin(np.arange(self.robot.nv), self.passive_coordinates)
+        if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
             raise SceneError(
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
+        R = np.where(passive, 0.0, R)
         return EffortLagrangian(self.torques, self, R, self._potential)
 
     def inverse_dynamics(
@@ -107,6 +120,8 @@ class Scene:
         """What is simulated, and what the URDF holds but the scene leaves out."""
         lines = [f"scene of robot {self.robot.name!r}", "simulated:"]
         lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
+        if self.passive:
+            lines.append(f"  no torque at {', '.join(self.passive)}")
         lines.append("left out:")
         lines += [f"  {line}" for line in self._left_out()] or ["  nothing that the URDF holds"]
         lines.append(self._derivatives())
@@ -117,7 +132,8 @@ class Scene:
     def to_dict(self) -> dict[str, Any]:
         """The scene as JSON-able data, the URDF's text included."""
         effects = {effect.key: dataclasses.asdict(effect) for effect in self.effects}
-        return {"robot": self.robot.to_dict(), "effects": effects}
+        passive = {"passive": list(self.passive)} if self.passive else {}
+        return {"robot": self.robot.to_dict(), "effects": effects, **passive}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Scene:
@@ -127,7 +143,8 @@ class Scene:
             if key not in REGISTRY:
                 raise SceneError(f"there is no effect {key!r}: {nearest(key, REGISTRY)}")
             effects.append(REGISTRY[key](**values))
-        return cls(Robot.from_dict(data["robot"]), effects)
+        robot = Robot.from_dict(data["robot"])
+        return cls(robot, effects, passive=tuple(data.get("passive", ())))
 
     @cached_property
     def _potential(self) -> PotentialTerm | None:
@@ -161,7 +178,8 @@ class Scene:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what is cached, so that worker processes build their own functions."""
-        return {name: getattr(self, name) for name in ("robot", "effects", "compile", "model")}
+        names = ("robot", "effects", "passive", "compile", "model")
+        return {name: getattr(self, name) for name in names}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
@@ -176,3 +194,19 @@ def require_vector_joints(robot: Robot) -> None:
             f"robot {robot.name!r} cannot be planned on yet: configurations of {joints} are not "
             "vectors (nq differs from nv); lock these joints with load_robot(..., locked=[...])."
         )
+
+
+def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
+    """The names of passive joints, checked."""
+    if isinstance(names, str):
+        raise SceneError(f"passive is a list of joint names, not the text {names!r}.")
+    for name in names:
+        if name not in robot.joint_names:
+            raise SceneError(
+                f"passive: robot {robot.name!r} has no joint {name!r}: "
+                f"{nearest(str(name), robot.joint_names)}"
+            )
+    chosen = tuple(name for name in robot.joint_names if name in names)
+    if chosen and len(chosen) == len(robot.joint_names):
+        raise SceneError("every joint is passive; a motion needs one that carries torque.")
+    return chosen

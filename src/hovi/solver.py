@@ -12,16 +12,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.budget import Deadline
+from hovi.equality_rounds import satisfy
 from hovi.errors import InputError
 from hovi.grid import DiscretePath
-from hovi.guess import check_path, moved, named_curve, path_on_grid, stretched
+from hovi.guess import check_path, moved, named_curve, stretched
 from hovi.limited_solver import LimitedOutcome, solve_limited
+from hovi.multipliers import Multipliers
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.problem import TrajectoryProblem
 from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective, follow
 
+Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
 """What is told the number of each step and the least cost so far."""
 
@@ -164,6 +168,7 @@ class _Answer:
     nit: int
     n_neg: int
     history: list[Iteration]
+    momenta: Array
 
     def trajectory(self) -> Trajectory:
         """The motion with its momenta and where it came from."""
@@ -175,20 +180,57 @@ class _Answer:
         }
         if problem.limits is not None and problem.limited:
             metadata["limits"] = problem.limits.to_dict()
-        momenta = problem.ld.momenta(self.path)
-        return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
+        return Trajectory(problem.grid, self.path, self.momenta, problem.scene, metadata)
 
 
 def _without_limits(
     problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
 ) -> _Answer:
     """By a trust region."""
+    if problem.constrained:
+        return _with_equations(problem, path, options, report)
     objective = ActionObjective(problem, structure=problem.structure)
     outcome = minimize(objective, path, options, report)
     n_neg, outcome = _certify(objective, outcome)
     status, message = _verdict(outcome, n_neg)
     nit, history = outcome.iterations, outcome.history
-    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history)
+    momenta = objective.momenta(outcome.x)
+    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, momenta)
+
+
+def _with_equations(
+    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
+) -> _Answer:
+    """By trust regions in rounds of an augmented Lagrangian."""
+    deadline = Deadline(options)
+    history: list[Iteration] = []
+
+    def round_(known: Multipliers, x: DiscretePath, decrease: float) -> Outcome[DiscretePath]:
+        objective = ActionObjective(problem, multipliers=known)
+        limits = deadline.left(len(history), max(decrease, DECREASE))
+        outcome = minimize(objective, x, limits, _shifted(report, len(history)))
+        history.extend(outcome.history)
+        return outcome
+
+    rounds = satisfy(problem, path, round_)
+    outcome = rounds.result
+    objective = ActionObjective(problem, multipliers=rounds.multipliers)
+    n_neg, outcome = _certify(objective, outcome)
+    outcome.value, outcome.iterations = problem.ld.action(outcome.x), len(history)
+    status, message = _verdict(outcome, n_neg)
+    if rounds.reason:
+        status, message = Status.INFEASIBLE, f"{rounds.reason}."
+    momenta = objective.momenta(outcome.x)
+    return _Answer(
+        problem, outcome.x, outcome.value, status, message, len(history), n_neg, history, momenta
+    )
+
+
+def _shifted(report: Report | None, done: int) -> Report | None:
+    """A report that counts on from the steps of earlier rounds."""
+    if report is None:
+        return None
+    return lambda step, cost: report(done + step, cost)
 
 
 def _with_limits(
@@ -207,6 +249,7 @@ def _with_limits(
         outcome.iterations,
         outcome.n_neg,
         outcome.history,
+        outcome.momenta,
     )
 
 
@@ -247,16 +290,14 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
     robot, grid, boundary = problem.robot, problem.grid, problem.boundary
     if isinstance(guess, DiscretePath):
         check_path(guess, grid, robot)
-        return moved(guess, grid, boundary, robot)
+        return moved(guess, grid, problem.ends(guess.q[[0, -1]], guess.v[[0, -1]]), robot)
     if isinstance(guess, str):
-        return path_on_grid(
-            named_curve(guess, robot, boundary, grid.duration), grid, boundary, robot
-        )
+        return problem.path(named_curve(guess, robot, boundary, grid.duration))
     if guess.v.shape[1] != robot.nv:
         raise InputError(
             f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."
         )
-    return path_on_grid(stretched(guess, grid.duration), grid, boundary, robot)
+    return problem.path(stretched(guess, grid.duration))
 
 
 def _certify(
@@ -268,7 +309,7 @@ def _certify(
     model = objective.model(outcome.x, None, None)
     factor = model.factor(0.0)
     if factor is None:
-        return objective.merge_model(outcome.x).negative_eigenvalues(), outcome
+        return objective.negative_eigenvalues(outcome.x), outcome
     if outcome.stop is Stop.STATIONARY:
         path = objective.retract(outcome.x, factor.solve(-model.gradient), model)
         value = objective.value(path)

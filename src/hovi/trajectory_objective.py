@@ -1,17 +1,22 @@
-"""The discrete action of a trajectory problem as an objective of the trust region."""
+"""The discrete action of a trajectory problem as an objective of the trust region.
+
+Where a motion has to meet equations, it is their augmented Lagrangian: see hovi.multipliers.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
-from hovi.discrete_lagrangian import Coordinates, Expansion, Jet
+from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian, Expansion, Jet
 from hovi.grid import DiscretePath
 from hovi.guess import moved
-from hovi.lagrangian import PointTerms
+from hovi.lagrangian import EffortLagrangian, PointTerms
+from hovi.multipliers import Multipliers, Residuals, node_residuals
 from hovi.optimize.band import BandModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
@@ -31,7 +36,9 @@ class ActionObjective(Objective[DiscretePath]):
     problem: what to minimise.
     structure: what depends on the grid alone, from an earlier objective on the same grid.
     algebra: "band" (LAPACK's banded Cholesky in nodal coordinates, the faster one) or "tree"
-        (merging intervals in regularised coordinates, right at every step length).
+        (merging intervals in regularised coordinates, right at every step length; for fixed ends
+        without conditions).
+    multipliers: of the equations, where there are some.
     """
 
     def __init__(
@@ -39,12 +46,14 @@ class ActionObjective(Objective[DiscretePath]):
         problem: TrajectoryProblem,
         algebra: LinearAlgebra | None = None,
         structure: ActionStructure | None = None,
+        multipliers: Multipliers | None = None,
     ) -> None:
         self.problem = problem
-        self.ld = problem.ld
-        self.structure = structure or ActionStructure(problem.grid, problem.robot.nv)
+        self.multipliers = multipliers
+        self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
+        self.structure = structure or problem.structure
         small = problem.grid.intervals <= BAND_INTERVALS
-        self.algebra: LinearAlgebra = algebra or ("band" if small else "tree")
+        self.algebra: LinearAlgebra = algebra or ("band" if small or not problem.plain else "tree")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
 
@@ -61,8 +70,51 @@ class ActionObjective(Objective[DiscretePath]):
         return "nodal" if self.algebra == "band" else "regular"
 
     def value(self, x: DiscretePath) -> float:
-        """The discrete action."""
-        return self.ld.action(x, self.jets(x))
+        """The discrete action, with what equations add."""
+        if self.multipliers is None:
+            return self.ld.action(x, self.jets(x))
+        return self.value_of(x, self.torques(x))
+
+    def torques(self, x: DiscretePath) -> list[Array]:
+        """tau at the quadrature points, (P, nv) per batch."""
+        lagrangian = self.lagrangian
+        pairs = zip(self.jets(x), self.ld.point_times, strict=True)
+        return [lagrangian.torques.torque(*jet, t) for jet, t in pairs]
+
+    def value_of(self, x: DiscretePath, torques: list[Array]) -> float:
+        """The value where the torques at the quadrature points are known."""
+        value = 0.0
+        for i, (jet, t, weights) in enumerate(
+            zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)
+        ):
+            density = self.lagrangian.value_of(torques[i], jet, t)
+            if self.multipliers is not None:
+                density = density + np.vecdot(self.multipliers.torque[i], torques[i])
+            value += float(weights @ density)
+        if self.multipliers is not None:
+            rho = self.multipliers.node_penalty
+            residuals = node_residuals(self.problem, x)
+            for mu, c in zip(self.multipliers.nodes, residuals, strict=True):
+                value += float(mu @ c + 0.5 * rho * c @ c)
+        return value
+
+    def effort(self, torque: Array, batch: int) -> Array:
+        """d value / d tau at the points of a batch: R tau, and the multipliers."""
+        effort = self.lagrangian.weight * torque
+        return effort if self.multipliers is None else effort + self.multipliers.torque[batch]
+
+    def residuals(self, x: DiscretePath) -> Residuals:
+        """By how much the equations fail."""
+        torques = self.torques(x)
+        largest = max(float(np.max(np.abs(tau))) for tau in torques)
+        passive = [tau[:, self.problem.passive] for tau in torques]
+        return Residuals(passive, node_residuals(self.problem, x), largest)
+
+    @property
+    def lagrangian(self) -> EffortLagrangian:
+        """The effort that is minimised."""
+        assert isinstance(self.ld.lagrangian, EffortLagrangian)
+        return self.ld.lagrangian
 
     def jets(self, x: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points, remembered for the last path."""
@@ -74,20 +126,33 @@ class ActionObjective(Objective[DiscretePath]):
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
         """The quadratic model at x, its curvature weighted by the predicted torque."""
-        multipliers = None
+        curvatures = None
         if previous is not None and step is not None and self._expansion is not None:
             local = previous.gather(step)
-            multipliers = self.ld.predict(self._expansion, local, self.coordinates)
-        return self.model_with(x, multipliers, None)
+            curvatures = self.ld.predict(self._expansion, local, self.coordinates)
+        if self.multipliers is not None:
+            if curvatures is None:
+                curvatures = [self.effort(tau, i) for i, tau in enumerate(self.torques(x))]
+            else:
+                pairs = zip(curvatures, self.multipliers.torque, strict=True)
+                curvatures = [effort + more for effort, more in pairs]
+        return self.model_with(x, curvatures, None)
 
     def model_with(
         self,
         x: DiscretePath,
-        multipliers: list[Array] | None,
+        curvatures: list[Array] | None,
         terms: list[PointTerms] | None,
     ) -> QuadraticModel:
-        """The model at x with given curvature weights and with what limits add at the points."""
-        self._expansion = self.ld.expand(x, self.coordinates, multipliers, terms, self.jets(x))
+        """The model at x with given curvature weights and with what limits add at the points.
+
+        curvatures: weights of the curvature of tau, multipliers of equations included.
+        """
+        if self.multipliers is not None:
+            terms = _with_forces(terms, self.multipliers.torque)
+        self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
+        if self.multipliers is not None:
+            self._add_conditions(x, self._expansion, self.multipliers)
         intervals = IntervalSum(
             self._expansion.gradient,
             self._expansion.hessian,
@@ -97,21 +162,51 @@ class ActionObjective(Objective[DiscretePath]):
             return BandModel(intervals, self.structure.layout, self.structure.metric_band)
         return MergeTreeModel(intervals, self.structure.tree)
 
+    def negative_eigenvalues(self, x: DiscretePath) -> int:
+        """n_neg of the exact Hessian at x."""
+        if not self.problem.plain:
+            model = self.model(x, None, None)
+            assert isinstance(model, BandModel)
+            return model.negative_eigenvalues()
+        return self.merge_model(x).negative_eigenvalues()
+
     def merge_model(self, x: DiscretePath) -> MergeTreeModel:
-        """The exact model at x in regularised coordinates, for the inertia."""
+        """The exact model at x in regularised coordinates, between fixed ends."""
         expansion = self.ld.expand(x, "regular")
         metric = self.structure.metric["regular"]
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
 
+    def momenta(self, x: DiscretePath) -> Array:
+        """Momenta at the nodes, the multipliers' share included: see DiscreteLagrangian.momenta."""
+        return self.ld.momenta(x, None if self.multipliers is None else self.multipliers.torque)
+
+    def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
+        """What conditions at nodes add to the intervals that have these nodes."""
+        N, rho = self.problem.grid.intervals, known.node_penalty
+        for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
+            k = min(each.node, N - 1)
+            columns = slice(0, 2) if each.node < N else slice(2, 4)
+            q, v = x.q[each.node], x.v[each.node]
+            c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
+            force = mu + rho * c
+            curvature = rho * np.einsum("sin,sjm->injm", J, J)
+            curvature += each.condition.curvature(q, v, force)
+            scale = np.array([1.0, 1.0 / self.problem.grid.steps[k]])  # of (q, h v)
+            expansion.gradient[k, columns] += np.tensordot(force, J, 1) * scale[:, None]
+            curvature *= scale[:, None, None, None] * scale[:, None]
+            expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
+
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
         h = self._h
         local = model.gather(step)  # (N, m, n)
-        dq = np.concatenate([local[:, 0], np.zeros((1, local.shape[2]))])
-        dv = np.concatenate([local[:, 1] / h, np.zeros((1, local.shape[2]))])
+        band = self.algebra == "band"
+        end = local[-1:, 2:4] if band else np.zeros((1, 2, local.shape[2]))
+        dq = np.concatenate([local[:, 0], end[:, 0]])
+        dv = np.concatenate([local[:, 1] / h, end[:, 1] / h[-1]])
         dZ = local[:, 2:4]
-        if self.algebra == "band":
+        if band:
             dZ = np.stack([dZ[:, 0] - local[:, 0] - local[:, 1], dZ[:, 1] - local[:, 1]], axis=1)
         q = self.problem.robot.integrate(x.q, dq)
         hh = h[:, None] ** 2
@@ -123,13 +218,38 @@ class ActionObjective(Objective[DiscretePath]):
         m = local.shape[1]
         T = self.problem.grid.duration
         size = max(1.0, float(np.max(np.abs(x.q))), T * float(np.max(np.abs(x.v))))
-        dq = max(float(np.max(np.abs(local[:, k]), initial=0.0)) for k in (0, *range(4, m)))
-        dv = float(np.max(np.abs(local[:, 1] / self._h)))
+        changes = [local[:, k] for k in (0, *range(4, m))]
+        speeds = [local[:, 1] / self._h]
+        if not self.problem.plain:
+            changes.append(local[-1, 2])
+            speeds.append(local[-1, 3] / self._h[-1])
+        dq = max(float(np.max(np.abs(change), initial=0.0)) for change in changes)
+        dv = max(float(np.max(np.abs(speed))) for speed in speeds)
         return max(dq, T * dv) / size
 
     @property
     def _h(self) -> Array:
         return self.problem.grid.steps[:, None]
+
+
+def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
+    """The discrete Lagrangian whose weight of the passive joints' torques is their penalty."""
+    lagrangian = problem.ld.lagrangian
+    if not isinstance(lagrangian, EffortLagrangian) or len(problem.passive) == 0:
+        return problem.ld
+    weight = lagrangian.weight.copy()
+    weight[problem.passive] = multipliers.torque_penalty
+    return DiscreteLagrangian(dataclasses.replace(lagrangian, weight=weight), problem.grid)
+
+
+def _with_forces(terms: list[PointTerms] | None, forces: list[Array]) -> list[PointTerms]:
+    """What limits add at the points, and the forces of multipliers on the torques."""
+    if terms is None:
+        return [PointTerms.of_effort(force) for force in forces]
+    return [
+        dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
+        for term, force in zip(terms, forces, strict=True)
+    ]
 
 
 def follow(solved: DiscretePath, problem: TrajectoryProblem) -> DiscretePath:
@@ -141,7 +261,10 @@ def follow(solved: DiscretePath, problem: TrajectoryProblem) -> DiscretePath:
 
     solved: a stationary path on the problem's grid, between other ends.
     """
-    path = moved(solved, problem.grid, problem.boundary, problem.robot)
+    ends = problem.ends(solved.q[[0, -1]], solved.v[[0, -1]])
+    path = moved(solved, problem.grid, ends, problem.robot)
+    if not problem.plain:
+        return path
     objective = ActionObjective(problem, "tree", problem.structure)
     model = objective.model(solved, None, None)
     factor = model.factor(0.0)

@@ -109,3 +109,33 @@ class BandModel(QuadraticModel):
         band = self._band if shift == 0.0 else self._band + shift * self._metric_band
         factor, info = dpbtrf(band.T, lower=1, overwrite_ab=int(shift != 0.0))
         return BandFactor(factor) if info == 0 else None
+
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues of H, by elimination of blocks of the bandwidth's size.
+
+        Each pivot block adds its own count, as Sylvester's law of inertia says (Haynsworth's
+        additivity for Schur complements).
+        """
+        bands = self.layout.assemble(self.intervals.hessian)
+        size, block = self.layout.size, max(self.layout.bandwidth, 1)
+        count = 0
+        schur = np.zeros((0, 0))
+        coupling = np.zeros((0, 0))
+        for first in range(0, size, block):
+            last = min(first + block, size)
+            pivot = _dense(bands, range(first, last), range(first, last))
+            pivot += np.tril(pivot, -1).T
+            if first:
+                coupling = _dense(bands, range(first, last), range(first - block, first))
+                pivot -= coupling @ np.linalg.solve(schur, coupling.T)
+            schur = (pivot + pivot.T) / 2
+            count += int(np.sum(np.linalg.eigvalsh(schur) < 0))
+        return count
+
+
+def _dense(bands: Array, rows: range, columns: range) -> Array:
+    """The lower triangle's entries of a block, shape (len(rows), len(columns))."""
+    i, j = np.array(rows)[:, None], np.array(columns)[None]
+    offset = i - j
+    inside = (offset >= 0) & (offset < bands.shape[1])
+    return np.asarray(np.where(inside, bands[j, np.where(inside, offset, 0)], 0.0))
