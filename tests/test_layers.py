@@ -15,15 +15,18 @@ SOURCE = Path(hovi.__file__).parent
 FLOORS = [
     {"errors", "newton", "conditions", "whole_file", "skeleton", "meshcat_page"},
     {
+        "obstacles",
         "schemes",
         "optimize",
         "compiled",
         "configuration",
         "urdf_rules",
         "robot_source",
+        "srdf",
         "example_robots",
     },
     {
+        "clearance",
         "point_function",
         "rigid_body",
         "urdf_check",

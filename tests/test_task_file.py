@@ -337,3 +337,23 @@ def test_a_mistake_in_limits_is_named_with_its_place(mistake: str, folder: Path)
 def test_an_unknown_example_gets_the_nearest_names() -> None:
     with pytest.raises(SceneError, match="two_link_swing_up"):
         example("two_link_swingup")
+
+
+SRDF = """<robot name="two_link"><group_state name="ready" group="arm">
+<joint name="shoulder" value="-1.5"/></group_state></robot>"""
+
+
+def test_an_end_may_be_the_name_of_a_pose(folder: Path, tmp_path: Path) -> None:
+    (folder / "poses.srdf").write_text(SRDF)
+    head, rest = REACH.split("[start]")
+    rest = rest.replace(rest.split("[goal]")[0], '\nq = "ready"\n\n')
+    text = f'srdf = "poses.srdf"\n{head}[start]{rest}'
+    task = load_task(write(folder, text))
+    np.testing.assert_array_equal(task.start.q, [-1.5, 0.0])
+    again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
+    assert list(again.scene.robot.poses) == ["ready"]
+    sentence = refusal(
+        folder, f'srdf = "poses.srdf"\n{head}[start]{rest}'.replace("ready", "raedy")
+    )
+    assert "did you mean 'ready'?" in sentence
+    assert "line" in sentence

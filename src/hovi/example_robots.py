@@ -1,8 +1,7 @@
 """The robots of example-robot-data, read without the package's own loader.
 
-That loader opens every mesh of a robot (0.3 to 0.5 s) and may pick up reference postures. Here
-only its table is read: the URDF's place, whether the base floats, and the SRDF of those
-robots whose rotor inertias are written there.
+That loader opens every mesh of a robot (0.3 to 0.5 s). Here only its table is read: the places of
+the URDF and the SRDF, whether the base floats, and whether rotor inertias are in the SRDF.
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ class ExampleRobot:
     """One entry of the table.
 
     package_dir: folder in which `package://` meshes are looked up. free_flyer: the base floats.
-    srdf: set where the rotor inertias are to be read from it.
+    srdf: named poses and pairs of links that need no check; None where there is none.
+    rotors: whether the rotor inertias are to be read from it, too.
     """
 
     name: str
@@ -32,6 +32,7 @@ class ExampleRobot:
     package_dir: Path
     free_flyer: bool
     srdf: Path | None
+    rotors: bool
 
 
 def example_names() -> tuple[str, ...]:
@@ -55,13 +56,14 @@ def example_robot(name: str) -> ExampleRobot:
             f"example-robot-data is installed without {relative}: install it again "
             "(pip install --force-reinstall example-robot-data)."
         ) from error
-    srdf = folder / loader.path / loader.srdf_subpath / loader.srdf_filename
+    srdf = folder / loader.path / loader.srdf_subpath / (loader.srdf_filename or "none")
     return ExampleRobot(
         name=name,
         urdf=folder / relative,
         package_dir=folder.parent.parent,
         free_flyer=bool(loader.free_flyer),
-        srdf=srdf if loader.has_rotor_parameters else None,
+        srdf=srdf if srdf.is_file() else None,
+        rotors=bool(loader.has_rotor_parameters),
     )
 
 

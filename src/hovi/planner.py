@@ -32,8 +32,8 @@ EXPLORING = 0.7
 
 def plan(
     scene: Scene,
-    start: State | npt.ArrayLike,
-    goal: State | npt.ArrayLike,
+    start: State | npt.ArrayLike | str,
+    goal: State | npt.ArrayLike | str,
     duration: float,
     *,
     scheme: str | Scheme = "galerkin-2",
@@ -50,7 +50,8 @@ def plan(
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 between two states in a given time.
 
-    scene: what is simulated. start, goal: a State, or a configuration of shape (nq,) at rest.
+    scene: what is simulated.
+    start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose.
     duration: T in [s]. scheme, intervals: how the action is discretised.
     limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
         "none", a Limits, or a mapping as as_limits takes it.
@@ -75,8 +76,8 @@ def plan(
         scene,
         tuple(scene.effort_lagrangian(weight).weight),
         Grid.uniform(duration, intervals, table),
-        as_state(start),
-        as_state(goal),
+        as_state(start, scene.robot),
+        as_state(goal, scene.robot),
         max_iterations,
         as_limits(scene.robot, limits),
     )

@@ -25,6 +25,7 @@ from hovi.robot_geometry import Shapes, load_shapes
 from hovi.robot_reading import example_source, file_source, is_path
 from hovi.robot_report import describe
 from hovi.robot_source import RobotSource
+from hovi.srdf import Srdf, parse_srdf, read_srdf_file
 from hovi.urdf_check import MAXIMUM_FREEDOM
 
 __all__ = ["Robot", "RobotSource", "load_robot"]
@@ -129,6 +130,29 @@ class Robot:
         """Reflected rotor inertia of the joints, (nv,), in [kg m^2] or [kg]."""
         return np.array(self.model.armature, dtype=float)
 
+    # What the SRDF says
+
+    @cached_property
+    def poses(self) -> dict[str, Array]:
+        """Named configurations (nq,) of the SRDF; none where there is no SRDF.
+
+        Raises ModelError for an SRDF that cannot be read.
+        """
+        return self.semantics.poses(self.model)
+
+    @cached_property
+    def semantics(self) -> Srdf:
+        """Poses and pairs of links that need no check for collisions, as the SRDF states them."""
+        text = self.source.srdf
+        return Srdf({}, frozenset()) if text is None else parse_srdf(text, self.name)
+
+    def pose(self, name: str) -> Array:
+        """The configuration (nq,) that the SRDF calls `name`. Raises InputError."""
+        if name in self.poses:
+            return self.poses[name].copy()
+        known = nearest(name, self.poses) if self.poses else "it has no SRDF that names any."
+        raise InputError(f"robot {self.name!r} has no pose {name!r}: {known}")
+
     # Shapes
 
     @property
@@ -140,6 +164,11 @@ class Robot:
     def collision(self) -> pin.GeometryModel | None:
         """Its collision shapes, loaded at the first look; None where nothing was found."""
         return self._collision_shapes.geometry
+
+    @property
+    def collision_problem(self) -> str:
+        """Why `collision` is None or incomplete, in a sentence; "" where nothing is missing."""
+        return self._collision_shapes.problem
 
     @property
     def visual_problem(self) -> str:
@@ -206,7 +235,9 @@ class Robot:
 
     def describe(self) -> str:
         """What the robot is, for a terminal: joints, limits, mass, and what a scene must name."""
-        return describe(self.name, self.model, self.source, self.tip_frame)
+        text = describe(self.name, self.model, self.source, self.tip_frame)
+        names = ", ".join(repr(name) for name in self.poses)
+        return f"{text}\n\nPoses that its SRDF names: {names}." if names else text
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-able dictionary that holds the URDF and no path of this machine."""
@@ -237,6 +268,7 @@ def load_robot(
     locked: Iterable[str] = (),
     visual: pin.GeometryModel | None = None,
     collision: pin.GeometryModel | None = None,
+    srdf: str | Path | None = None,
 ) -> Robot:
     """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
 
@@ -246,21 +278,23 @@ def load_robot(
     free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
     locked: joints held at the neutral configuration.
     visual, collision: geometry that goes with a pinocchio.Model.
+    srdf: path of an SRDF with named poses; an example robot's own is found without it.
     Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock.
     """
     names = _names(locked)
     folders = tuple(str(Path(folder).absolute()) for folder in _names(package_dirs))
+    semantics = None if srdf is None else Path(srdf)
     if isinstance(x, pin.Model):
-        return _from_model(x, x.name, names, (visual, collision))
+        return _from_model(x, x.name, names, (visual, collision), semantics)
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
     if isinstance(x, Path) or is_path(x):
-        source = file_source(Path(x), folders, names, bool(free_flyer))
+        source = file_source(Path(x), folders, names, bool(free_flyer), semantics)
     elif x in BUILT_IN_CODE:
         model, *shapes = build_in_code(x)
-        return _from_model(model, x, names, (shapes[0], shapes[1]))
+        return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
     else:
-        source = example_source(x, folders, names, free_flyer)
+        source = example_source(x, folders, names, free_flyer, semantics)
     model = robot_model.build_model(source)
     return Robot(source.reference if source.kind == "example" else model.name, model, source)
 
@@ -275,6 +309,7 @@ def _from_model(
     name: str,
     locked: tuple[str, ...],
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
+    srdf: Path | None = None,
 ) -> Robot:
     if model.nv > MAXIMUM_FREEDOM:
         raise ModelError(
@@ -285,5 +320,6 @@ def _from_model(
     reduced, shapes = robot_model.reduce_with_geometry(model.copy(), shapes, locked)
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
-    source = RobotSource(kind="model", reference=name, locked=locked)
+    text = None if srdf is None else read_srdf_file(srdf)
+    source = RobotSource(kind="model", reference=name, locked=locked, srdf=text)
     return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -8,6 +8,7 @@ from pathlib import Path
 from hovi.example_robots import example_robot, rotor_armature
 from hovi.robot_model import build_full_model
 from hovi.robot_source import RobotSource, text_hash
+from hovi.srdf import read_srdf_file
 from hovi.urdf_check import read_urdf
 
 
@@ -17,9 +18,13 @@ def is_path(text: str) -> bool:
 
 
 def file_source(
-    path: Path, package_dirs: tuple[str, ...], locked: tuple[str, ...], free_flyer: bool
+    path: Path,
+    package_dirs: tuple[str, ...],
+    locked: tuple[str, ...],
+    free_flyer: bool,
+    srdf: Path | None = None,
 ) -> RobotSource:
-    """The source of a URDF file. Raises ModelError when it cannot be read."""
+    """The source of a URDF file, and of an SRDF. Raises ModelError when one cannot be read."""
     text = read_urdf(path)
     return RobotSource(
         kind="urdf",
@@ -30,15 +35,21 @@ def file_source(
         locked=locked,
         free_flyer=free_flyer,
         folder=str(path.parent.absolute()),
+        srdf=None if srdf is None else read_srdf_file(srdf),
     )
 
 
 def example_source(
-    name: str, package_dirs: tuple[str, ...], locked: tuple[str, ...], free_flyer: bool | None
+    name: str,
+    package_dirs: tuple[str, ...],
+    locked: tuple[str, ...],
+    free_flyer: bool | None,
+    srdf: Path | None = None,
 ) -> RobotSource:
-    """The source of an example robot. Raises ModelError for an unknown name."""
+    """The source of an example robot, its own SRDF included. Raises ModelError for a bad name."""
     example = example_robot(name)
     text = read_urdf(example.urdf)
+    semantics = srdf or example.srdf
     source = RobotSource(
         kind="example",
         reference=name,
@@ -47,7 +58,8 @@ def example_source(
         package_dirs=package_dirs,
         locked=locked,
         free_flyer=example.free_flyer if free_flyer is None else free_flyer,
+        srdf=None if semantics is None else read_srdf_file(semantics),
     )
-    if example.srdf is None:
+    if example.srdf is None or not example.rotors:
         return source
     return replace(source, armature=rotor_armature(build_full_model(source), example.srdf))

@@ -26,6 +26,7 @@ class RobotSource:
     free_flyer: the base floats.
     folder: the folder of the URDF file, for its meshes; "" when the file is not at hand.
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
+    srdf: the text of the SRDF that goes with the URDF; None where there is none.
     """
 
     kind: SourceKind
@@ -37,6 +38,7 @@ class RobotSource:
     free_flyer: bool = False
     folder: str = ""
     armature: tuple[tuple[str, float], ...] = ()
+    srdf: str | None = field(default=None, repr=False)
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-able dictionary without any path of this machine."""
@@ -48,6 +50,7 @@ class RobotSource:
             "locked": list(self.locked),
             "free_flyer": self.free_flyer,
             "armature": dict(self.armature),
+            "srdf": self.srdf,
         }
 
     @classmethod
@@ -73,6 +76,7 @@ class RobotSource:
             locked=tuple(str(name) for name in _entry(data, "locked", list)),
             free_flyer=_entry(data, "free_flyer", bool),
             armature=_armature(_entry(data, "armature", dict)),
+            srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
         )
 
 

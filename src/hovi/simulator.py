@@ -103,7 +103,7 @@ def simulate(
     free = mechanics(scene)
     forced = ForcedLagrangian(free, scene_force(scene, _torque(torque)))
     ld = SchemeLagrangian(forced, galerkin(inner_modes, 1), duration / intervals)
-    q, v = as_state(start).on(scene.robot, "start")
+    q, v = as_state(start, scene.robot).on(scene.robot, "start")
     x, p = legendre(free, q, v)
     return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
 

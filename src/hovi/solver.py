@@ -78,8 +78,8 @@ class Solution:
 
     def replan(
         self,
-        start: State | npt.ArrayLike | None = None,
-        goal: State | npt.ArrayLike | None = None,
+        start: State | npt.ArrayLike | str | None = None,
+        goal: State | npt.ArrayLike | str | None = None,
         guess: Solution | None = None,
         **options: Any,
     ) -> Solution:
@@ -87,7 +87,7 @@ class Solution:
 
         Everything that was built is used again, so that this can run in a loop. The guess is
         where the earlier motion goes to first order, which counts as one of the steps.
-        start, goal: a State or a configuration at rest; as before when None.
+        start, goal: a State, a configuration at rest or the name of a pose; as before when None.
         guess: an earlier answer on the same grid; this one when None.
         options: as for `solve`.
         Raises InputError when this solution does not know its problem.
@@ -96,8 +96,8 @@ class Solution:
             raise InputError("this solution does not know its problem; plan again instead.")
         old = self.problem
         problem = old.between(
-            old.start if start is None else as_state(start),
-            old.goal if goal is None else as_state(goal),
+            old.start if start is None else as_state(start, old.robot),
+            old.goal if goal is None else as_state(goal, old.robot),
         )
         origin = self if guess is None else guess
         path = origin.trajectory.path

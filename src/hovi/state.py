@@ -68,6 +68,11 @@ def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
     return chosen
 
 
-def as_state(state: State | npt.ArrayLike) -> State:
-    """A configuration at rest as a State; a State as it is."""
+def as_state(state: State | npt.ArrayLike | str, robot: Robot) -> State:
+    """A configuration at rest, or the name of a pose of the robot, as a State; a State as it is.
+
+    Raises InputError for a pose that the robot does not have.
+    """
+    if isinstance(state, str):
+        return State(robot.pose(state))
     return state if isinstance(state, State) else State(state)

@@ -101,6 +101,7 @@ def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
             package_dirs=tuple(folder / each for each in table.package_dirs),
             free_flyer=table.free_flyer,
             locked=tuple(table.locked),
+            srdf=None if table.srdf is None else folder / table.srdf,
         )
     except HoviError as refused:
         line = toml.line(("robot",))
@@ -108,7 +109,7 @@ def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
 
 
 def _read_end(end: EndTable, name: str, robot: Robot, toml: TomlText) -> State:
-    q = end.q if isinstance(end.q, list) else _configuration(end.q, name, robot, toml)
+    q = _configuration(end.q, name, robot, toml)
     v = end.v if not isinstance(end.v, dict) else _velocity(end.v, name, robot, toml)
     try:
         robot.check_configuration(q, f"{name}.q")
@@ -121,7 +122,18 @@ def _read_end(end: EndTable, name: str, robot: Robot, toml: TomlText) -> State:
     return State(q, v)
 
 
-def _configuration(by_joint: dict[str, Any], end: str, robot: Robot, toml: TomlText) -> list[float]:
+def _configuration(
+    given: list[float] | dict[str, Any] | str, end: str, robot: Robot, toml: TomlText
+) -> list[float]:
+    if isinstance(given, str):
+        try:
+            return [float(each) for each in robot.pose(given)]
+        except HoviError as unknown:
+            raise toml.error((end, "q"), str(unknown)) from None
+    return given if isinstance(given, list) else _by_joint(given, end, robot, toml)
+
+
+def _by_joint(by_joint: dict[str, Any], end: str, robot: Robot, toml: TomlText) -> list[float]:
     left_out = [joint for joint in robot.joint_names if joint not in by_joint]
     _check_joints(by_joint, (end, "q"), robot, toml)
     if left_out:

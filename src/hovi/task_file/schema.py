@@ -16,19 +16,19 @@ def _kind(value: object) -> str:
     return "<list>" if isinstance(value, list) else "<number>"
 
 
-Numbers = Annotated[list[FiniteFloat], Tag("<list>")]
-Coordinates = Annotated[
-    Numbers
-    | Annotated[
-        dict[
-            str,
-            Annotated[Annotated[FiniteFloat, Tag("<number>")] | Numbers, Discriminator(_kind)],
-        ],
-        Tag("<table>"),
-    ],
-    Discriminator(_kind),
-]
+def _kind_or_name(value: object) -> str:
+    return "<name>" if isinstance(value, str) else _kind(value)
 
+
+Numbers = Annotated[list[FiniteFloat], Tag("<list>")]
+ByJoint = Annotated[
+    dict[str, Annotated[Annotated[FiniteFloat, Tag("<number>")] | Numbers, Discriminator(_kind)]],
+    Tag("<table>"),
+]
+Coordinates = Annotated[Numbers | ByJoint, Discriminator(_kind)]
+Configuration = Annotated[
+    Numbers | ByJoint | Annotated[str, Tag("<name>")], Discriminator(_kind_or_name)
+]
 
 Bound = Annotated[
     Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")],
@@ -55,8 +55,9 @@ class Table(BaseModel):
 class EndTable(Table):
     """[start] or [goal]."""
 
-    q: Coordinates = Field(
-        description="a list of finite numbers, one per coordinate, or a table of joint names"
+    q: Configuration = Field(
+        description="a list of finite numbers, one per coordinate, a table of joint names, or the "
+        "name of a pose"
     )
     v: Coordinates | None = Field(
         default=None,
@@ -99,6 +100,7 @@ class TaskTable(Table):
     package_dirs: list[str] = Field(
         default=[], description="a list of folders relative to this file"
     )
+    srdf: str | None = Field(default=None, description="the path of an .srdf relative to this file")
     free_flyer: bool = Field(default=False, description="true or false")
     duration: FiniteFloat = Field(gt=0, description="a positive number of seconds")
     limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')

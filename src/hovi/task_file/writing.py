@@ -12,7 +12,9 @@ import tomlkit
 from tomlkit.items import Table
 
 from hovi.errors import SceneError
+from hovi.example_robots import example_robot
 from hovi.robot_source import RobotSource
+from hovi.srdf import read_srdf_file
 from hovi.task_file.effect_tables import effect_table
 from hovi.task_file.limit_tables import limits_value
 from hovi.task_file.task import Task
@@ -24,14 +26,14 @@ def save_task(task: Task, path: str | Path) -> Path:
 
     task: what to write.
     path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that
-        came from a file is written beside it when it is not there yet.
-    Raises SceneError when the robot has no file, or when another URDF of the same name is there.
+        came from a file is written beside it when it is not there yet, its SRDF too.
+    Raises SceneError when the robot has no file, or when another file of the same name is there.
     """
     path = Path(path)
     source = task.scene.robot.source
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _keep_urdf_beside(source, path)
+        _keep_robot_beside(source, path)
         _write(path, tomlkit.dumps(_document(task, path.parent)).encode("utf-8"))
     except OSError as refused:
         raise SceneError(f"{path} cannot be written: {reason(refused)}.") from None
@@ -46,6 +48,8 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
         document["locked"] = list(source.locked)
     if source.package_dirs:
         document["package_dirs"] = _relative(source, folder)
+    if _own_srdf(source) is not None:
+        document["srdf"] = _srdf_name(source)
     if source.free_flyer:
         document["free_flyer"] = True
     document["duration"] = float(task.duration)
@@ -84,20 +88,37 @@ def _relative(source: RobotSource, folder: Path) -> list[str]:
     return [os.path.relpath(each, folder.resolve()) for each in source.package_dirs]
 
 
-def _keep_urdf_beside(source: RobotSource, path: Path) -> None:
+def _keep_robot_beside(source: RobotSource, path: Path) -> None:
     if source.kind == "model":
         raise SceneError(
             "a robot given as a pinocchio.Model has no file that a task file can name; "
             "load it from a URDF to save the task."
         )
-    if source.kind != "urdf" or source.urdf is None:
-        return
-    text = source.urdf.encode("utf-8")
-    urdf = path.parent / Path(source.reference).name
-    if not urdf.exists():
-        _write(urdf, text)
-    elif urdf.read_bytes() != text:
-        raise SceneError(f"{urdf} is another URDF than the task's; choose another folder.")
+    if source.kind == "urdf" and source.urdf is not None:
+        _keep_beside(path.parent / Path(source.reference).name, source.urdf, "URDF")
+    srdf = _own_srdf(source)
+    if srdf is not None:
+        _keep_beside(path.parent / _srdf_name(source), srdf, "SRDF")
+
+
+def _keep_beside(file: Path, text: str, what: str) -> None:
+    content = text.encode("utf-8")
+    if not file.exists():
+        _write(file, content)
+    elif file.read_bytes() != content:
+        raise SceneError(f"{file} is another {what} than the task's; choose another folder.")
+
+
+def _own_srdf(source: RobotSource) -> str | None:
+    """The text of the SRDF, unless it is the one that comes with an example robot."""
+    if source.kind == "example" and source.srdf is not None:
+        theirs = example_robot(source.reference).srdf
+        return None if theirs and read_srdf_file(theirs) == source.srdf else source.srdf
+    return source.srdf
+
+
+def _srdf_name(source: RobotSource) -> str:
+    return f"{Path(source.reference).stem}.srdf"
 
 
 def _write(path: Path, content: bytes) -> None:
