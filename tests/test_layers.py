@@ -50,6 +50,7 @@ FLOORS = [
     {"guess", "legendre_transforms"},
     {
         "limit_check",
+        "motion_error",
         "saturation",
         "limit_bands",
         "problem",
@@ -63,7 +64,8 @@ FLOORS = [
     {"limited_action", "equality_rounds"},
     {"limited_solver"},
     {"solver", "task_file", "simulator"},
-    {"multistart"},
+    {"finer_solution", "multistart"},
+    {"error_estimate"},
     {"planner"},
     {"playback", "plotting", "export"},
     {"cli"},

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from hovi import schemes as schemes
     from hovi.chain_urdf import chain as chain
     from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
+    from hovi.error_estimate import estimate_error as estimate_error
     from hovi.errors import HoviError as HoviError
     from hovi.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
     from hovi.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from hovi.legendre_transforms import legendre_plus as legendre_plus
     from hovi.limits import Limits as Limits
     from hovi.model_files import example as example
+    from hovi.motion_error import MotionError as MotionError
     from hovi.planner import plan as plan
     from hovi.playback import replay as replay
     from hovi.plotting import plot as plot
@@ -71,6 +73,7 @@ _PLACES = {
     "Grid": "hovi.grid",
     "HoviError": "hovi.errors",
     "Limits": "hovi.limits",
+    "MotionError": "hovi.motion_error",
     "Robot": "hovi.robot",
     "Scene": "hovi.scene",
     "SchemeLagrangian": "hovi.segment_lagrangian",
@@ -88,6 +91,7 @@ _PLACES = {
     "conjugate_time": "hovi.exact_discrete_lagrangian",
     "discrete_hamiltonian_flow": "hovi.euler_lagrange",
     "discrete_lagrangian_map": "hovi.euler_lagrange",
+    "estimate_error": "hovi.error_estimate",
     "euler_lagrange_residual": "hovi.euler_lagrange",
     "example": "hovi.model_files",
     "flow": "hovi.stepper",

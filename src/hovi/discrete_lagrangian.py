@@ -147,6 +147,16 @@ class DiscreteLagrangian:
             parts.append(Expansion(value, gradient, hessian, torque))
         return parts[0] if len(parts) == 1 else self._joined(parts)
 
+    def gradient(self, path: DiscretePath, coordinates: Coordinates = "nodal") -> Array:
+        """The gradient of every L_d in the columns of the coordinates, shape (N, m, n)."""
+        m = 4 + self.grid.inner_modes
+        gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
+        for batch in self._batches:
+            point_gradient = self.lagrangian.gradient(*_jet(batch, path), t=batch.t)
+            part = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
+            gradient[batch.index, : part.shape[1]] = part
+        return gradient
+
     def _joined(self, parts: list[Expansion]) -> Expansion:
         """The expansion of all intervals from those of the batches."""
         N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv

@@ -1,0 +1,36 @@
+"""The error of a solution, from a finer solution next to it."""
+
+from __future__ import annotations
+
+from hovi.errors import InputError
+from hovi.finer_solution import FinerSolution, finer_solution
+from hovi.motion_error import MotionError, deviation
+from hovi.solver import Solution
+
+
+def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
+    """How far a solution is from the motion that it approximates, over the whole motion.
+
+    It is compared with the solution nearby on the same intervals with two more inner modes each,
+    whose own error is smaller by orders where the motion is resolved.
+    frame: whose origin is followed, by default the robot's tip_frame.
+    None where no such solution was found nearby: nothing is known of the error then.
+    Raises InputError for what is no stationary motion, or was planned under limits.
+    """
+    finer = finer_than(solution)
+    if finer is None:
+        return None
+    costs = solution.cost, finer.cost
+    return deviation(solution.trajectory, finer.trajectory, costs, frame)
+
+
+def finer_than(solution: Solution) -> FinerSolution | None:
+    """The finer solution that `estimate_error` compares with."""
+    problem = solution.problem
+    if problem is None:
+        raise InputError("this solution does not know its problem; plan again instead.")
+    if not solution.success:
+        raise InputError(f"errors of minima are estimated, and this ended in {solution.status}.")
+    if problem.limited:
+        raise InputError("errors of motions under limits are not estimated this way.")
+    return finer_solution(problem, solution.trajectory.path, solution.cost)

@@ -1,0 +1,154 @@
+"""A finer solution next to a known one: the same grid with two more inner modes per interval.
+
+Prolonged to the finer grid a solution is already near: one or two Newton steps lead to the finer
+one. On the way the Hessian of the first step tells what each interval would gain alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete_lagrangian import Expansion
+from hovi.errors import InputError
+from hovi.grid import DiscretePath, Grid
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.problem import TrajectoryProblem
+from hovi.schemes import Scheme, galerkin
+from hovi.schemes.galerkin_table import MAX_INNER_MODES
+from hovi.solver import solve
+from hovi.trajectory import Trajectory
+from hovi.trajectory_objective import ActionObjective
+
+Array = npt.NDArray[np.float64]
+
+MORE_MODES = 2
+"""Inner modes that the finer solution has more: with one more the costs of both may be off by as
+much to the same side, and their difference would say nothing."""
+NEWTON_STEPS = 4
+"""Hessians that may be factored on the way before the optimiser is called."""
+CORRECTIONS = 3
+"""Steps with one Hessian."""
+CONTRACTION = 0.3
+"""Ratio of the lengths of successive steps above which the Hessian is renewed."""
+NEGLIGIBLE = 0.02
+"""Length of a step, as a share of the whole way, that makes it the last."""
+ROUNDING = 1e-15
+"""Length of a step, relative to the data, below which nothing is left to gain."""
+
+
+@dataclass(frozen=True, eq=False)
+class FinerSolution:
+    """A solution of a problem on a finer grid of the same intervals.
+
+    problem: on the finer grid. path: its solution. cost: its discrete action.
+    gains: L_d of every interval of the coarser solution less what it would be with the finer
+        interval's modes between the same end data, shape (N,). Their sum is the difference of
+        costs to first order: what an interval contributes to the error.
+    """
+
+    problem: TrajectoryProblem
+    path: DiscretePath
+    cost: float
+    gains: Array
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion, without its momenta, which nothing here needs."""
+        momenta = np.zeros((self.path.intervals + 1, 2, self.path.v.shape[1]))
+        return Trajectory(self.problem.grid, self.path, momenta, self.problem.scene)
+
+
+def finer_solution(
+    problem: TrajectoryProblem, path: DiscretePath, cost: float
+) -> FinerSolution | None:
+    """The finer solution next to a stationary path of a problem without limits.
+
+    cost: the discrete action of the path. None where none was found nearby.
+    """
+    fine = problem.on(finer_grid(problem.grid))
+    objective = ActionObjective(fine)
+    start = prolonged(path, fine.grid)
+    first = objective.model(start, None, None)
+    gains = _gains(objective.expansion, problem, path)
+    found = _newton(objective, start, first)
+    if found is not None:
+        value = objective.value(found)
+        if np.isfinite(value):
+            return FinerSolution(fine, found, value, gains)
+    solution = solve(fine, start)
+    if not solution.success:
+        return None
+    return FinerSolution(fine, solution.trajectory.path, solution.cost, gains)
+
+
+def _newton(
+    objective: ActionObjective, x: DiscretePath, model: QuadraticModel
+) -> DiscretePath | None:
+    """Newton's method with Hessians that are kept while they serve; None where it fails.
+
+    Lengths are those of changes of q and T v: in a flat valley a change of the action says little
+    of them.
+    """
+    whole = 0.0
+    for _ in range(NEWTON_STEPS):
+        factor = model.factor(0.0)
+        if factor is None:
+            return None
+        gradient, length = model.gradient, np.inf
+        for _ in range(CORRECTIONS):
+            step = factor.solve(-gradient)
+            last, length = length, objective.relative_size(x, step, model)
+            if not length <= last:
+                return None
+            x = objective.retract(x, step, model)
+            whole = max(whole, length)
+            if length <= max(NEGLIGIBLE * whole, ROUNDING) and last < np.inf:
+                return x
+            if length > CONTRACTION * last and last < np.inf:
+                break
+            gradient = model.scatter(objective.ld.gradient(x, objective.coordinates))
+        model = objective.model(x, None, None)
+    return None
+
+
+def finer_grid(grid: Grid) -> Grid:
+    """The same intervals, each with two more inner modes than its scheme has.
+
+    Raises InputError where the scheme has too many already.
+    """
+    if grid.inner_modes + MORE_MODES > MAX_INNER_MODES:
+        raise InputError(
+            f"errors are estimated for schemes of up to {MAX_INNER_MODES - MORE_MODES} inner "
+            f"modes, not {grid.inner_modes}; use more intervals instead."
+        )
+    return Grid(grid.steps, tuple(_table(s.inner_modes + MORE_MODES) for s in grid.schemes))
+
+
+@cache
+def _table(inner_modes: int) -> Scheme:
+    return galerkin(inner_modes)
+
+
+def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
+    """The same curve on a grid of the same intervals with at least as many inner modes."""
+    N, r, n = path.inner.shape
+    inner = np.zeros((N, fine.inner_modes, n))
+    inner[:, :r] = path.inner
+    return DiscretePath(path.q, path.v, path.z, inner)
+
+
+def _gains(expansion: Expansion, problem: TrajectoryProblem, path: DiscretePath) -> Array:
+    """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
+    N, m, n = expansion.gradient.shape
+    modes = m - 4
+    g = expansion.gradient[:, 4:].reshape(N, modes * n)
+    H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, modes * n, modes * n)
+    # modes that an interval does not have are rows of zeros
+    absent = np.asarray(~H.any(axis=2))
+    H = H + absent[:, :, None] * np.eye(modes * n)
+    drop = 0.5 * np.einsum("ki,ki->k", g, np.linalg.solve(H, g[:, :, None])[:, :, 0])
+    return np.asarray(problem.ld.values(path) - expansion.values + drop)
