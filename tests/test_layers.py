@@ -13,7 +13,7 @@ SOURCE = Path(hovi.__file__).parent
 
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
-    {"errors", "newton", "conditions", "whole_file", "skeleton", "meshcat_page"},
+    {"errors", "newton", "conditions", "whole_file", "skeleton", "meshcat_page", "json_numbers"},
     {
         "obstacles",
         "schemes",
@@ -34,6 +34,7 @@ FLOORS = [
         "regularised",
         "model_files",
         "meshcat_server",
+        "figure_file",
     },
     {"stored_torque", "trajectory_file", "torque_model", "segment"},
     {"chain_urdf", "robot_model", "robot_report"},
@@ -67,7 +68,8 @@ FLOORS = [
     {"finer_solution", "multistart"},
     {"error_estimate"},
     {"planner"},
-    {"playback", "plotting", "export"},
+    {"playback", "plotting", "export", "accuracy"},
+    {"work_precision_plot"},
     {"cli"},
     {"__main__"},
 ]

@@ -33,6 +33,10 @@ class TrajectoryFileError(HoviError):
     """A trajectory file cannot be read or written."""
 
 
+class UnmeasurableError(HoviError):
+    """A method cannot solve a scene, or there is no motion to measure methods against."""
+
+
 class DisplayError(HoviError):
     """A picture, a page or a viewer cannot be made."""
 

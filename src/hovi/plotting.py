@@ -24,12 +24,12 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from hovi.errors import DisplayError
+from hovi.figure_file import write_figure
 from hovi.limit_bands import Curve, draw_limits, legend_entries
 from hovi.limits import KINDS, Limits
 from hovi.robot import Robot
 from hovi.saturation import at_limit, imposed_limits
 from hovi.trajectory import Sample, Trajectory
-from hovi.whole_file import reason, whole_file
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -37,17 +37,11 @@ Mask = npt.NDArray[np.bool_]
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")
 """The colors of Okabe and Ito, which people with any color vision tell apart."""
 _STYLES = ("-", "--", ":", "-.")
-_DPI = 150
 _POINTS = 2_000
 _MOST_MARKS = 150
 _SURFACE_TIMES = 180
 _SECTIONS = 25
 _STRIPS = 20
-_METADATA: dict[str, dict[str, str | None]] = {
-    ".png": {"Software": None},
-    ".pdf": {"CreationDate": None},
-    ".svg": {"Date": None},
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +73,12 @@ def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
 
     path: a PNG, PDF or SVG by its suffix, written whole or not at all. Raises DisplayError.
     """
-    _write(motion_figure(trajectory), path)
+    write_figure(motion_figure(trajectory), path)
 
 
 def plot_angles(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
     """Write `angles_figure` to a file, as `plot` does."""
-    _write(angles_figure(trajectory), path)
+    write_figure(angles_figure(trajectory), path)
 
 
 def plot_swept_surface(
@@ -93,7 +87,7 @@ def plot_swept_surface(
     window: tuple[float, float] | None = None,
 ) -> None:
     """Write `surface_figure` to a file, as `plot` does."""
-    _write(surface_figure(trajectory, window), path)
+    write_figure(surface_figure(trajectory, window), path)
 
 
 def motion_figure(trajectory: Trajectory) -> Figure:
@@ -338,17 +332,3 @@ def _dress_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
         axis.set_major_locator(MaxNLocator(5))
     ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.05)
     ax.view_init(elev=22, azim=-58)
-
-
-def _write(figure: Figure, path: str | os.PathLike[str]) -> None:
-    suffix = Path(path).suffix.lower()
-    if suffix not in _METADATA:
-        raise DisplayError(
-            f"cannot tell what picture {Path(path).name!r} is to be; "
-            f"let its name end in {', '.join(_METADATA)}."
-        )
-    try:
-        with whole_file(path) as stream:
-            figure.savefig(stream, format=suffix[1:], dpi=_DPI, metadata=_METADATA[suffix])
-    except OSError as error:
-        raise DisplayError(f"cannot write the picture {str(path)!r}: {reason(error)}.") from error

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.peaks import Peaks, peaks
+from hovi.json_numbers import finite
 from hovi.solver import Solution
 from hovi.task_file import Task
 
@@ -42,7 +43,7 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "excess": None if room is None else room.excess,
         "out": None if out is None else str(out),
     }
-    return json.dumps(_finite(fields), allow_nan=False)
+    return json.dumps(finite(fields), allow_nan=False)
 
 
 def print_report(solution: Solution, task: Task, out: Path | None) -> None:
@@ -142,17 +143,6 @@ def _peaks_json(extremes: Peaks) -> dict[str, dict[str, Any]]:
         }
         for i, name in enumerate(extremes.names)
     }
-
-
-def _finite(value: Any) -> Any:
-    """The value with null for every number that JSON cannot hold."""
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
 
 
 def _range(low: float, high: float) -> str:

@@ -1,0 +1,23 @@
+"""Work-precision diagrams: what each further digit costs in time, scheme by scheme."""
+
+from __future__ import annotations
+
+from hovi.accuracy.diagram import MEASURES, Choice, Diagram
+from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.resolved_motion import ResolvedMotion
+from hovi.accuracy.run import Run
+from hovi.accuracy.variational_method import SCHEMES
+from hovi.accuracy.work_precision import Peer, Setting, work_precision
+
+__all__ = [
+    "MEASURES",
+    "SCHEMES",
+    "Choice",
+    "Diagram",
+    "MotionError",
+    "Peer",
+    "ResolvedMotion",
+    "Run",
+    "Setting",
+    "work_precision",
+]

@@ -1,0 +1,132 @@
+"""The work-precision diagram of a scene: what each further digit costs, as typed records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.resolved_motion import ResolvedMotion
+from hovi.accuracy.run import Run
+
+MEASURES = ("cost", "joints", "tip")
+"""Fields of MotionError."""
+UNITS = {"cost": "relative", "joints": "rad", "tip": "mm"}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `plan(tolerance=)` chose, with the time that it took and the error that it has.
+
+    tolerance: relative, in the cost. estimate: what it says that its error is.
+    """
+
+    tolerance: float
+    scheme: str
+    intervals: int
+    seconds: float
+    estimate: float | None
+    error: MotionError
+    success: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """Runs of several methods on one scene, from one guess, on one machine.
+
+    scene: its name. guess: "near" or "cubic". resolved: what errors are against.
+    runs: by method, then by intervals. choices: of `plan(tolerance=)`, ascending in accuracy.
+    notes: sentences on what was left out. complete: False where the time budget ended it.
+    seconds: what measuring took.
+    """
+
+    scene: str
+    guess: str
+    resolved: ResolvedMotion
+    runs: tuple[Run, ...] = field(repr=False)
+    choices: tuple[Choice, ...] = ()
+    notes: tuple[str, ...] = ()
+    complete: bool = True
+    seconds: float = 0.0
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """Names of the methods, in their order."""
+        return tuple(dict.fromkeys(run.method for run in self.runs))
+
+    def of(self, method: str) -> tuple[Run, ...]:
+        """The runs of one method by intervals."""
+        return tuple(run for run in self.runs if run.method == method)
+
+    def kept(self, method: str, measure: str = "cost") -> tuple[tuple[Run, float], ...]:
+        """The runs of a method that count, each with the largest error of it and all finer ones.
+
+        An error that is small by luck, and grows again on the next grid, promises nothing.
+        measure: in MEASURES.
+        """
+        worst, pairs = 0.0, []
+        for run in reversed([run for run in self.of(method) if run.counts]):
+            worst = max(worst, getattr(run.error, measure))
+            pairs.append((run, worst))
+        return tuple(reversed(pairs))
+
+    def cheapest(
+        self,
+        tolerance: float,
+        measure: str = "cost",
+        among: Callable[[Run], bool] = lambda run: True,
+        time: Callable[[Run], float] = lambda run: run.seconds,
+    ) -> Run | None:
+        """The run of least time whose error, kept on all finer grids, is within a tolerance.
+
+        among: which runs may be taken. time: in [s]. None where no run is so accurate.
+        """
+        enough = [
+            run
+            for method in self.methods
+            for run, error in self.kept(method, measure)
+            if error <= tolerance and among(run)
+        ]
+        return min(enough, key=time, default=None)
+
+    def front(
+        self,
+        measure: str = "cost",
+        among: Callable[[Run], bool] = lambda run: True,
+        time: Callable[[Run], float] = lambda run: run.seconds,
+    ) -> tuple[Run, ...]:
+        """The runs that no other one beats in both time and kept error, the fastest first."""
+        pairs = [pair for method in self.methods for pair in self.kept(method, measure)]
+        front, least = [], float("inf")
+        for run, error in sorted(pairs, key=lambda pair: (time(pair[0]), pair[1])):
+            if among(run) and error < least:
+                front.append(run)
+                least = error
+        return tuple(front)
+
+    def with_notes(self, *notes: str) -> Diagram:
+        """The diagram with more sentences."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it."""
+        front = {measure: {id(run) for run in self.front(measure)} for measure in MEASURES}
+        return {
+            "scene": self.scene,
+            "guess": self.guess,
+            "resolved": {
+                "scheme": self.resolved.scheme,
+                "intervals": self.resolved.intervals,
+                "cost": self.resolved.cost,
+                "uncertainty": vars(self.resolved.uncertainty),
+            },
+            "complete": self.complete,
+            "notes": list(self.notes),
+            "seconds": self.seconds,
+            "runs": [
+                run.to_dict() | {"front": [m for m in MEASURES if id(run) in front[m]]}
+                for run in self.runs
+            ],
+            "choices": [{**vars(choice), "error": vars(choice.error)} for choice in self.choices],
+        }

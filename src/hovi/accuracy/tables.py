@@ -1,0 +1,68 @@
+"""A diagram as rows: for a terminal, for Markdown, for a spreadsheet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+
+from hovi.accuracy.diagram import Diagram
+from hovi.accuracy.run import Run
+from hovi.json_numbers import finite
+
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+COLUMNS = (
+    "cost error",
+    "method",
+    "intervals",
+    "cost",
+    "joints [rad]",
+    "tip [mm]",
+    "building [ms]",
+    "first [ms]",
+    "warm [ms]",
+    "steps",
+)
+
+
+def cheapest_rows(
+    diagram: Diagram, tolerances: Sequence[float] = TOLERANCES
+) -> list[tuple[str, ...]]:
+    """What a tolerance costs at least, one row per relative error of the cost: see COLUMNS."""
+    rows = []
+    for tolerance in tolerances:
+        run = diagram.cheapest(tolerance)
+        if run is None:
+            rows.append((f"{tolerance:.0e}", "none so accurate", *[""] * (len(COLUMNS) - 2)))
+        else:
+            rows.append((f"{tolerance:.0e}", *_cells(run)))
+    return rows
+
+
+def _cells(run: Run) -> tuple[str, ...]:
+    return (
+        run.method,
+        str(run.intervals),
+        f"{run.error.cost:.0e}",
+        f"{run.error.joints:.0e}",
+        f"{run.error.tip:.0e}",
+        *(f"{1e3 * x:.3g}" for x in (run.setup_seconds, run.first_seconds, run.seconds)),
+        str(run.steps),
+    )
+
+
+def as_csv(diagram: Diagram) -> str:
+    """Every run as one line under a header, times in [s]."""
+    rows = [run.to_dict() for run in diagram.runs]
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, [name for name in rows[0] if name != "repeats"])
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({name: row[name] for name in row if name != "repeats"})
+    return stream.getvalue()
+
+
+def as_json(diagram: Diagram) -> str:
+    """The diagram as one JSON object; numbers that are not finite become null."""
+    return json.dumps(finite(diagram.to_dict()), allow_nan=False)

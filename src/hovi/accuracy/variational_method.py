@@ -1,0 +1,72 @@
+"""hovi's own schemes as methods of a diagram."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+
+import numpy as np
+
+from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.grid import Grid
+from hovi.guess import Curve, path_on_grid
+from hovi.lagrangian import EffortLagrangian
+from hovi.problem import TrajectoryProblem
+from hovi.schemes import by_name
+from hovi.solver import solve
+
+SCHEMES = (
+    "taylor-midpoint",
+    "hermite-simpson",
+    "galerkin-0",
+    "galerkin-1",
+    "galerkin-2",
+    "galerkin-3",
+    "galerkin-4",
+    "galerkin-5",
+)
+"""What a diagram shows unless it is told otherwise."""
+
+
+class VariationalMethod(Method):
+    """A scheme, solved by the trust region.
+
+    problem: what is planned, on any grid. guess: where every solve starts. scheme: its name.
+    """
+
+    def __init__(self, problem: TrajectoryProblem, guess: Curve, scheme: str) -> None:
+        self._problem, self._guess = problem, guess
+        self._scheme = by_name(scheme)
+        self.name, self.family, self.order = scheme, "hovi", self._scheme.order
+
+    def prepare(self, intervals: int) -> Prepared:
+        """Everything from the loaded robot on, as if nothing had been solved before."""
+        watch, old = Stopwatch(), self._problem
+        grid = Grid.uniform(old.grid.duration, intervals, self._scheme)
+        problem = on_grid(old, grid, anew=True)
+        path = path_on_grid(self._guess, grid, problem.boundary, problem.robot)
+        problem.structure  # noqa: B018 - built here, and not in the first solve
+
+        def run() -> Answer:
+            watch = Stopwatch()
+            found = solve(problem, path)
+            seconds = watch.seconds
+            cost = found.cost if np.isfinite(found.cost) else float("inf")
+            where = found.trajectory.configurations
+            return Answer(found.success, found.message, cost, where, found.nit, seconds)
+
+        return Prepared(run, watch.seconds)
+
+
+def on_grid(problem: TrajectoryProblem, grid: Grid, anew: bool = False) -> TrajectoryProblem:
+    """The problem on another grid, without its limits.
+
+    anew: with all of its functions built again.
+    """
+    lagrangian = problem.ld.lagrangian
+    if anew:
+        assert isinstance(lagrangian, EffortLagrangian)
+        scene = copy.copy(problem.scene)  # which leaves behind what is cached
+        lagrangian = scene.effort_lagrangian(lagrangian.weight)
+    return dataclasses.replace(problem, ld=DiscreteLagrangian(lagrangian, grid), limits=None)

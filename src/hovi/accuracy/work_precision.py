@@ -1,0 +1,118 @@
+"""work_precision: what each further digit costs on a scene, on this machine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from hovi.accuracy.budget import Budget
+from hovi.accuracy.diagram import Diagram
+from hovi.accuracy.guess_motion import guess_curve
+from hovi.accuracy.measuring import REPEATS, Progress, measure
+from hovi.accuracy.method import Method
+from hovi.accuracy.resolved_motion import resolve
+from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
+from hovi.errors import UnmeasurableError
+from hovi.guess import Curve
+from hovi.limits import as_limits
+from hovi.planner import plan
+from hovi.problem import TrajectoryProblem
+from hovi.task_file import Task
+
+SEARCHING = 0.3
+"""Share of the budget in which the motion may be found and resolved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What all methods have in common.
+
+    problem: on the grid of the resolved motion. guess: where every solve starts.
+    """
+
+    problem: TrajectoryProblem
+    guess: Curve
+
+
+Peer = Callable[[Setting], Method]
+"""What makes a method of somebody else for a setting. Raises UnmeasurableError if it cannot."""
+
+
+def work_precision(
+    task: Task,
+    *,
+    guess: str = "near",
+    schemes: Sequence[str] = SCHEMES,
+    peers: Sequence[Peer] = (),
+    budget: float = 60.0,
+    repeats: int = REPEATS,
+    progress: Progress | None = None,
+) -> Diagram:
+    """Errors in cost, joints and tip against time, of many schemes on many grids.
+
+    The motion is planned as the task says, without its limits, and resolved until it stops
+    changing; every method then solves the same problem from the same guess.
+
+    guess: "near" (nine tenths of the resolved motion, one tenth of the cubic: all methods work on
+        the same minimum) or "cubic" (they may end in others, and then do not count).
+    schemes: names as by_name takes them. peers: other people's methods.
+    budget: of wall time, in [s]. repeats: of every solve, by which its time is judged.
+    progress: called with a line of text and the fraction done.
+    Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
+    resolved.
+    """
+    time, report = Budget(budget), progress or _silent
+    report(f"planning {task.name}", 0.0)
+    found = plan(
+        task.scene,
+        task.start,
+        task.goal,
+        task.duration,
+        scheme=task.scheme,
+        intervals=task.intervals,
+        limits="none",
+        starts=task.starts,
+        seed=task.seed,
+        time_limit=SEARCHING * budget,
+    )
+    if not found.success or found.problem is None:
+        raise UnmeasurableError(f"no motion of {task.name} to measure against: {found.message}")
+    report("resolving the motion", time.fraction)
+    resolved = resolve(found.problem, found, lambda: time.fraction > SEARCHING)
+    problem = found.problem.on(resolved.trajectory.grid)
+    setting = Setting(problem, guess_curve(guess, problem, resolved.trajectory))
+    methods: list[Method] = [VariationalMethod(problem, setting.guess, name) for name in schemes]
+    notes = list(_left_out(task))
+    for peer in peers:
+        try:
+            methods.append(peer(setting))
+        except UnmeasurableError as refused:
+            notes.append(str(refused))
+    try:
+        measured = measure(methods, resolved.yardstick, time, report, repeats=repeats)
+    finally:
+        for method in methods:
+            method.close()
+    return Diagram(
+        scene=task.name,
+        guess=guess,
+        resolved=resolved,
+        runs=measured.runs,
+        notes=(*notes, *measured.notes),
+        complete=measured.complete,
+        seconds=time.spent,
+    )
+
+
+def _left_out(task: Task) -> Sequence[str]:
+    """What the diagram does not show of the task."""
+    if not as_limits(task.scene.robot, task.limits).bounded.any():
+        return ()
+    return (
+        "The scene has limits; the diagram is of its motion without them: under limits the error "
+        "is that of the places where they begin and end to hold, whatever the scheme.",
+    )
+
+
+def _silent(text: str, fraction: float) -> None:
+    """No progress."""
