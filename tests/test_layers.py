@@ -36,7 +36,7 @@ FLOORS = [
         "meshcat_server",
         "figure_file",
     },
-    {"stored_torque", "trajectory_file", "torque_model", "segment"},
+    {"plain_urdf", "stored_torque", "trajectory_file", "torque_model", "segment"},
     {"chain_urdf", "robot_model", "robot_report"},
     {"robot_geometry", "robot_reading"},
     {"robot"},

@@ -59,11 +59,28 @@ BROKEN = {
         ["'hinge'", "<limit"],
     ),
     "box negative": ('size="1 0.1 0.1"', 'size="1 -0.1 0.1"', ["'rod'", "negative"]),
+    "damping negative": (
+        "<axis",
+        '<dynamics damping="-1" friction="1"/><axis',
+        ["'hinge'", "negative damping"],
+    ),
+    "two inertials": (
+        "</inertial>",
+        '</inertial><inertial><mass value="1"/></inertial>',
+        ["'rod'", "2 elements <inertial>"],
+    ),
+    "two masses": ("<mass", '<mass value="9"/><mass', ["'rod'", "2 elements <mass>"]),
+    "two axes": ("<axis", '<axis xyz="1 0 0"/><axis', ["'hinge'", "2 elements <axis>"]),
+    "plane that is not level": ("revolute", "planar", ["'hinge'", "planar", "normal to z"]),
     "joint type unknown": ("revolute", "revolut", ["'hinge'", "did you mean 'revolute'"]),
     "joint unnamed": ('joint name="hinge"', "joint", ["joint", "no name"]),
     "joint twice": ("</robot>", HINGE + "</robot>", ["'hinge'", "2 times"]),
     "link unnamed": ('<link name="base"/>', "<link/>", ["link", "no name"]),
     "link twice": ("</robot>", '<link name="rod"/></robot>', ["'rod'", "2 times"]),
+    "link of a long name": ('"rod"', '"' + "rod" * 10**5 + '"', ["a link", "256 characters"]),
+    "joint of a strange name": ('"hinge"', '"a\x9b2Jb"', ["a joint", "printable"]),
+    "joint called universe": ('"hinge"', '"universe"', ["a joint", "'universe'"]),
+    "robot of a strange name": ('"arm"', '"a\x9b"', ["<robot>", "printable"]),
     "no links": (ARM[ARM.index("  <link") : ARM.index("</robot>")], "", ["no <link>"]),
     "child missing": ('<child link="rod"/>', "", ["'hinge'", "<child"]),
     "child unknown": ('child link="rod"', 'child link="rood"', ["'hinge'", "did you mean 'rod'"]),
@@ -93,6 +110,12 @@ BROKEN = {
     "empty": (ARM, "", ["well-formed"]),
     "NUL": ("arm", "a\0m", ["well-formed"]),
     "doctype": ("<robot", '<!DOCTYPE x [<!ENTITY a "b">]><robot', ["DOCTYPE"]),
+    "too many elements": ("</robot>", "<a/>" * 100_001 + "</robot>", ["100,000 elements"]),
+    "too many attributes": (
+        "<robot",
+        "<robot " + " ".join(f'a{i}="1"' for i in range(65)),
+        ["more than 64 attributes"],
+    ),
     "nested too deep": ("</robot>", "<a>" * 99 + "</a>" * 99 + "</robot>", ["deep"]),
 }
 
@@ -108,6 +131,7 @@ def test_a_broken_urdf_is_refused_with_one_sentence_that_names_the_culprit(what:
     assert "'arm.urdf'" in message
     assert message.endswith((".", "?", "..."))
     assert "\n" not in message
+    assert len(message) < 500
     for word in words:
         assert word in message
 

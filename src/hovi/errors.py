@@ -8,6 +8,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LONGEST = 256  # characters that are compared: the time grows with their square
+_MOST = 60  # names that are listed
+
 
 class HoviError(Exception):
     """Root of everything that hovi raises on purpose."""
@@ -48,7 +51,8 @@ def nearest(name: str, valid: Iterable[str]) -> str:
     valid: the names that would have been accepted.
     """
     names = sorted(valid)
-    close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    close = difflib.get_close_matches(name[:_LONGEST], names, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
-    return "valid names are " + ", ".join(repr(n) for n in names) + "."
+    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+    return "valid names are " + ", ".join(repr(n) for n in names[:_MOST]) + more + "."

@@ -28,6 +28,7 @@ from hovi.figure_file import write_figure
 from hovi.limit_bands import Curve, draw_limits, legend_entries
 from hovi.limits import KINDS, Limits
 from hovi.robot import Robot
+from hovi.robot_model import frame_id
 from hovi.saturation import at_limit, imposed_limits
 from hovi.trajectory import Sample, Trajectory
 
@@ -202,7 +203,7 @@ def _coordinates(robot: Robot | None, q: Array) -> Array:
 def _chain(robot: Robot, q: Array) -> Array:
     """Origins of the joints that carry the tip, and the tip, shape (links + 1, M, 3), in [m]."""
     model = robot.model
-    tip = model.frames[model.getFrameId(robot.tip_frame)]
+    tip = model.frames[frame_id(model, robot.tip_frame)]
     joints = [joint for joint in model.supports[tip.parentJoint] if joint != 0]
     data, points = model.createData(), np.empty((len(joints) + 1, len(q), 3))
     for i, configuration in enumerate(q):

@@ -209,7 +209,7 @@ class Robot:
             raise InputError(
                 f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
             )
-        index = self.model.getFrameId(frame)
+        index = robot_model.frame_id(self.model, frame)
         return configuration.frame_position(self.model, index, np.asarray(q, dtype=float))
 
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:

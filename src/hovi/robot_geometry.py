@@ -17,8 +17,10 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.example_robots import example_robot
+from hovi.plain_urdf import write_numbers_plainly
 from hovi.robot_model import build_full_model, reduce_with_geometry
 from hovi.robot_source import RobotSource
+from hovi.urdf_check import checked_urdf
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +109,7 @@ def _package_dirs(source: RobotSource) -> list[Path]:
 
 def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     """The URDF with absolute mesh names, without the shapes whose mesh is unusable, and why."""
-    robot = ElementTree.fromstring(source.urdf or "")
+    robot = checked_urdf(source.urdf or "", source.reference)
     problems = []
     for link in robot.iterfind("link"):
         for shape in link.findall(kind):
@@ -117,6 +119,7 @@ def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     for material in robot.iterfind("material"):
         if _find_files(material, source):
             robot.remove(material)
+    write_numbers_plainly(robot)
     return ElementTree.tostring(robot, encoding="unicode"), problems
 
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError, nearest
+from hovi.plain_urdf import plain_urdf
 from hovi.robot_source import RobotSource
-from hovi.urdf_check import check_urdf
 
 Array = npt.NDArray[np.float64]
 
@@ -22,15 +22,20 @@ def build_full_model(source: RobotSource) -> pin.Model:
             f"robot {source.reference!r} was given as a pinocchio.Model, which no file can hold: "
             "load it again with hovi.load_robot(model)."
         )
-    check_urdf(source.urdf, source.reference)
+    text = plain_urdf(source.urdf, source.reference)
     root = (pin.JointModelFreeFlyer(),) if source.free_flyer else ()
     try:
-        model = pin.buildModelFromXML(source.urdf, *root)
+        model = pin.buildModelFromXML(text, *root)
     except (ValueError, RuntimeError) as error:
         raise ModelError(
             f"Pinocchio cannot read the URDF {source.reference!r}: {error}; "
             "its parser's own words are on stderr."
         ) from error
+    if len(set(model.names)) < len(model.names):
+        raise ModelError(
+            f"robot {source.reference!r} has a joint 'root_joint', which is what its floating base "
+            "is called: give that joint another name, or load the robot without free_flyer."
+        )
     return _with_armature(model, source.armature)
 
 
@@ -62,6 +67,12 @@ def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
                 f"robot {model.name!r} has no joint {name!r}: {nearest(name, movable)}"
             )
     return [model.getJointId(name) for name in names]
+
+
+def frame_id(model: pin.Model, name: str) -> int:
+    """Pinocchio's index of a frame; of the link where a joint bears the same name."""
+    same = [i for i, frame in enumerate(model.frames) if frame.name == name]
+    return next((i for i in same if model.frames[i].type == pin.BODY), same[0])
 
 
 def check_mass_matrix(model: pin.Model) -> None:

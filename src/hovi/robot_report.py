@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.robot_source import RobotSource
+from hovi.urdf_check import checked_urdf
 
 Array = npt.NDArray[np.float64]
 
@@ -122,7 +123,7 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             yield f"the {what} limit is 0 at {_joints_at(model, zero)}"
     if source.urdf is None:
         return
-    robot = ElementTree.fromstring(source.urdf)
+    robot = checked_urdf(source.urdf, source.reference)
     movable = {name for _, name in pairs}
     mimics = [j.get("name", "") for j in robot.iterfind("joint") if j.find("mimic") is not None]
     mimics = [name for name in mimics if name in movable]

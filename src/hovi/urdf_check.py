@@ -3,7 +3,8 @@
 Pinocchio takes "1,5" for a mass of 0, loads negative masses, explains a broken tree on stderr
 only and needs memory that grows with the cube of the degrees of freedom. So the text is counted
 first, then parsed without entities, then held against a table of rules (urdf_rules.py). The first
-rule that is broken raises one sentence that names the link or joint.
+rule that is broken raises one sentence that names the link or joint. What passes reaches Pinocchio
+as plain_urdf.py writes it again, never as it came.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from hovi.urdf_rules import RULES
 MAXIMUM_BYTES = 32_000_000
 MAXIMUM_LINKS = 1_000
 MAXIMUM_DEPTH = 64
+MAXIMUM_ELEMENTS = 100_000
+MAXIMUM_ATTRIBUTES = 64
+"""Of one element: Pinocchio's parser compares each with every other."""
 MAXIMUM_FREEDOM = 250
 """Pinocchio's workspace holds tensors of 48 nv^3 bytes: 0.8 GB at 250 degrees of freedom."""
 
@@ -49,20 +53,26 @@ def check_urdf(text: str, name: str = "robot.urdf") -> None:
     name: what to call the URDF in the message.
     Raises ModelError with one sentence: what was expected, what came, what to do.
     """
+    checked_urdf(text, name)
+
+
+def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
+    """The element <robot> of a URDF's text that passes every rule. Raises ModelError."""
     if len(text) > MAXIMUM_BYTES:
         raise ModelError(_too_large(name, len(text)))
     robot = _Reader(name).read(text)
     for rule in RULES:
         for sentence in rule(robot):
             raise ModelError(f"URDF {name!r}: {sentence}")
+    return robot
 
 
 class _Reader:
-    """Expat into an element tree, counting links, freedom and depth as they come."""
+    """Expat into an element tree, counting what there is as it comes."""
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.depth = self.links = self.freedom = 0
+        self.depth = self.elements = self.links = self.freedom = 0
         self.builder = ElementTree.TreeBuilder()
 
     def read(self, text: str) -> ElementTree.Element:
@@ -71,17 +81,22 @@ class _Reader:
         parser.EndElementHandler = self.end
         parser.StartDoctypeDeclHandler = self.doctype
         try:
-            parser.Parse(text.encode(), True)
+            parser.Parse(text, True)  # as UTF-8, whatever the declaration says
         except (expat.ExpatError, UnicodeEncodeError) as error:
             raise ModelError(f"URDF {self.name!r} is not well-formed XML: {error}.") from error
         return self.builder.close()
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         self.depth += 1
+        self.elements += 1
         if self.depth == 1 and tag != "robot":
             self.refuse(f"its root element must be <robot>, not <{tag[:40]}>.")
         if self.depth > MAXIMUM_DEPTH:
             self.refuse(f"elements are nested more than {MAXIMUM_DEPTH} deep.")
+        if self.elements > MAXIMUM_ELEMENTS:
+            self.refuse(f"it has more than {MAXIMUM_ELEMENTS:,} elements, the most accepted.")
+        if len(attributes) > MAXIMUM_ATTRIBUTES:
+            self.refuse(f"<{tag[:40]}> has more than {MAXIMUM_ATTRIBUTES} attributes.")
         if tag.startswith("xacro:"):
             self.refuse(f"<{tag[:40]}> is xacro, not URDF: run xacro on the file first.")
         if self.depth == 2:

@@ -23,16 +23,20 @@ MAXIMUM_MAGNITUDE = 1e12
 MAXIMUM_LIMIT = 1e30
 """Limits are compared, never computed with; robots write 1e16 for "none"."""
 
+MAXIMUM_NAME = 256
+
 INERTIA_TOLERANCE = 1e-7
 """Negative principal inertia, in [kg m^2], that still passes as a rounding of the CAD export."""
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
+_WORLD = "universe"
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
-_NUMBERS: dict[str, dict[str, int]] = {
+NUMBERS: dict[str, dict[str, int]] = {
     "origin": {"xyz": 3, "rpy": 3},
     "axis": {"xyz": 3},
     "mass": {"value": 1},
@@ -53,6 +57,15 @@ _NUMBERS: dict[str, dict[str, int]] = {
 }
 """How many numbers each attribute holds, by element."""
 
+_ONCE: dict[str, tuple[str, ...]] = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry", "material"),
+    "collision": ("origin", "geometry"),
+    "joint": ("origin", "axis", "parent", "child", "limit", "dynamics", "mimic"),
+}
+"""What an element holds once at most: Pinocchio would read the first and skip the others."""
+
 _REQUIRED: dict[str, tuple[str, ...]] = {
     "mass": ("value",),
     "inertia": _INERTIA,
@@ -67,8 +80,11 @@ _REQUIRED: dict[str, tuple[str, ...]] = {
 
 def the_robot_is_named(robot: Element) -> Iterator[str]:
     """The robot has a name."""
-    if not robot.get("name", "").strip():
+    name = robot.get("name", "")
+    if not name.strip():
         yield "<robot> needs name=."
+    elif problem := _name_problem(name):
+        yield f"the name {_short(name)} of <robot> must {problem}."
 
 
 def links_are_named(robot: Element) -> Iterator[str]:
@@ -88,12 +104,24 @@ def joints_have_a_type(robot: Element) -> Iterator[str]:
     for joint in robot.iterfind("joint"):
         kind = joint.get("type", "")
         if kind not in JOINT_TYPES:
-            yield f"joint {_name(joint)} has type {kind!r}; {nearest(kind, JOINT_TYPES)}"
+            yield f"joint {_name(joint)} has type {_short(kind)}; {nearest(kind, JOINT_TYPES)}"
+
+
+def elements_are_not_repeated(robot: Element) -> Iterator[str]:
+    """What a link or a joint holds once is there once."""
+    for owner in (*robot.iterfind("link"), *robot.iterfind("joint")):
+        for element in (owner, *owner):
+            for tag in _ONCE.get(element.tag, ()):
+                if (count := len(element.findall(tag))) > 1:
+                    yield (
+                        f"<{element.tag}> of {_called(owner)} holds {count} elements <{tag}>: "
+                        "keep one."
+                    )
 
 
 def attributes_are_there(robot: Element) -> Iterator[str]:
     """Attributes without a default are written."""
-    for owner, element in _elements(robot):
+    for owner, element in elements_in_use(robot):
         for attribute in _REQUIRED.get(element.tag, ()):
             if not element.get(attribute):
                 yield f"<{element.tag}> of {_called(owner)} needs {attribute}=."
@@ -101,8 +129,8 @@ def attributes_are_there(robot: Element) -> Iterator[str]:
 
 def numbers_are_finite(robot: Element) -> Iterator[str]:
     """Numbers are what C reads as finite numbers, of a sane size, and as many as expected."""
-    for owner, element in _elements(robot):
-        for attribute, count in _NUMBERS.get(element.tag, {}).items():
+    for owner, element in elements_in_use(robot):
+        for attribute, count in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
             if text is not None and (problem := _number_problem(text, count, element.tag)):
                 place = f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)}"
@@ -118,8 +146,9 @@ def joints_connect_links(robot: Element) -> Iterator[str]:
             if not link:
                 yield f"joint {_name(joint)} needs <{end} link=...>."
             elif link not in links:
-                yield f"joint {_name(joint)} has {end} link {link!r}, which does not exist: " + (
-                    nearest(link, links)
+                yield (
+                    f"joint {_name(joint)} has {end} link {_short(link)}, which does not exist: "
+                    + (nearest(link, links))
                 )
 
 
@@ -190,9 +219,9 @@ def inertias_are_positive(robot: Element) -> Iterator[str]:
 
 def shapes_have_a_size(robot: Element) -> Iterator[str]:
     """Shapes are not inside out."""
-    for owner, element in _elements(robot):
+    for owner, element in elements_in_use(robot):
         for attribute in ("size", "radius", "length"):
-            text = element.get(attribute) if element.tag in _NUMBERS else None
+            text = element.get(attribute) if element.tag in NUMBERS else None
             if text is not None and min(map(float, text.split())) < 0.0:
                 yield f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)} is negative."
 
@@ -205,6 +234,19 @@ def axes_are_not_zero(robot: Element) -> Iterator[str]:
             continue
         if math.hypot(*map(float, axis.get("xyz", "1 0 0").split())) < 1e-9:
             yield f"joint {_name(joint)} has the axis {axis.get('xyz')!r}: give it a direction."
+
+
+def planes_are_level(robot: Element) -> Iterator[str]:
+    """A planar joint moves in x and y of its frame, which is all that Pinocchio knows."""
+    for joint in robot.iterfind("joint"):
+        axis = joint.find("axis")
+        xyz = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+        x, y, z = map(float, xyz.split())
+        if joint.get("type") == "planar" and math.hypot(x, y) > 1e-9 * abs(z):
+            yield (
+                f"joint {_name(joint)} is planar with the normal {_short(xyz)}, and only planes "
+                'normal to z are simulated: write <axis xyz="0 0 1"/> and turn its <origin>.'
+            )
 
 
 def limits_are_ordered(robot: Element) -> Iterator[str]:
@@ -226,6 +268,15 @@ def limits_are_ordered(robot: Element) -> Iterator[str]:
                 yield f"joint {_name(joint)} has a negative {attribute} limit: give 0 or more."
 
 
+def losses_are_not_negative(robot: Element) -> Iterator[str]:
+    """Damping and friction take energy out."""
+    for joint in robot.iterfind("joint"):
+        for dynamics in joint.iterfind("dynamics"):
+            for attribute in NUMBERS["dynamics"]:
+                if float(dynamics.get(attribute, "0")) < 0.0:
+                    yield f"joint {_name(joint)} has a negative {attribute}: give 0 or more."
+
+
 def joints_mimic_others(robot: Element) -> Iterator[str]:
     """No joint mimics itself."""
     for joint in robot.iterfind("joint"):
@@ -236,7 +287,7 @@ def joints_mimic_others(robot: Element) -> Iterator[str]:
 
 def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
     """A package:// name does not climb out of its package."""
-    for owner, element in _elements(robot):
+    for owner, element in elements_in_use(robot):
         filename = element.get("filename", "") if element.tag in ("mesh", "texture") else ""
         scheme, separator, rest = filename.partition("://")
         rest = rest.lstrip("/")
@@ -254,6 +305,7 @@ RULES: tuple[Rule, ...] = (
     links_are_named,
     joints_are_named,
     joints_have_a_type,
+    elements_are_not_repeated,
     attributes_are_there,
     numbers_are_finite,
     joints_connect_links,
@@ -264,7 +316,9 @@ RULES: tuple[Rule, ...] = (
     inertias_are_positive,
     shapes_have_a_size,
     axes_are_not_zero,
+    planes_are_level,
     limits_are_ordered,
+    losses_are_not_negative,
     joints_mimic_others,
     meshes_stay_in_their_package,
 )
@@ -276,11 +330,15 @@ def _named(robot: Element, tag: str) -> Iterator[str]:
     for name, count in names.items():
         if not name.strip():
             yield f"a <{tag}> has no name: every {tag} needs name=."
+        elif problem := _name_problem(name):
+            yield f"the name {_short(name)} of a {tag} must {problem}."
+        elif name == _WORLD:
+            yield f"a {tag} cannot be called {name!r}, which is Pinocchio's word for the world."
         elif count > 1:
             yield f"{tag} {name!r} is there {count} times: {tag} names must be unique."
 
 
-def _elements(robot: Element) -> Iterator[tuple[Element, Element]]:
+def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
     """(link, joint or material, element inside it) for everything that Pinocchio reads."""
     for link in robot.iterfind("link"):
         for tag in ("inertial", "visual", "collision"):
@@ -301,6 +359,12 @@ def _number_problem(text: str, count: int, tag: str) -> str:
     if max(abs(float(word)) for word in words) > largest:
         return f"at most {largest:g} in size"
     return ""
+
+
+def _name_problem(name: str) -> str:
+    if len(name) > MAXIMUM_NAME:
+        return f"have at most {MAXIMUM_NAME} characters"
+    return "" if name.isprintable() else "hold printable characters only"
 
 
 def _end(joint: Element, tag: str) -> str:
