@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
+from hovi.optimize.contraction import contract
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -73,22 +74,6 @@ class _Batch:
         powers = self.h[:, None] ** -np.arange(3.0)
         return np.asarray(powers[:, None, :, None])
 
-    @cached_property
-    def pairs(self) -> dict[Coordinates, Array]:
-        """What second derivatives count for pairs of columns, (B or 1, m * m, Q * 9)."""
-        uniform = bool(np.ptp(self.h) == 0)
-        h = self.h[:1] if uniform else self.h
-        powers = h[:, None] ** -np.arange(3)
-        pair = h[:, None, None] * powers[:, :, None] * powers[:, None, :]  # (B or 1, 3, 3)
-        weights = pair[:, None] * self.scheme.weights[:, None, None]  # (B or 1, Q, 3, 3)
-        tables = {name: _table(self.scheme, name) for name in COORDINATES}
-        return {
-            name: np.einsum("qri,qsj,bqrs->bijqrs", table, table, weights).reshape(
-                len(h), table.shape[2] ** 2, -1
-            )
-            for name, table in tables.items()
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class DiscreteLagrangian:
@@ -142,8 +127,10 @@ class DiscreteLagrangian:
             value, point_gradient, point_hessian, torque = self._evaluate(
                 batch, known[i], multiplier, term
             )
-            gradient = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
-            hessian = _contract_hessian(batch, coordinates, point_hessian)
+            table = _table(batch.scheme, coordinates)
+            gradient, hessian = contract(
+                table, batch.scheme.weights, batch.h, point_gradient, point_hessian
+            )
             parts.append(Expansion(value, gradient, hessian, torque))
         return parts[0] if len(parts) == 1 else self._joined(parts)
 
@@ -311,12 +298,3 @@ def _contract_gradient(batch: _Batch, table: Array, gradient: Array) -> Array:
     B, (Q, _, m) = len(batch.h), table.shape
     weighted = gradient.reshape(B, Q, 3, -1) * batch.point_weights[..., None]
     return np.asarray(np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1)))
-
-
-def _contract_hessian(batch: _Batch, coordinates: Coordinates, hessian: Array) -> Array:
-    """Hessian of L_d in the columns of the coordinates, shape (B, m, m, n, n)."""
-    B, Q, m = len(batch.h), len(batch.scheme.weights), 4 + batch.scheme.inner_modes
-    n = hessian.shape[-1] // 3 if hessian.ndim == 3 else hessian.shape[-1]
-    blocks = hessian.reshape(B, Q, 3, n, 3, n).transpose(0, 1, 2, 4, 3, 5)
-    pairs = batch.pairs[coordinates]
-    return np.asarray(np.matmul(pairs, blocks.reshape(B, Q * 9, n * n)).reshape(B, m, m, n, n))

@@ -7,7 +7,8 @@ import numpy.typing as npt
 import pytest
 from interval_problems import SIZES, IntervalProblem, random_problem
 
-from hovi.optimize.band import BandLayout, BandModel
+from hovi.optimize import _packed
+from hovi.optimize.band import PANEL, BandLayout, BandModel
 
 Array = npt.NDArray[np.float64]
 
@@ -31,14 +32,14 @@ def build(
 @pytest.mark.parametrize(("n", "modes"), SIZES)
 def test_the_band_holds_the_lower_half_of_the_dense_matrix(n: int, modes: tuple[int, ...]) -> None:
     problem, model = build(n, modes, INDEFINITE)
-    size, width = model.layout.size, model.layout.bandwidth
+    size = model.layout.size
     band = model.layout.assemble(problem.nodal.hessian)
     dense = np.zeros((size, size))
     for j in range(size):
-        length = min(width + 1, size - j)
-        dense[j : j + length, j] = band[j, :length]
+        column = band[j, j % PANEL :][: size - j]
+        dense[j : j + len(column), j] = column
     np.testing.assert_allclose(dense, np.tril(problem.hessian), rtol=0, atol=1e-13)
-    assert width <= (4 + max(modes)) * n - 1
+    assert band.shape[1] < (4 + max(modes)) * n + 2 * PANEL
 
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
@@ -77,6 +78,19 @@ def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float, e
     again = model.factor(shift)
     assert again is not None
     np.testing.assert_array_equal(again.solve(-model.gradient), step)
+
+
+@pytest.mark.parametrize("n", [5, 6, 7, 16, 30])
+def test_any_processor_solves_arms_of_any_size(n: int) -> None:
+    problem, model = build(n, (2, 0, 1, 2, 2), DEFINITE + 10.0 * n)
+    layout = model.layout
+    band = layout.assemble(problem.nodal.hessian)
+    expected = problem.newton_step(0.0)
+    for portable in (False, True):
+        factor, step = np.empty_like(band), np.empty_like(expected)
+        assert _packed.factor(band, band, 0.0, layout.rows, layout.size, factor, portable)
+        _packed.solve(factor, layout.rows, -model.gradient, step, portable)
+        np.testing.assert_allclose(step, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("curvature", [DEFINITE, INDEFINITE])

@@ -1,7 +1,7 @@
-"""The block-tridiagonal model in LAPACK's banded storage, inner modes included in the band.
+"""The block-tridiagonal model as a band matrix, inner modes included in the band.
 
-Unknowns are ordered node, inner modes, node, ...: H + shift D is then one banded matrix whose
-Cholesky factorisation (`pbtrf`) gives the step and decides definiteness at once.
+Unknowns are ordered node, inner modes, node, ...: H + shift D is then one band matrix whose
+Cholesky factorisation gives the step and decides definiteness at once.
 """
 
 from __future__ import annotations
@@ -10,12 +10,41 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import dpbtrf, dpbtrs
 
+from hovi.optimize import _packed
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+
+PANEL: int = _packed.panel_columns
+"""Columns of the band that are factored together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Neighbouring entries of the intervals' Hessians that are neighbours in the band as well.
+
+    starts, positions: where each run begins in the Hessians and in the band, both laid out flat.
+    lengths: numbers in it. scales: what they are multiplied with; one when None.
+    """
+
+    starts: Index
+    positions: Index
+    lengths: Index
+    scales: Array | None
+
+    @classmethod
+    def of(cls, entries: Index, positions: Index, scales: Array | None) -> Runs:
+        """The runs of single entries, of which no two with one start have different scales."""
+        cut = (np.diff(entries) != 1) | (np.diff(positions) != 1)
+        if scales is not None:
+            cut |= np.diff(scales) != 0
+        first = np.flatnonzero(np.concatenate([[True], cut]))[: len(entries)]
+        lengths = np.diff(np.append(first, len(entries)))
+        return cls(
+            entries[first], positions[first], lengths, None if scales is None else scales[first]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,59 +53,80 @@ class BandLayout:
 
     unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
         column is fixed.
-    size: number of unknowns. bandwidth: of the lower triangle, the diagonal not counted.
-    entries: which entries of the intervals' Hessians, laid out flat, the band takes.
-    positions: where each of them goes in the band, laid out flat.
+    size: number of unknowns.
+    rows: of every panel of the band, from its first column's diagonal to the last row that it or
+        an earlier panel reaches, shape (panels,).
+    runs: which entries of the intervals' Hessians the band takes, and where they go.
     scales: column = scale * unknown, shape (N, m), so that neighbours of different length share
         an unknown; None where every scale is one.
     """
 
     unknowns: Index
     size: int
-    bandwidth: int
-    entries: Index
-    positions: Index
+    rows: Index
+    runs: Runs
     scales: Array | None
 
     @classmethod
     def of(cls, unknowns: Index, scales: Array | None = None) -> BandLayout:
-        """The layout of given unknowns.
-
-        Entry (i, j), i >= j, stands at j (bandwidth + 1) + i - j.
-        """
-        N = len(unknowns)
-        flat = unknowns.reshape(N, -1)
+        """The layout of given unknowns."""
+        N, m, n = unknowns.shape
+        flat = unknowns.reshape(N, m * n)
         size = int(flat.max()) + 1
-        i, j = flat[:, :, None], flat[:, None, :]
+        j, i = flat[:, :, None], flat[:, None, :]
         lower = (i >= j) & (j >= 0)
-        bandwidth = int(np.max(np.where(lower, i - j, 0)))
-        position = (j * (bandwidth + 1) + i - j)[lower]
-        # columns (m, n, m, n) of a flat interval Hessian, which is stored as (m, m, n, n)
-        m, n = unknowns.shape[1:]
-        stored = np.arange(m * m * n * n).reshape(m, m, n, n).transpose(0, 2, 1, 3)
-        offset = np.arange(N)[:, None, None] * (m * m * n * n)
+        rows = _rows(flat, size)
+        stride = max(rows, default=0)
+        positions = (j * stride + i - (j - j % PANEL))[lower]
+        # where (m, n, m, n), a column and its rows, is stored as (m, m, n, n)
+        stored = np.arange((m * n) ** 2).reshape(m, m, n, n).transpose(0, 2, 1, 3)
+        offset = np.arange(N)[:, None, None] * (m * n) ** 2
         entries = (offset + stored.reshape(m * n, m * n))[lower]
-        return cls(unknowns, size, bandwidth, entries, position, scales)
+        products = None
+        if scales is not None:
+            columns = np.repeat(scales, n, axis=1)
+            products = (columns[:, :, None] * columns[:, None, :])[lower]
+        runs = Runs.of(entries, positions, products)
+        return cls(unknowns, size, rows, runs, scales)
 
     def assemble(self, hessian: Array) -> Array:
-        """The band of a sum over intervals, shape (size, bandwidth + 1): column j at row j."""
-        if self.scales is not None:
-            pairs = self.scales[:, :, None] * self.scales[:, None, :]
-            hessian = hessian * pairs[..., None, None]
-        length = self.size * (self.bandwidth + 1)
-        band = np.bincount(self.positions, hessian.reshape(-1)[self.entries], minlength=length)
-        return np.asarray(band.reshape(self.size, self.bandwidth + 1), dtype=np.float64)
+        """The band of a sum over intervals, a column of the lower triangle in every row.
+
+        Entry (i, j) stands at [j, i - i0], i0 = j - j % 4 the first column of its panel; columns
+        fill up the last panel. Shape (4 panels, most rows of a panel).
+        hessian: symmetric, shape (N, m, m, n, n).
+        """
+        band = np.empty((PANEL * len(self.rows), max(self.rows, default=0)))
+        runs = self.runs
+        _packed.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
+        return band
+
+
+def _rows(unknowns: Index, size: int) -> Index:
+    """Rows of every panel, multiples of its width: where panels end does not fall.
+
+    unknowns: of every interval, shape (N, m n), -1 where fixed.
+    """
+    first = np.arange(0, size, PANEL)
+    last = np.zeros(len(first), dtype=np.intp)
+    lowest = np.broadcast_to(unknowns.max(axis=1, keepdims=True), unknowns.shape)
+    free = unknowns >= 0
+    np.maximum.at(last, unknowns[free] // PANEL, lowest[free])
+    return PANEL * (np.maximum.accumulate(last) // PANEL + 1) - first
 
 
 @dataclass(frozen=True, eq=False)
 class BandFactor:
-    """A banded Cholesky factor."""
+    """A banded Cholesky factor, with the reciprocal of its diagonal in the diagonal's place."""
 
     factor: Array
+    rows: Index
 
     def solve(self, rhs: Array) -> Array:
         """(H + shift D)^-1 rhs."""
-        return np.asarray(dpbtrs(self.factor, rhs, lower=1)[0])
+        solution = np.empty_like(rhs)
+        _packed.solve(self.factor, self.rows, rhs, solution)
+        return solution
 
 
 class BandModel(QuadraticModel):
@@ -106,18 +156,21 @@ class BandModel(QuadraticModel):
         """Banded Cholesky of H + shift D; None where it fails."""
         if self._band is None:
             self._band = self.layout.assemble(self.intervals.hessian)
-        band = self._band if shift == 0.0 else self._band + shift * self._metric_band
-        factor, info = dpbtrf(band.T, lower=1, overwrite_ab=int(shift != 0.0))
-        return BandFactor(factor) if info == 0 else None
+        factor = np.empty_like(self._band)
+        rows = self.layout.rows
+        definite = _packed.factor(
+            self._band, self._metric_band, shift, rows, self.layout.size, factor
+        )
+        return BandFactor(factor, rows) if definite else None
 
     def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of H, by elimination of blocks of the bandwidth's size.
+        """Number of negative eigenvalues of H, by elimination of blocks as large as the band is wide.
 
         Each pivot block adds its own count, as Sylvester's law of inertia says (Haynsworth's
         additivity for Schur complements).
         """
         bands = self.layout.assemble(self.intervals.hessian)
-        size, block = self.layout.size, max(self.layout.bandwidth, 1)
+        size, block = self.layout.size, max(bands.shape[1], 1)
         count = 0
         schur = np.zeros((0, 0))
         coupling = np.zeros((0, 0))
@@ -136,6 +189,6 @@ class BandModel(QuadraticModel):
 def _dense(bands: Array, rows: range, columns: range) -> Array:
     """The lower triangle's entries of a block, shape (len(rows), len(columns))."""
     i, j = np.array(rows)[:, None], np.array(columns)[None]
-    offset = i - j
-    inside = (offset >= 0) & (offset < bands.shape[1])
+    offset = i - (j - j % PANEL)
+    inside = (i >= j) & (offset < bands.shape[1])
     return np.asarray(np.where(inside, bands[j, np.where(inside, offset, 0)], 0.0))

@@ -1,0 +1,117 @@
+// The Python binding. Shapes and types are checked by the Python side that calls it.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <algorithm>
+#include <memory>
+#include <new>
+#include <optional>
+
+#include <nanobind/stl/optional.h>
+
+#include "doors.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using hovi::Doors;
+
+namespace {
+
+template <typename Scalar, int dimensions>
+using Array = nb::ndarray<Scalar, nb::numpy, nb::ndim<dimensions>, nb::c_contig, nb::device::cpu>;
+template <int dimensions>
+using Input = Array<const double, dimensions>;
+template <int dimensions>
+using Output = Array<double, dimensions>;
+using Index = Array<const std::int64_t, 1>;
+
+const Doors& best_doors() {
+#ifdef HOVI_WITH_AVX2
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return hovi::packed_avx2;
+#endif
+  return hovi::packed_baseline;
+}
+
+const Doors& doors(bool portable) {
+  static const Doors& best = best_doors();
+  return portable ? hovi::packed_baseline : best;
+}
+
+constexpr std::align_val_t alignment{64};
+
+struct Free {
+  void operator()(double* memory) const { ::operator delete(memory, alignment); }
+};
+
+std::unique_ptr<double, Free> room(std::size_t numbers) {
+  void* memory = ::operator new(numbers * sizeof(double), alignment);
+  return std::unique_ptr<double, Free>(static_cast<double*>(memory));
+}
+
+void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
+              const Input<2>& gradient, const Input<3>& hessian,
+              const Output<3>& columns_gradient, const Output<5>& columns_hessian,
+              bool portable) {
+  const hovi::Contraction shape{steps.shape(0),  table.shape(0),  table.shape(2),
+                                columns_gradient.shape(2), table.data(), weights.data(),
+                                steps.data()};
+  const nb::gil_scoped_release released;
+  const auto work = room(doors(portable).workspace(shape));
+  doors(portable).contract(shape, gradient.data(), hessian.data(), work.get(),
+                           columns_gradient.data(), columns_hessian.data());
+}
+
+inline void add(const double* a, double factor, const double* b, std::size_t size, double* sum) {
+  for (std::size_t i = 0; i < size; ++i) sum[i] = a[i] + factor * b[i];
+}
+
+void assemble(const Input<5>& hessian, const Index& starts, const Index& positions,
+              const Index& lengths, const std::optional<Input<1>>& scales,
+              const Output<2>& band) {
+  const nb::gil_scoped_release released;
+  std::fill_n(band.data(), band.size(), 0.0);
+  const std::size_t runs = starts.shape(0);
+  const std::int64_t *start = starts.data(), *position = positions.data(), *length = lengths.data();
+  const double *const numbers = hessian.data(), *const scale = scales ? scales->data() : nullptr;
+  double* const entries = band.data();
+  for (std::size_t run = 0; run < runs; ++run)
+    add(entries + position[run], scale ? scale[run] : 1.0, numbers + start[run], length[run],
+        entries + position[run]);
+}
+
+// Columns that only fill up the last panel are those of the unit matrix.
+bool factor(const Input<2>& band, const Input<2>& metric, double shift, const Index& rows,
+            std::size_t size, const Output<2>& out, bool portable) {
+  const hovi::Band shape{rows.shape(0), band.shape(1), rows.data()};
+  const nb::gil_scoped_release released;
+  const std::size_t columns = band.shape(0);
+  add(band.data(), shift, metric.data(), columns * shape.stride, out.data());
+  for (std::size_t j = size; j < columns; ++j)
+    out.data()[j * shape.stride + j % hovi::panel_columns] = 1.0;
+  return doors(portable).factor(shape, out.data());
+}
+
+void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const Output<1>& out,
+           bool portable) {
+  const hovi::Band shape{rows.shape(0), factor.shape(1), rows.data()};
+  const std::size_t size = rhs.shape(0);
+  const nb::gil_scoped_release released;
+  const auto x = room(factor.shape(0));
+  std::copy_n(rhs.data(), size, x.get());
+  std::fill_n(x.get() + size, factor.shape(0) - size, 0.0);
+  doors(portable).solve(shape, factor.data(), x.get());
+  std::copy_n(x.get(), size, out.data());
+}
+
+}  // namespace
+
+NB_MODULE(_packed, m) {
+  m.attr("panel_columns") = hovi::panel_columns;
+  m.def("contract", &contract, "table"_a, "weights"_a, "steps"_a, "gradient"_a, "hessian"_a,
+        "columns_gradient"_a, "columns_hessian"_a, "portable"_a = false);
+  m.def("assemble", &assemble, "hessian"_a, "starts"_a, "positions"_a, "lengths"_a,
+        "scales"_a.none(), "band"_a);
+  m.def("factor", &factor, "band"_a, "metric"_a, "shift"_a, "rows"_a, "size"_a, "out"_a,
+        "portable"_a = false);
+  m.def("solve", &solve, "factor"_a, "rows"_a, "rhs"_a, "out"_a, "portable"_a = false);
+}
