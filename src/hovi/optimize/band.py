@@ -164,7 +164,7 @@ class BandModel(QuadraticModel):
         return BandFactor(factor, rows) if definite else None
 
     def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of H, by elimination of blocks as large as the band is wide.
+        """Number of negative eigenvalues of H, by elimination of blocks as large as the band.
 
         Each pivot block adds its own count, as Sylvester's law of inertia says (Haynsworth's
         additivity for Schur complements).
