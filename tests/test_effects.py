@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import casadi as ca
@@ -11,7 +10,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.effects import REGISTRY, Effect, Gravity, JointLimitPotential, SceneSymbols
+from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
 from hovi.effects.joint_limit_potential import smooth_ramp
 from hovi.errors import SceneError
 from hovi.lagrangian import PotentialTerm
@@ -190,16 +189,3 @@ def test_a_joint_with_several_coordinates_has_no_range(joint: str) -> None:
 def test_gravity_that_is_no_number_is_refused(two_link: Robot, acceleration: float) -> None:
     with pytest.raises(SceneError, match="acceleration must be finite"):
         Scene(two_link, [Gravity(acceleration)])
-
-
-@pytest.mark.parametrize("key", REGISTRY)
-def test_every_effect_is_frozen_and_described_in_one_line(key: str) -> None:
-    values: dict[str, Any] = {"ranges": {"elbow": RANGE}} if key == "joint_limit_potential" else {}
-    effect: Effect = REGISTRY[key](**values)
-    assert effect.key == key
-    text = effect.describe()
-    assert text.startswith(key)
-    assert "\n" not in text
-    field = dataclasses.fields(effect)[0].name
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        setattr(effect, field, 1.0)

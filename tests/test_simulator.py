@@ -45,16 +45,16 @@ class Drag(Effect):
 
 
 @dataclass(frozen=True)
-class Added(Effect):
-    """A test's effect that depends on the acceleration."""
+class Lagging(Effect):
+    """A test's effect that depends on the acceleration as no inertia does."""
 
-    key: ClassVar[str] = "added_mass"
+    key: ClassVar[str] = "lagging"
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
-        return 0.1 * symbols.a
+        return ca.vertcat(0.1 * symbols.a[1], 0)
 
     def describe(self) -> str:
-        return "added mass"
+        return "lagging"
 
 
 def torque(t: Array) -> Array:
@@ -136,8 +136,8 @@ def test_what_cannot_be_simulated_is_refused(arm_scene: Scene, two_link: Robot) 
         simulate(arm_scene, START, 0.0)
     with pytest.raises(InputError, match="intervals must be 1 or more"):
         simulate(arm_scene, START, 1.0, intervals=0)
-    with pytest.raises(SceneError, match="'added_mass' depends on the acceleration"):
-        simulate(Scene(two_link, [Added()]), START, 1.0)
+    with pytest.raises(SceneError, match="'lagging' depends on the acceleration, but not as"):
+        simulate(Scene(two_link, [Lagging()]), START, 1.0)
     with pytest.raises(InputError, match=r"the flow ends at t = .* shorter step"):
         simulate(arm_scene, State([0, 0], [200.0, -300.0]), 10.0, intervals=3)
 

@@ -15,7 +15,7 @@ from hovi.lagrangian import EffortLagrangian
 from hovi.rigid_body import InverseDynamicsKernel, casadi_functions
 from hovi.robot import Robot
 from hovi.scene import Scene
-from hovi.torque_model import AnalyticTorque, CasadiTorque, TorqueModel
+from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 
 Array = npt.NDArray[np.float64]
 Columns = tuple[ca.SX, ca.SX, ca.SX, ca.SX]
@@ -45,11 +45,11 @@ def models(
     """The analytic model, and the same thing entirely in CasADi."""
     symbols = columns(scene.robot.nv)
     tau = casadi_functions(scene.model).inverse_dynamics(*symbols[:3])
-    kernel = InverseDynamicsKernel(scene.model)
+    main = AnalyticTorque(InverseDynamicsKernel(scene.model))
     if added is None:
-        return AnalyticTorque(kernel), CasadiTorque(symbols, tau)
+        return main, CasadiTorque(symbols, tau)
     more = added(symbols)
-    return AnalyticTorque(kernel, CasadiTorque(symbols, more)), CasadiTorque(symbols, tau + more)
+    return SummedTorque(main, CasadiTorque(symbols, more)), CasadiTorque(symbols, tau + more)
 
 
 def jets(n: int, seed: int = 0) -> tuple[Array, Array, Array, Array]:

@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.effort_term import EffortTerm
 from hovi.point_function import PointFunction
 from hovi.robot import Robot
 from hovi.torque_model import TorqueModel, times
@@ -90,7 +91,7 @@ class PointTerms:
 
 @dataclass(frozen=True, eq=False)
 class EffortLagrangian(Lagrangian):
-    """L~ = 1/2 tau^T diag(R) tau + V(q): the cost of control as a Lagrangian on T^(2)Q.
+    """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v): the cost of control as a Lagrangian on T^(2)Q.
 
     [ColomboFerraroMartin2016, section 5]
 
@@ -98,12 +99,14 @@ class EffortLagrangian(Lagrangian):
     scene: the scene that it belongs to.
     potential: (q, v, a, t) -> V, gradient (3 nv), Hessian (3 nv, 3 nv), or None where V = 0.
     weight: R, shape (nv,).
+    effort_term: phi, or None where it is zero.
     """
 
     torques: TorqueModel
     scene: EffortScene
     weight: Array
     potential: PotentialTerm | None = None
+    effort_term: EffortTerm | None = None
     order: int = 2
 
     @property
@@ -127,7 +130,7 @@ class EffortLagrangian(Lagrangian):
         return self.torques.expand(q, v, a, t, R, curvature)[2]
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
-        """1/2 tau^T diag(R) tau + V, shape (P,)."""
+        """1/2 tau^T diag(R) tau + V + phi, shape (P,)."""
         tau = self.torques.torque(jet[0], jet[1], jet[2], t)
         return self.value_of(tau, jet, t)
 
@@ -136,10 +139,12 @@ class EffortLagrangian(Lagrangian):
         value = 0.5 * np.einsum("pi,pi,i->p", tau, tau, self.weight)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
+        if self.effort_term is not None:
+            value = value + self.effort_term.value(tau, jet[1])
         return np.asarray(value)
 
     def gradient(self, *jet: Array, t: Array | None = None, force: Array | None = None) -> Array:
-        """The gradient J^T (R tau + force) + dV, shape (P, 3, nv).
+        """The gradient J^T (R tau + force) + dV + dphi, shape (P, 3, nv).
 
         force: multipliers of the torques, shape (P, nv); none when None.
         """
@@ -149,6 +154,8 @@ class EffortLagrangian(Lagrangian):
         if force is not None:
             effort = effort + force
         gradient = np.matmul(effort[:, None], J)[:, 0]
+        if self.effort_term is not None:
+            gradient = gradient + self.effort_term.expand(tau, v, J)[1]
         if self.potential is not None:
             gradient = gradient + self.potential.expand(q, v, a, t=t)[1]
         return np.asarray(gradient.reshape(len(tau), 3, self.nv))
@@ -175,6 +182,10 @@ class EffortLagrangian(Lagrangian):
         """
         q, v, a = jet
         R = self.weight if terms is None else self.weight + terms.effort_weight
+        if self.effort_term is not None:
+            tau = self.torques.torque(q, v, a, t)
+            given = self.weight * tau if multiplier is None else multiplier
+            multiplier = given + self.effort_term.slope(tau, v)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
         effort = self.weight * tau
         value = 0.5 * np.einsum("pi,pi->p", tau, effort)
@@ -188,6 +199,9 @@ class EffortLagrangian(Lagrangian):
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV
+        if self.effort_term is not None:
+            phi, dphi, ddphi = self.effort_term.expand(tau, v, J)
+            value, gradient, hessian = value + phi, gradient + dphi, hessian + ddphi
         return value, gradient, hessian, tau, J
 
 

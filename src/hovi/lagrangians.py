@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from hovi.effects import SceneSymbols
 from hovi.errors import InputError, SceneError
 from hovi.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.moving_base_torque import inverse_dynamics
 from hovi.point_function import PointFunction
 from hovi.rigid_body import casadi_functions
 from hovi.scene import Scene
@@ -35,14 +35,21 @@ def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
 
 
 def mechanics(scene: Scene) -> CasadiLagrangian:
-    """L = 1/2 v^T M(q) v - V(q) on TQ, in [J]: the scene's robot under its gravity, k = 1.
+    """L = 1/2 v^T (M(q) + A(q)) v - V(q) on TQ, in [J]: the robot under its gravity, k = 1.
 
-    What effects add to the torques is not in it: see `scene_force`.
-    Raises SceneError for joints whose configurations are not vectors.
+    A: the inertia of effects whose torque has a part A(q) a. What effects add besides, and what
+    the motion of a base brings with it, are not in it: see `scene_force`.
+    Raises SceneError for joints whose configurations are not vectors, and for effects whose torque
+    depends on the acceleration in another way.
     """
     functions = casadi_functions(scene.model)
     q, v = _symbols(scene, 2)
-    return CasadiLagrangian([q, v], functions.kinetic_energy(q, v) - functions.potential_energy(q))
+    L = functions.kinetic_energy(q, v) - functions.potential_energy(q)
+    inertia = _added_inertia(scene)
+    if inertia is not None:
+        A = ca.Function("A", [scene.symbols.q], [inertia])(q)
+        L += ca.bilin(A, v, v) / 2
+    return CasadiLagrangian([q, v], L)
 
 
 def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
@@ -89,22 +96,67 @@ def scene_force(scene: Scene, torque: Torque | None = None) -> Force:
     """The torques that are put on a scene's joints, less what its effects resist with.
 
     torque: u(t), times (P,) -> (P, nv); none when not given.
-    Raises SceneError for an effect whose torque depends on the acceleration.
+    Raises SceneError for an effect whose torque depends on the acceleration in another way than
+    an inertia does.
     """
-    nv, symbols = scene.robot.nv, SceneSymbols.of(scene.robot)
-    added = [(e, e.torque(scene.robot, symbols)) for e in scene.effects]
-    named = [(effect, term) for effect, term in added if term is not None]
-    for effect, term in named:
-        if ca.depends_on(term, symbols.a):
+    resistance = resistance_of(scene)
+    if resistance is None:
+        return Force(scene.robot.nv, torque)
+    q, v, t = scene.symbols.q, scene.symbols.v, scene.symbols.t
+    slope = ca.jacobian(resistance, ca.vertcat(q, v))
+    function = ca.Function("resistance", [q, v, t], [resistance, slope])
+    return Force(scene.robot.nv, torque, PointFunction(function))
+
+
+def resistance_of(scene: Scene) -> ca.SX | None:
+    """d(q, v, t) of M a + ... + d = u: what is not in the Euler-Lagrange equations of `mechanics`.
+
+    An expression of scene.symbols, shape (nv,); None where there is nothing.
+    """
+    q, v, a, t = scene.symbols.columns()
+    parts = []
+    added = scene.added_torque(scene.symbols)
+    if added is not None:
+        inertia = _added_inertia(scene)
+        parts.append(added if inertia is None else ca.substitute(added, a, ca.SX.zeros(a.shape)))
+        if inertia is not None:
+            momentum, energy = inertia @ v, ca.bilin(inertia, v, v) / 2
+            parts.append(ca.gradient(energy, q) - ca.jtimes(momentum, q, v))
+    if scene.symbols.base is not None:
+        # masses do not depend on where a base is: without accelerations the difference is exact
+        still = ca.SX.zeros(a.shape)
+        parts.append(inverse_dynamics(scene.model, scene.symbols.base, q, v, still, t))
+        parts.append(-inverse_dynamics(scene.model, None, q, v, still, t))
+    return sum(parts[1:], parts[0]) if parts else None
+
+
+def _added_inertia(scene: Scene) -> ca.SX | None:
+    """A(q) of effects whose torque is A(q) a + ..., shape (nv, nv); None without such effects."""
+    q, v, a, t = scene.symbols.columns()
+    total = None
+    for effect in scene.effects:
+        term = effect.torque(scene.robot, scene.symbols)
+        if term is None or not ca.depends_on(term, a):
+            continue
+        A = ca.simplify(ca.jacobian(term, a))
+        if ca.depends_on(A, ca.vertcat(v, a, t)) or not _symmetric(A, q):
             raise SceneError(
-                f"effect {effect.key!r} depends on the acceleration: not simulated; leave it out."
+                f"effect {effect.key!r} depends on the acceleration, but not as an inertia does "
+                "(a symmetric A(q) times a): it cannot be simulated; leave it out."
             )
-    if not named:
-        return Force(nv, torque)
-    total = sum((term for _, term in named[1:]), named[0][1])
-    q, v, t = symbols.q, symbols.v, symbols.t
-    slope = ca.jacobian(total, ca.vertcat(q, v))
-    return Force(nv, torque, PointFunction(ca.Function("resistance", [q, v, t], [total, slope])))
+        total = A if total is None else total + A
+    return total
+
+
+def _symmetric(A: ca.SX, q: ca.SX) -> bool:
+    """Whether A(q) equals its transpose, at three fixed random points."""
+    skew = ca.Function("skew", [q], [ca.densify(A - A.T), ca.densify(A)])
+    random = np.random.default_rng(0)
+    pairs = (skew(random.normal(size=q.shape[0])) for _ in range(3))
+    return all(
+        np.abs(np.array(odd)).max() <= 1e-12 * max(1.0, np.abs(np.array(full)).max())
+        for odd, full in pairs
+    )
 
 
 @dataclass(frozen=True, eq=False)

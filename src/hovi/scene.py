@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -13,12 +13,14 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.effects import REGISTRY, Effect, SceneSymbols
+from hovi.effects import REGISTRY, Effect, SceneSymbols, Touch
+from hovi.effort_term import EffortTerm
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
-from hovi.rigid_body import InverseDynamicsKernel, casadi_functions, joints_without_kernel
+from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics
+from hovi.rigid_body import InverseDynamicsKernel, joints_without_kernel
 from hovi.robot import Robot
-from hovi.torque_model import AnalyticTorque, CasadiTorque, TorqueModel
+from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +57,7 @@ class Scene:
         model.armature = np.zeros(model.nv)
         for effect in effects:
             effect.check(self.robot)
-            effect.configure(model)
+            effect.configure(model, self.robot)
         object.__setattr__(self, "effects", effects)
         object.__setattr__(self, "passive", _passive(self.robot, self.passive))
         object.__setattr__(self, "model", model)
@@ -66,16 +68,33 @@ class Scene:
 
         Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
         """
+        symbols = self.symbols
+        added = self.added_torque(symbols)
+        if not self.analytic:
+            tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
+            return CasadiTorque(
+                symbols.columns(), tau if added is None else tau + added, self.compile
+            )
+        main: TorqueModel
+        if symbols.base is None:
+            main = AnalyticTorque(InverseDynamicsKernel(self.model))
+        else:
+            main = MovingBaseTorque(self.model, symbols.base, symbols.t, self.compile)
+        if added is None:
+            return main
+        return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile))
+
+    @cached_property
+    def symbols(self) -> SceneSymbols:
+        """What the effects' expressions are written in, the base's motion included."""
         symbols = SceneSymbols.of(self.robot)
-        added = self._added_torque(symbols)
-        if self.analytic:
-            more = None
-            if added is not None:
-                more = CasadiTorque(symbols.columns(), added, self.compile)
-            return AnalyticTorque(InverseDynamicsKernel(self.model), more)
-        tau = casadi_functions(self.model).inverse_dynamics(symbols.q, symbols.v, symbols.a)
-        tau = tau if added is None else tau + added
-        return CasadiTorque(symbols.columns(), tau, self.compile)
+        motions = [effect.base(self.robot, symbols) for effect in self.effects]
+        named = [motion for motion in motions if motion is not None]
+        return dataclasses.replace(symbols, base=named[0]) if named else symbols
+
+    def added_torque(self, symbols: SceneSymbols) -> ca.SX | None:
+        """What the effects add to RNEA, a column of nv; or None."""
+        return _sum(self._touching(Touch.TORQUE, "torque", symbols))
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
@@ -90,21 +109,22 @@ class Scene:
         return not joints_without_kernel(self.model)
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
-        """L~ = 1/2 tau^T diag(R) tau + V on T^(2)Q.
+        """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
 
-        weight: R, shape (nv,), all ones when not given; that of passive joints, whose torque
-            vanishes, does not count and is set to zero. [ColomboFerraroMartin2016, section 5]
+        weight: R, shape (nv,); when not given, that of the effect `effort_weight`, or all ones. That
+            of passive joints, whose torque vanishes, does not count and is set to zero.
+            [ColomboFerraroMartin2016, section 5]
         Raises ModelError for joints whose configurations are not vectors.
         """
         require_vector_joints(self.robot)
-        R = np.ones(self.robot.nv) if weight is None else np.asarray(weight, dtype=np.float64)
+        R = self._effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
         passive = np.isin(np.arange(self.robot.nv), self.passive_coordinates)
         if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
             raise SceneError(
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
         R = np.where(passive, 0.0, R)
-        return EffortLagrangian(self.torques, self, R, self._potential)
+        return EffortLagrangian(self.torques, self, R, self._potential, self._effort_term)
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -115,6 +135,22 @@ class Scene:
         """
         q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
         return self.torques.torque(q, v, a, None if t is None else np.asarray(t, dtype=np.float64))
+
+    def without(self, key: str) -> Scene:
+        """The same scene without one of its effects."""
+        kept = [effect for effect in self.effects if effect.key != key]
+        return dataclasses.replace(self, effects=kept)
+
+    def graph(self) -> ca.Function:
+        """(q, v, a, t) -> (tau, L~): all that the scene names, as one expression graph."""
+        symbols = self.symbols
+        tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
+        added = self.added_torque(symbols)
+        tau = tau if added is None else tau + added
+        cost = ca.dot(ca.DM(self._effort_weight), tau**2) / 2
+        for more in (self.added_cost(symbols), self.added_effort_cost(tau, symbols.v)):
+            cost = cost if more is None else cost + more
+        return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
     def describe(self) -> str:
         """What is simulated, and what the URDF holds but the scene leaves out."""
@@ -147,18 +183,44 @@ class Scene:
         return cls(robot, effects, passive=tuple(data.get("passive", ())))
 
     @cached_property
-    def _potential(self) -> PotentialTerm | None:
-        symbols = SceneSymbols.of(self.robot)
-        terms = [effect.potential(self.robot, symbols) for effect in self.effects]
-        named = [term for term in terms if term is not None]
-        if not named:
-            return None
-        return PotentialTerm(symbols.columns(), sum(named[1:], named[0]), self.compile)
+    def _effort_weight(self) -> Array:
+        weights = [effect.effort_weight(self.robot) for effect in self.effects]
+        named = [weight for weight in weights if weight is not None]
+        return named[0] if named else np.ones(self.robot.nv)
 
-    def _added_torque(self, symbols: SceneSymbols) -> ca.SX | None:
-        terms = [effect.torque(self.robot, symbols) for effect in self.effects]
-        named = [term for term in terms if term is not None]
-        return sum(named[1:], named[0]) if named else None
+    @cached_property
+    def _potential(self) -> PotentialTerm | None:
+        total = self.added_cost(self.symbols)
+        if total is None:
+            return None
+        return PotentialTerm(self.symbols.columns(), total, self.compile)
+
+    def added_cost(self, symbols: SceneSymbols) -> ca.SX | None:
+        """V of the effects, a number; or None."""
+        return _sum(self._touching(Touch.COST, "potential", symbols))
+
+    @cached_property
+    def _effort_term(self) -> EffortTerm | None:
+        tau, v = ca.SX.sym("tau", self.robot.nv), self.symbols.v
+        phi = self.added_effort_cost(tau, v)
+        return None if phi is None else EffortTerm(tau, v, phi, self.compile)
+
+    def added_effort_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
+        """phi(tau, v) of the effects, a number; or None."""
+        return _sum(self._touching(Touch.COST, "effort_cost", tau, v))
+
+    def _touching(self, touch: Touch, term: str, *symbols: Any) -> Iterator[ca.SX]:
+        """The terms of one kind that effects add."""
+        for effect in self.effects:
+            added = getattr(effect, term)(self.robot, *symbols)
+            if added is None:
+                continue
+            if touch not in effect.touches:
+                raise SceneError(
+                    f"effect {effect.key!r} adds to the {touch} without saying so: put "
+                    f"Touch.{touch.name} into its `touches`."
+                )
+            yield added
 
     def _derivatives(self) -> str:
         if self.analytic:
@@ -184,6 +246,12 @@ class Scene:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             object.__setattr__(self, name, value)
+
+
+def _sum(terms: Iterable[ca.SX]) -> ca.SX | None:
+    """The sum of all terms; None where there is none."""
+    named = list(terms)
+    return sum(named[1:], named[0]) if named else None
 
 
 def require_vector_joints(robot: Robot) -> None:

@@ -94,30 +94,24 @@ class CasadiTorque:
 
 
 class AnalyticTorque:
-    """RNEA with Pinocchio's analytic derivatives, and what effects add from CasADi, if anything.
+    """RNEA with Pinocchio's analytic derivatives.
 
-    kernel: RNEA of the scene's model. added: the effects' torques, or None.
+    kernel: RNEA of the scene's model.
     """
 
-    def __init__(self, kernel: InverseDynamicsKernel, added: CasadiTorque | None = None) -> None:
+    def __init__(self, kernel: InverseDynamicsKernel) -> None:
         self.kernel = kernel
-        self.added = added
         self._threads = default_threads()
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
-        tau = self.kernel.torque(q, v, a)
-        return tau if self.added is None else tau + self.added.torque(q, v, a, t)
+        return self.kernel.torque(q, v, a)
 
     def linearize(
         self, q: Array, v: Array, a: Array, t: Array | None = None
     ) -> tuple[Array, Array]:
         """tau and its Jacobian."""
-        tau, J = self.kernel.linearize(q, v, a)
-        if self.added is not None:
-            more, dmore = self.added.linearize(q, v, a, t)
-            tau, J = tau + more, J + dmore
-        return tau, J
+        return self.kernel.linearize(q, v, a)
 
     def expand(
         self,
@@ -130,11 +124,43 @@ class AnalyticTorque:
     ) -> tuple[Array, Array, Array]:
         """tau, J and the Hessian of TorqueModel.expand."""
         if curvature is None:
-            curvature = R * self.torque(q, v, a, t)
-        if self.added is None:
-            return self.kernel.expand(q, v, a, R, curvature, self._threads)
+            curvature = R * self.kernel.torque(q, v, a)
+        return self.kernel.expand(q, v, a, R, curvature, self._threads)
+
+
+class SummedTorque:
+    """What a main torque model gives and what effects add to it from CasADi."""
+
+    def __init__(self, main: TorqueModel, added: CasadiTorque) -> None:
+        self.main = main
+        self.added = added
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv)."""
+        return self.main.torque(q, v, a, t) + self.added.torque(q, v, a, t)
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau and its Jacobian."""
+        tau, J = self.main.linearize(q, v, a, t)
         more, dmore = self.added.linearize(q, v, a, t)
-        tau, J, hessian = self.kernel.expand(q, v, a, R, curvature, self._threads)
+        return tau + more, J + dmore
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and the Hessian of TorqueModel.expand: (J + J')^T R (J + J') in four parts."""
+        more, dmore = self.added.linearize(q, v, a, t)
+        if curvature is None:
+            curvature = R * (self.main.torque(q, v, a, t) + more)
+        tau, J, hessian = self.main.expand(q, v, a, t, R, curvature)
         RdJ = R[..., None] * dmore
         cross = np.matmul(J.transpose(0, 2, 1), RdJ)
         hessian += cross + cross.transpose(0, 2, 1)

@@ -2,13 +2,63 @@
 
 from __future__ import annotations
 
-from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.armature import Armature
+from hovi.effects.custom import Custom
+from hovi.effects.drag import Drag
+from hovi.effects.dry_friction import DryFriction
+from hovi.effects.effect import Effect, SceneSymbols, Touch
+from hovi.effects.effort_weight import EffortWeight
 from hovi.effects.gravity import Gravity
 from hovi.effects.joint_limit_potential import JointLimitPotential
+from hovi.effects.joint_springs import JointSprings
+from hovi.effects.motion_cost import AccelerationCost, VelocityCost
+from hovi.effects.moving_base import MovingBase
+from hovi.effects.payload import Payload
+from hovi.effects.power_cost import PowerCost
+from hovi.effects.reference_cost import ReferenceCost
+from hovi.effects.viscous_friction import ViscousFriction
+from hovi.effects.wrench import Wrench
 
-REGISTRY: dict[str, type[Effect]] = {
-    effect.key: effect for effect in (Gravity, JointLimitPotential)
-}
+EFFECTS: tuple[type[Effect], ...] = (
+    Gravity,
+    ViscousFriction,
+    DryFriction,
+    Armature,
+    JointSprings,
+    JointLimitPotential,
+    Payload,
+    Wrench,
+    Drag,
+    MovingBase,
+    Custom,
+    EffortWeight,
+    VelocityCost,
+    AccelerationCost,
+    ReferenceCost,
+    PowerCost,
+)
+REGISTRY: dict[str, type[Effect]] = {effect.key: effect for effect in EFFECTS}
 """Effects by the name of their table in a scene file."""
 
-__all__ = ["REGISTRY", "Effect", "Gravity", "JointLimitPotential", "SceneSymbols"]
+__all__ = [
+    "REGISTRY",
+    "AccelerationCost",
+    "Armature",
+    "Custom",
+    "Drag",
+    "DryFriction",
+    "Effect",
+    "EffortWeight",
+    "Gravity",
+    "JointLimitPotential",
+    "JointSprings",
+    "MovingBase",
+    "Payload",
+    "PowerCost",
+    "ReferenceCost",
+    "SceneSymbols",
+    "Touch",
+    "VelocityCost",
+    "ViscousFriction",
+    "Wrench",
+]

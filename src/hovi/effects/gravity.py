@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from hovi.effects.effect import Effect
+from hovi.effects.effect import Effect, Touch
 from hovi.errors import SceneError
 
 if TYPE_CHECKING:
@@ -18,26 +18,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gravity(Effect):
-    """The generalised gravity g(q) of RNEA, for a uniform field along -z of the world.
+    """The generalised gravity g(q) of RNEA, for a uniform field.
 
-    acceleration: in [m/s^2].
+    acceleration: in [m/s^2]. direction: of the field in the world, of any length but zero.
     """
 
     acceleration: float = 9.81
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     key: ClassVar[str] = "gravity"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an acceleration that is not a finite number."""
+        """Refuse an acceleration that is not a finite number, and a direction that is none."""
         if not np.isfinite(self.acceleration):
             raise SceneError(
                 f"effect 'gravity': acceleration must be finite, got {self.acceleration}; "
                 "leave the effect out for a scene without gravity."
             )
+        if len(self.direction) != 3 or not 0 < np.linalg.norm(self.direction) < np.inf:
+            raise SceneError(
+                f"effect 'gravity': direction must be three finite numbers that are not all zero, "
+                f"got {list(self.direction)}."
+            )
 
-    def configure(self, model: pin.Model) -> None:
+    def configure(self, model: pin.Model, robot: Robot) -> None:
         """Gravity is simulated by Pinocchio itself."""
-        model.gravity.linear = np.array([0.0, 0.0, -self.acceleration])
+        along = np.array(self.direction) / np.linalg.norm(self.direction)
+        model.gravity.linear = self.acceleration * along
 
     def describe(self) -> str:
         """One line for the account of a scene."""
-        return f"gravity: {self.acceleration} m/s^2 along -z"
+        if self.direction == (0.0, 0.0, -1.0):
+            return f"gravity: {self.acceleration} m/s^2 along -z"
+        along = ", ".join(f"{x:g}" for x in self.direction)
+        return f"gravity: {self.acceleration} m/s^2 along ({along})"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.effect import Effect, SceneSymbols, Touch
 from hovi.errors import SceneError, nearest
 
 if TYPE_CHECKING:
@@ -20,19 +20,24 @@ if TYPE_CHECKING:
 class JointLimitPotential(Effect):
     """V(q) = slope * sum over joints of r(lower - q) + r(q - upper), a part of the cost.
 
+    With stops = true it is a mechanical stop as well: tau_i += dV/dq_i, in plans and simulations.
+
     r is the ramp max(x, 0), made twice differentiable within `width` of its kink:
     r(x) = (x + w)^3 (3 w - x) / (16 w^3) for |x| < w. [ColomboFerraroMartin2016, section 5: the
     elbow, with slope 1000 between 0 and 170 degrees]
 
     ranges: (lower, upper) by joint name, in [rad] or [m].
-    slope: of the cost, per [rad] or [m].
+    slope: of the cost, per [rad] or [m]; of stops too, in [N m] or [N].
     width: w > 0, in [rad] or [m].
+    stops: whether the joints feel it.
     """
 
     ranges: Mapping[str, tuple[float, float]]
     slope: float = 1000.0
     width: float = 1e-3
+    stops: bool = False
     key: ClassVar[str] = "joint_limit_potential"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.COST, Touch.TORQUE)
 
     def check(self, robot: Robot) -> None:
         """Refuse unknown joints, empty ranges, and numbers that make no ramp."""
@@ -62,12 +67,25 @@ class JointLimitPotential(Effect):
             terms += [smooth_ramp(lower - x, self.width), smooth_ramp(x - upper, self.width)]
         return self.slope * ca.sum1(ca.vertcat(*terms))
 
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
+        """dV/dq of the named joints, where they have stops."""
+        if not self.stops or not self.ranges:
+            return None
+        rows = [ca.SX(0)] * robot.nv
+        for joint, (lower, upper) in self.ranges.items():
+            member = robot.model.joints[robot.model.getJointId(joint)]
+            x = symbols.q[member.idx_q]
+            pull = ramp_slope(x - upper, self.width) - ramp_slope(lower - x, self.width)
+            rows[member.idx_v] = self.slope * pull
+        return ca.vertcat(*rows)
+
     def describe(self) -> str:
         """One line for the account of a scene."""
         ranges = ", ".join(f"{j} in [{a:.6g}, {b:.6g}]" for j, (a, b) in self.ranges.items())
+        stops = ", a stop for the joints too" if self.stops else ""
         return (
             f"joint_limit_potential: {ranges}; slope {self.slope:g} per rad or m, "
-            f"smoothed over {self.width:g}"
+            f"smoothed over {self.width:g}{stops}"
         )
 
 
@@ -82,3 +100,9 @@ def smooth_ramp(x: ca.SX, width: float) -> ca.SX:
     """max(x, 0), twice differentiable: (x + w)^3 (3 w - x) / (16 w^3) within w of the kink."""
     y = ca.fmin(ca.fmax(x + width, 0.0), 2 * width)
     return y**3 * (4 * width - y) / (16 * width**3) + ca.fmax(x - width, 0.0)
+
+
+def ramp_slope(x: ca.SX, width: float) -> ca.SX:
+    """The derivative of `smooth_ramp`: (x + w)^2 (2 w - x) / (4 w^3) within w, 0 and 1 outside."""
+    y = ca.fmin(ca.fmax(x + width, 0.0), 2 * width)
+    return y**2 * (3 * width - y) / (4 * width**3)

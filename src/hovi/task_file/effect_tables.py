@@ -9,7 +9,16 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
-from pydantic import AllowInfNan, BaseModel, Field, Strict, ValidationError, create_model
+from pydantic import (
+    AllowInfNan,
+    BaseModel,
+    Discriminator,
+    Field,
+    Strict,
+    Tag,
+    ValidationError,
+    create_model,
+)
 
 from hovi.effects import REGISTRY, Effect
 from hovi.errors import SceneError, nearest
@@ -29,7 +38,8 @@ def read_effects(
 
 def effect_table(effect: Effect) -> dict[str, Any]:
     """The table that `read_effects` reads back as this effect."""
-    return {field.name: plain(getattr(effect, field.name)) for field in fields(effect)}
+    values = {field.name: plain(getattr(effect, field.name)) for field in fields(effect)}
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlText) -> Effect:
@@ -70,13 +80,42 @@ def _strict(hint: Any) -> Any:
         return Annotated[float, Strict(), AllowInfNan(False)]
     if hint in (int, str, bool):
         return Annotated[hint, Strict()]
-    inner = tuple(_strict(each) if each is not Ellipsis else each for each in get_args(hint))
     origin = get_origin(hint)
     if origin in (Union, types.UnionType):
-        return functools.reduce(operator.or_, inner)
+        return _strict_union(hint)
+    inner = tuple(_strict(each) if each is not Ellipsis else each for each in get_args(hint))
     if isinstance(origin, type):
         return Annotated[origin[inner], Strict(False)]  # type: ignore[index]  # any generic class
     return hint
+
+
+def _strict_union(hint: Any) -> Any:
+    """A union whose member is chosen by what the value is, so that one complaint comes of it."""
+    members = [each for each in get_args(hint) if each is not type(None)]
+    if len(members) == 1:
+        return _strict(members[0])
+    tagged = (Annotated[_strict(each), Tag(_tag_of(each))] for each in members)
+    union = functools.reduce(operator.or_, tagged)
+    return Annotated[
+        union, Discriminator(_tag, custom_error_type="kind", custom_error_message=_in_words(hint))
+    ]
+
+
+def _tag_of(hint: Any) -> str:
+    origin = get_origin(hint) or hint
+    if origin in (float, int):
+        return "<number>"
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        return "<table>"
+    return "<list>" if origin in (list, tuple) else f"<{origin.__name__}>"
+
+
+def _tag(value: Any) -> str:
+    """The tag of a value that TOML holds."""
+    for kind, tag in ((bool, "<bool>"), (dict, "<table>"), ((list, tuple), "<list>")):
+        if isinstance(value, kind):
+            return tag
+    return "<number>" if isinstance(value, (int, float)) else f"<{type(value).__name__}>"
 
 
 def _in_words(hint: Any) -> str:
@@ -85,7 +124,9 @@ def _in_words(hint: Any) -> str:
     inner = get_args(hint)
     origin = get_origin(hint)
     if origin is tuple and Ellipsis not in inner:
-        return f"a list of {len(inner)} {_NUMBERS.get(inner[0], 'value')}s"
+        if inner[0] in _NUMBERS:
+            return f"a list of {len(inner)} {_NUMBERS[inner[0]]}s"
+        return f"a list of {len(inner)}, each {_in_words(inner[0])}"
     if origin in (list, tuple):
         return f"a list, each {_in_words(inner[0])}"
     if isinstance(origin, type) and issubclass(origin, Mapping):

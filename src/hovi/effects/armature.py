@@ -1,0 +1,56 @@
+"""Armature: the inertia of rotors, reflected by their gears."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.joint_values import (
+    JointValues,
+    in_words,
+    joint_values,
+    of_urdf,
+    require_one_source,
+)
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class Armature(Effect):
+    """M(q) += diag(I), I_i = rotor inertia times gear ratio squared. [Featherstone2008, sec. 9.6]
+
+    inertia: I, 0 or more, in [kg m^2] or [kg].
+    from_urdf: take the armature that the robot's model holds instead.
+    """
+
+    inertia: JointValues | None = None
+    from_urdf: bool = False
+    key: ClassVar[str] = "armature"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse negative numbers, unknown joints, and a model without armature."""
+        self.values(robot)
+
+    def values(self, robot: Robot) -> npt.NDArray[np.float64]:
+        """I of every joint coordinate, shape (nv,)."""
+        require_one_source(self.key, "inertia", self.inertia, self.from_urdf)
+        if self.inertia is None:
+            return of_urdf(robot, self.key, "armature", robot.armature)
+        return joint_values(robot, "effect 'armature': inertia", self.inertia, 0)
+
+    def configure(self, model: pin.Model, robot: Robot) -> None:
+        """Armature is simulated by Pinocchio itself."""
+        model.armature = self.values(robot)
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return f"armature: {in_words(self.inertia, 'kg m^2 (kg)')}"

@@ -1,0 +1,72 @@
+"""An effect of the user's own, from formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+
+from hovi.effects.effect import Effect, SceneSymbols, Touch
+from hovi.effects.formula import Number, Symbols, expression
+from hovi.effects.positions import positions
+from hovi.errors import SceneError, nearest
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class Custom(Effect):
+    """Torques and a cost, each a formula of q["joint"], v["joint"], a["joint"] and t.
+
+    In Python, a subclass of Effect takes any CasADi expression instead of a formula.
+
+    torque_of: what is added to tau of each joint, in [N m] or [N].
+    cost: what is added to the cost.
+    """
+
+    torque_of: Mapping[str, Number] = field(default_factory=dict)
+    cost: Number = 0.0
+    key: ClassVar[str] = "custom"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.TORQUE, Touch.COST)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown joints and formulas that make no sense."""
+        symbols = SceneSymbols.of(robot)
+        self.torque(robot, symbols)
+        self.potential(robot, symbols)
+
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
+        """The formulas of the joints."""
+        names, rows = robot.coordinate_names, [ca.SX(0)] * robot.nv
+        for joint, given in self.torque_of.items():
+            if joint not in names:
+                raise SceneError(
+                    f"effect 'custom': robot {robot.name!r} has no joint {joint!r}: "
+                    f"{nearest(joint, names)}"
+                )
+            what = f"effect 'custom': torque_of joint {joint!r}"
+            rows[names.index(joint)] = expression(what, given, _by_joint(robot, symbols))
+        return ca.vertcat(*rows) if self.torque_of else None
+
+    def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
+        """The formula of the cost."""
+        cost = expression("effect 'custom': cost", self.cost, _by_joint(robot, symbols))
+        return None if cost.is_zero() else cost
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        parts = [f"tau of {joint} += {given}" for joint, given in self.torque_of.items()]
+        parts += [] if self.cost == 0 else [f"cost += {self.cost}"]
+        return "custom: " + ("; ".join(parts) or "nothing")
+
+
+def _by_joint(robot: Robot, symbols: SceneSymbols) -> Symbols:
+    """q, v and a by the names of their coordinates, and t."""
+    columns = {"q": positions(robot, symbols.q), "v": symbols.v, "a": symbols.a}
+    tables: dict[str, ca.SX | Mapping[str, ca.SX]] = {"t": symbols.t}
+    for letter, column in columns.items():
+        tables[letter] = dict(zip(robot.coordinate_names, ca.vertsplit(column), strict=True))
+    return tables

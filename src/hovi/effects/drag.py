@@ -1,0 +1,69 @@
+"""Drag of air or a fluid on a frame, in wind or at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.frame_motion import frame_motion, require_frame
+from hovi.effects.time_vector import TimeVector, in_words, time_vector
+from hovi.errors import SceneError
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class Drag(Effect):
+    """The force F = -(rho A |u| / 2 + c) u on a frame that moves at u against the fluid.
+
+    |u| is smoothed as sqrt(u^2 + w^2) - w, so that the force is twice differentiable at rest.
+    [Batchelor1967, sec. 5.11]
+
+    frame: one of the robot's frames, at whose origin the force acts.
+    area: A, drag coefficient times area, in [m^2]. density: rho, in [kg/m^3].
+    linear: c, in [N s/m]. wind: velocity of the fluid in the world, in [m/s], each component a
+        number or a formula of t. width: w, in [m/s].
+    """
+
+    frame: str
+    area: float = 0.0
+    density: float = 1.204
+    linear: float = 0.0
+    wind: TimeVector = (0.0, 0.0, 0.0)
+    width: float = 1e-2
+    key: ClassVar[str] = "drag"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown frames and negative numbers."""
+        require_frame(robot, self.key, self.frame)
+        for name in ("area", "density", "linear"):
+            value = getattr(self, name)
+            if not 0 <= value < np.inf:
+                raise SceneError(
+                    f"effect 'drag': {name} must be finite and 0 or more, got {value}."
+                )
+        if not 0 < self.width < np.inf:
+            raise SceneError(f"effect 'drag': width must be positive and finite, got {self.width}.")
+        time_vector("effect 'drag': wind", self.wind, ca.SX.sym("t"))
+
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        """-J^T F."""
+        motion = frame_motion(robot, symbols, self.frame)
+        u = motion.velocity - time_vector("effect 'drag': wind", self.wind, symbols.t)
+        strength = ca.SX(self.linear)
+        if self.area * self.density > 0:
+            speed = ca.sqrt(ca.sumsqr(u) + self.width**2) - self.width
+            strength = strength + 0.5 * self.density * self.area * speed
+        return motion.joint_torque(strength * u)
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return (
+            f"drag: area {self.area:g} m^2 in {self.density:g} kg/m^3, linear {self.linear:g} "
+            f"N s/m on {self.frame}, wind {in_words(self.wind)} m/s"
+        )

@@ -1,0 +1,48 @@
+"""Springs in the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.joint_values import JointValues, in_words, joint_values
+from hovi.effects.positions import positions, require_positions
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class JointSprings(Effect):
+    """tau_i += k_i (q_i - rest_i): what it takes to bend a spring away from its rest.
+
+    stiffness: k, 0 or more, in [N m/rad] or [N/m]. rest: in [rad] or [m].
+    """
+
+    stiffness: JointValues
+    rest: JointValues = 0.0
+    key: ClassVar[str] = "joint_springs"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse negative stiffness, unknown joints, and joints without a position to rest at."""
+        what = "effect 'joint_springs'"
+        stiffness = joint_values(robot, f"{what}: stiffness", self.stiffness, 0)
+        joint_values(robot, f"{what}: rest", self.rest)
+        require_positions(robot, what, np.flatnonzero(stiffness))
+
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        """k (q - rest)."""
+        stiffness = joint_values(robot, "effect 'joint_springs': stiffness", self.stiffness, 0)
+        rest = joint_values(robot, "effect 'joint_springs': rest", self.rest)
+        return ca.DM(stiffness) * (positions(robot, symbols.q) - ca.DM(rest))
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return (
+            f"joint_springs: {in_words(self.stiffness, 'N m/rad (N/m)')}, "
+            f"at rest at {in_words(self.rest, 'rad (m)')}"
+        )

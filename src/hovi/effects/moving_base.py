@@ -1,0 +1,57 @@
+"""A base that moves in a given way: a robot on a ship, a train, a shaking table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+
+from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.time_vector import TimeVector, in_words, time_vector
+from hovi.errors import SceneError
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class MovingBase(Effect):
+    """tau = the joints' rows of RNEA for the robot on six more joints that move as prescribed.
+
+    All that a moving frame brings with it (its acceleration, Euler's, Coriolis' and centrifugal
+    forces, and a gravity that turns in the base's eyes) is in these rows. [Featherstone2008,
+    sec. 9.2]
+
+    position: of the base in the world, in [m]. rotation: (roll, pitch, yaw) about the world's
+        axes, R = Rz(yaw) Ry(pitch) Rx(roll) as in a URDF, in [rad]. Each component is a number or
+        a formula of t.
+    """
+
+    position: TimeVector = (0.0, 0.0, 0.0)
+    rotation: TimeVector = (0.0, 0.0, 0.0)
+    key: ClassVar[str] = "moving_base"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse what is no number and no formula, and a base that floats by itself."""
+        for name in ("position", "rotation"):
+            time_vector(f"effect 'moving_base': {name}", getattr(self, name), ca.SX.sym("t"))
+        for name, joint in list(zip(robot.model.names, robot.model.joints, strict=True))[1:]:
+            if joint.shortname() == "JointModelFreeFlyer":
+                raise SceneError(
+                    f"effect 'moving_base': joint {name!r} of robot {robot.name!r} floats, so that "
+                    "its base moves by itself; load the robot with free_flyer=False."
+                )
+
+    def base(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        """(x, y, z, yaw, pitch, roll) at time t."""
+        position = time_vector("effect 'moving_base': position", self.position, symbols.t)
+        rotation = time_vector("effect 'moving_base': rotation", self.rotation, symbols.t)
+        return ca.vertcat(position, rotation[2], rotation[1], rotation[0])
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return (
+            f"moving_base: position {in_words(self.position)} m, roll, pitch and yaw "
+            f"{in_words(self.rotation)} rad"
+        )

@@ -1,0 +1,74 @@
+"""A payload: a rigid body fixed to a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.frame_motion import require_frame
+from hovi.errors import SceneError
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class Payload(Effect):
+    """A rigid body welded to a frame: the spatial inertias of body and link add up.
+
+    [Featherstone2008, sec. 2.13]
+
+    frame: one of the robot's frames. mass: in [kg].
+    center: its center of mass in the frame, in [m].
+    inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about that center in the frame's axes, in [kg m^2];
+        a point mass when not given.
+    """
+
+    frame: str
+    mass: float
+    center: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    key: ClassVar[str] = "payload"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown frames, frames that rest, and numbers that make no rigid body."""
+        require_frame(robot, self.key, self.frame)
+        if robot.model.frames[robot.model.getFrameId(self.frame)].parentJoint == 0:
+            raise SceneError(
+                f"effect 'payload': frame {self.frame!r} is fixed to the base, where a payload "
+                "changes nothing; name a frame that a joint moves."
+            )
+        if not 0 <= self.mass < np.inf:
+            raise SceneError(
+                f"effect 'payload': mass must be finite and 0 or more, got {self.mass} kg."
+            )
+        if not np.isfinite(self.center).all():
+            raise SceneError(
+                f"effect 'payload': center must be three finite numbers, got {list(self.center)}."
+            )
+        tensor = self._tensor()
+        if not np.isfinite(tensor).all() or np.linalg.eigvalsh(tensor)[0] < -1e-12 * tensor.max():
+            raise SceneError(
+                "effect 'payload': inertia (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) must be finite and must "
+                f"not have a negative principal value, got {list(self.inertia)}."
+            )
+
+    def configure(self, model: pin.Model, robot: Robot) -> None:
+        """The body is part of the model then."""
+        frame = model.frames[model.getFrameId(self.frame)]
+        body = pin.Inertia(self.mass, np.array(self.center), self._tensor())
+        model.inertias[frame.parentJoint] += frame.placement.act(body)
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        center = ", ".join(f"{x:g}" for x in self.center)
+        return f"payload: {self.mass:g} kg at {self.frame}, center ({center}) m"
+
+    def _tensor(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)

@@ -1,0 +1,49 @@
+"""A cost on mechanical power."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+import numpy as np
+
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.joint_values import JointValues, in_words, joint_values
+from hovi.errors import SceneError
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+
+@dataclass(frozen=True)
+class PowerCost(Effect):
+    """w_i |tau_i v_i| summed over the joints: the energy of drives that cannot take any back.
+
+    |P| is smoothed as sqrt(P^2 + s^2) - s.
+
+    weight: w, 0 or more, per [W]. width: s, in [W].
+    """
+
+    weight: JointValues
+    width: float = 0.1
+    key: ClassVar[str] = "power_cost"
+    touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown joints, negative weights, and a width that is not positive."""
+        joint_values(robot, "effect 'power_cost': weight", self.weight, 0)
+        if not 0 < self.width < np.inf:
+            raise SceneError(
+                f"effect 'power_cost': width must be positive and finite, got {self.width} W."
+            )
+
+    def effort_cost(self, robot: Robot, tau: ca.SX, v: ca.SX) -> ca.SX:
+        """The weighted smoothed power."""
+        weight = joint_values(robot, "effect 'power_cost': weight", self.weight, 0)
+        power = ca.sqrt((tau * v) ** 2 + self.width**2) - self.width
+        return ca.dot(ca.DM(weight), power)
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return f"power_cost: {in_words(self.weight, 'per W')}, smoothed over {self.width:g} W"

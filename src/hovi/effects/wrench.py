@@ -1,0 +1,58 @@
+"""A force and a moment from outside, at a frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import casadi as ca
+
+from hovi.effects.effect import Effect, SceneSymbols
+from hovi.effects.frame_motion import frame_motion, require_frame
+from hovi.effects.time_vector import TimeVector, in_words, time_vector
+from hovi.errors import SceneError, nearest
+
+if TYPE_CHECKING:
+    from hovi.robot import Robot
+
+AXES = ("world", "frame")
+
+
+@dataclass(frozen=True)
+class Wrench(Effect):
+    """tau -= J(q)^T (f, m), for a wrench that acts on the robot. [Featherstone2008, sec. 5.3]
+
+    frame: one of the robot's frames, at whose origin the force acts.
+    force: f, in [N]. moment: m, in [N m]. Each component is a number or a formula of t.
+    axes: "world", or "frame" for components along the frame's own axes.
+    """
+
+    frame: str
+    force: TimeVector = (0.0, 0.0, 0.0)
+    moment: TimeVector = (0.0, 0.0, 0.0)
+    axes: str = "world"
+    key: ClassVar[str] = "wrench"
+
+    def check(self, robot: Robot) -> None:
+        """Refuse unknown frames and axes, and what is no number and no formula."""
+        require_frame(robot, self.key, self.frame)
+        if self.axes not in AXES:
+            raise SceneError(f"effect 'wrench': axes {self.axes!r}: {nearest(self.axes, AXES)}")
+        for name in ("force", "moment"):
+            time_vector(f"effect 'wrench': {name}", getattr(self, name), ca.SX.sym("t"))
+
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        """-J^T (f, m)."""
+        f = time_vector("effect 'wrench': force", self.force, symbols.t)
+        m = time_vector("effect 'wrench': moment", self.moment, symbols.t)
+        motion = frame_motion(robot, symbols, self.frame)
+        if self.axes == "frame":
+            f, m = motion.rotation @ f, motion.rotation @ m
+        return -motion.joint_torque(f, None if m.is_zero() else m)
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return (
+            f"wrench: force {in_words(self.force)} N, moment {in_words(self.moment)} N m "
+            f"at {self.frame} in the axes of the {self.axes}"
+        )
