@@ -111,14 +111,14 @@ class Scene:
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
 
-        weight: R, shape (nv,); when not given, that of the effect `effort_weight`, or all ones. That
-            of passive joints, whose torque vanishes, does not count and is set to zero.
+        weight: R, shape (nv,); when not given, that of the effect `effort_weight`, or all ones;
+            that of passive joints, whose torque vanishes, does not count and is set to zero.
             [ColomboFerraroMartin2016, section 5]
         Raises ModelError for joints whose configurations are not vectors.
         """
         require_vector_joints(self.robot)
         R = self._effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
-        passive = np.isin(np.arange(self.robot.nv), self.passive_coordinates)
+        passive = self._is_passive
         if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
             raise SceneError(
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
@@ -147,7 +147,8 @@ class Scene:
         tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
         added = self.added_torque(symbols)
         tau = tau if added is None else tau + added
-        cost = ca.dot(ca.DM(self._effort_weight), tau**2) / 2
+        weight = np.where(self._is_passive, 0.0, self._effort_weight)
+        cost = ca.dot(ca.DM(weight), tau**2) / 2
         for more in (self.added_cost(symbols), self.added_effort_cost(tau, symbols.v)):
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
@@ -181,6 +182,10 @@ class Scene:
             effects.append(REGISTRY[key](**values))
         robot = Robot.from_dict(data["robot"])
         return cls(robot, effects, passive=tuple(data.get("passive", ())))
+
+    @cached_property
+    def _is_passive(self) -> npt.NDArray[np.bool_]:
+        return np.isin(np.arange(self.robot.nv), self.passive_coordinates)
 
     @cached_property
     def _effort_weight(self) -> Array:
