@@ -13,7 +13,16 @@ SOURCE = Path(hovi.__file__).parent
 
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
-    {"errors", "newton", "conditions", "whole_file", "skeleton", "meshcat_page", "json_numbers"},
+    {
+        "errors",
+        "newton",
+        "conditions",
+        "budget",
+        "whole_file",
+        "skeleton",
+        "meshcat_page",
+        "json_numbers",
+    },
     {
         "obstacles",
         "schemes",
@@ -55,7 +64,6 @@ FLOORS = [
         "saturation",
         "limit_bands",
         "problem",
-        "budget",
         "euler_lagrange",
         "exact_discrete_lagrangian",
         "symmetry",
@@ -65,7 +73,7 @@ FLOORS = [
     {"limited_action", "equality_rounds"},
     {"limited_solver"},
     {"solver", "task_file", "simulator"},
-    {"finer_solution", "multistart"},
+    {"finer_solution", "multistart", "free_duration"},
     {"error_estimate"},
     {"planner"},
     {"playback", "plotting", "export", "accuracy"},

@@ -41,12 +41,15 @@ def refusal(folder: Path, text: str, error: type[HoviError] = SceneError) -> str
     return sentence
 
 
+COMPARED = {"two_link_swing_up", "two_link_reach", "two_link_elbow", "ur5_reach", "panda_reach"}
+"""Scenes that other solvers are given as well, without limits."""
+
+
 @pytest.mark.parametrize("name", example_scenes())
 def test_every_shipped_scene_loads(name: str) -> None:
     task = load_task(example(name))
     assert task.name == name
-    assert (task.limits == "none") is not name.endswith("_limited")
-    assert task.scene.effects[0].key == "gravity"
+    assert task.limits == "none" or name not in COMPARED
 
 
 @pytest.mark.parametrize("name", sorted(example_scenes()))

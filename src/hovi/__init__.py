@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagrangian
     from hovi.exact_discrete_lagrangian import conjugate_time as conjugate_time
     from hovi.export import write_csv as write_csv
+    from hovi.frame_goal import FrameGoal as FrameGoal
+    from hovi.goals import Via as Via
     from hovi.grid import DiscretePath as DiscretePath
     from hovi.grid import Grid as Grid
     from hovi.lagrangian import CasadiLagrangian as CasadiLagrangian
@@ -70,6 +72,7 @@ _PLACES = {
     "DiscretePath": "hovi.grid",
     "ExactDiscreteLagrangian": "hovi.exact_discrete_lagrangian",
     "Flow": "hovi.stepper",
+    "FrameGoal": "hovi.frame_goal",
     "Grid": "hovi.grid",
     "HoviError": "hovi.errors",
     "Limits": "hovi.limits",
@@ -85,6 +88,7 @@ _PLACES = {
     "Task": "hovi.task_file",
     "Trajectory": "hovi.trajectory",
     "TrajectoryProblem": "hovi.problem",
+    "Via": "hovi.goals",
     "base_rotation": "hovi.symmetry",
     "base_translation": "hovi.symmetry",
     "chain": "hovi.chain_urdf",

@@ -1,33 +1,16 @@
-"""What is left of a solve's budget."""
+"""What is left of a solve's time."""
 
 from __future__ import annotations
 
-import dataclasses
 import time
 
-from hovi.optimize.trust_region import Options
 
+class TimeLeft:
+    """The seconds that are left of a limit, which counts from now; None where there is none."""
 
-class Deadline:
-    """The steps and the time of a solve, shared by its rounds.
+    def __init__(self, limit: float | None) -> None:
+        self._ends = None if limit is None else time.monotonic() + limit
 
-    options: the budgets of the whole solve, which starts now.
-    """
-
-    def __init__(self, options: Options) -> None:
-        self.options = options
-        limit = options.time_limit
-        self.ends = None if limit is None else time.monotonic() + limit
-
-    def left(self, steps_done: int, decrease: float | None = None) -> Options:
-        """Options for what is left.
-
-        steps_done: steps that are used up. decrease: where another tolerance is wanted.
-        """
-        left = None if self.ends is None else max(self.ends - time.monotonic(), 0.0)
-        return dataclasses.replace(
-            self.options,
-            time_limit=left,
-            max_iterations=max(self.options.max_iterations - steps_done, 0),
-            decrease=self.options.decrease if decrease is None else decrease,
-        )
+    def __call__(self) -> float | None:
+        """Seconds left, 0 where time is up."""
+        return None if self._ends is None else max(self._ends - time.monotonic(), 0.0)

@@ -204,7 +204,7 @@ class DiscreteLagrangian:
         numbers = np.arange(self.grid.intervals)
         return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self._batches]
 
-    def momenta(self, path: DiscretePath, forces: list[Array] | None = None) -> Array:
+    def momenta(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
         """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
 
         p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k (F-), and
@@ -215,26 +215,50 @@ class DiscreteLagrangian:
         g = self.derivatives(path, forces)
         return np.concatenate([-g[:, :2], g[-1:, 2:]])
 
-    def derivatives(self, path: DiscretePath, forces: list[Array] | None = None) -> Array:
+    def derivatives(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
         """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
 
         At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
-        forces: multipliers of the torques at the quadrature points, (P, nv) per batch, whose work
-            belongs to L_d where torques have to vanish.
+        forces: multipliers of limits and of torques that vanish, whose work belongs to L_d.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
         g = np.empty((N, 4, n))
-        for i, batch in enumerate(self._batches):
-            jet = _jet(batch, path)
-            if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
-                gradient = self.lagrangian.gradient(*jet, t=batch.t, force=forces[i])
-            else:
-                gradient = self.lagrangian.gradient(*jet, t=batch.t)
+        gradients = self.point_gradients(path, forces)
+        for batch, gradient in zip(self._batches, gradients, strict=True):
             regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
             g[batch.index] = regular[:, :4]
         h = self.grid.steps[:, None]
         d1, d2, d3, d4 = g[:, 0], g[:, 1], g[:, 2], g[:, 3]
         return np.stack([d1 - d3, h * (d2 - d3 - d4), d3, h * d4], axis=1)
+
+    def point_gradients(
+        self, path: DiscretePath, forces: list[PointTerms] | None = None
+    ) -> list[Array]:
+        """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; forces as above."""
+        gradients = []
+        for i, batch in enumerate(self._batches):
+            jet = _jet(batch, path)
+            if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
+                gradients.append(self.lagrangian.gradient(*jet, t=batch.t, terms=forces[i]))
+            else:
+                gradients.append(self.lagrangian.gradient(*jet, t=batch.t))
+        return gradients
+
+    def duration_derivative(
+        self, path: DiscretePath, forces: list[PointTerms] | None = None
+    ) -> float:
+        """d S / d T of a stationary action S, the nodes' q and v and the steps' proportions fixed.
+
+        T dS/dT = S - sum h w (dL/dv . v + 2 dL/da . a) + sum (D2 L_d . v0 + D4 L_d . v1), for L
+        that does not depend on time; it is minus Pontryagin's Hamiltonian.
+        """
+        total = self.action(path)
+        gradients = self.point_gradients(path, forces)
+        for jet, g, w in zip(self.jets(path), gradients, self.point_weights, strict=True):
+            total -= float(w @ (np.vecdot(g[:, 1], jet[1]) + 2 * np.vecdot(g[:, 2], jet[2])))
+        d = self.derivatives(path, forces)
+        total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
+        return total / self.grid.duration
 
     @cached_property
     def _batches(self) -> list[_Batch]:

@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 SEEDS = 40
 """Random configurations that are tried after the first."""
-ENOUGH = 8
+ENOUGH = 4
 """Seeds that may meet the goal before the nearest is taken."""
 ITERATIONS = 100
 """Steps from one seed."""

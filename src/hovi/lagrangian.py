@@ -143,19 +143,23 @@ class EffortLagrangian(Lagrangian):
             value = value + self.effort_term.value(tau, jet[1])
         return np.asarray(value)
 
-    def gradient(self, *jet: Array, t: Array | None = None, force: Array | None = None) -> Array:
-        """The gradient J^T (R tau + force) + dV + dphi, shape (P, 3, nv).
+    def gradient(
+        self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
+    ) -> Array:
+        """The gradient J^T R tau + dV + dphi, shape (P, 3, nv).
 
-        force: multipliers of the torques, shape (P, nv); none when None.
+        terms: what limits and multipliers add.
         """
         q, v, a = jet
         tau, J = self.torques.linearize(q, v, a, t)
         effort = self.weight * tau
-        if force is not None:
-            effort = effort + force
+        if terms is not None:
+            effort = effort + terms.effort_gradient
         gradient = np.matmul(effort[:, None], J)[:, 0]
         if self.effort_term is not None:
             gradient = gradient + self.effort_term.expand(tau, v, J)[1]
+        if terms is not None:
+            gradient += terms.jet_gradient
         if self.potential is not None:
             gradient = gradient + self.potential.expand(q, v, a, t=t)[1]
         return np.asarray(gradient.reshape(len(tau), 3, self.nv))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from functools import cached_property
 
@@ -72,6 +73,25 @@ class LimitedAction(BoundedObjective[DiscretePath]):
             terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
             curvatures.append(self._effort(x, i) + force[part, k:])
         return self.action.model_with(x, curvatures, terms)
+
+    def forces(self, multipliers: Array) -> list[PointTerms]:
+        """What the bounds, and equations besides, exert on (q, v, a, tau) at the points.
+
+        multipliers: of the outputs, shape (P, K).
+        """
+        force = self._unscaled(multipliers, 1)
+        k = 3 * self.lagrangian.nv
+        zero = np.zeros_like(force)
+        terms = [
+            PointTerms(force[p, :k], zero[p, :k], force[p, k:], zero[p, k:]) for p in self._parts
+        ]
+        known = self.action.multipliers
+        if known is None:
+            return terms
+        return [
+            dataclasses.replace(term, effort_gradient=term.effort_gradient + torque)
+            for term, torque in zip(terms, known.torque, strict=True)
+        ]
 
     def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
         """Change of the action and of the bounded outputs, to first order."""

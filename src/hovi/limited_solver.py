@@ -14,6 +14,7 @@ from hovi.contradictions import contradiction, static_sentence
 from hovi.equality_rounds import first_multipliers, satisfy
 from hovi.grid import DiscretePath
 from hovi.guess import stretched, with_bump
+from hovi.lagrangian import PointTerms
 from hovi.limit_check import Excess, excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
 from hovi.limits import Limits
@@ -65,6 +66,7 @@ class LimitedOutcome:
     """What became of a problem with limits.
 
     problem: the problem as solved, with the intervals that had to be split.
+    forces: of the limits and equations on the motion, at the quadrature points.
     reason: why there is no motion, in a sentence without its end; "" where there is one.
     excess: largest share of a range by which a limit is exceeded anywhere.
     """
@@ -76,7 +78,7 @@ class LimitedOutcome:
     iterations: int
     history: list[Iteration]
     n_neg: int
-    momenta: Array
+    forces: list[PointTerms] | None = None
     reason: str = ""
     excess: float = 0.0
 
@@ -94,8 +96,8 @@ def solve_limited(
     """
     reason = contradiction(problem, limits)
     if reason:
-        value, momenta = problem.ld.action(path), problem.ld.momenta(path)
-        return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, momenta, reason)
+        value = problem.ld.action(path)
+        return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason=reason)
     deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
     search = _Search(problem, limits, options, deadline, report, path)
     outcome = search.first(path)
@@ -238,7 +240,7 @@ class _Search:
         self, outcome: BoundedOutcome[DiscretePath], reason: str, excess: float
     ) -> LimitedOutcome:
         """The result of the stages."""
-        action = self._objective(self.multipliers).action
+        objective = self._objective(self.multipliers)
         return LimitedOutcome(
             self.problem,
             outcome.x,
@@ -247,7 +249,7 @@ class _Search:
             self.iterations,
             self.history,
             self._inertia(outcome),
-            action.momenta(outcome.x),
+            objective.forces(outcome.barrier.multipliers),
             reason or self.unmet,
             excess,
         )

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from joblib import Parallel, delayed, parallel_config
 
 from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.frame_goal import FrameGoal
+from hovi.goals import Via
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched, with_bump
 from hovi.limits import Limits
@@ -47,15 +49,16 @@ class Job:
     weight: tuple[float, ...]
     grid: Grid
     start: State
-    goal: State
+    goal: State | FrameGoal
     max_iterations: int
     limits: Limits
+    via: tuple[Via, ...] = ()
 
     def problem(self) -> TrajectoryProblem:
         """The trajectory problem."""
         lagrangian = self.scene.effort_lagrangian(self.weight)
         ld = DiscreteLagrangian(lagrangian, self.grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via)
 
 
 @dataclass(eq=False)

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError
+from hovi.frame_goal import FrameGoal
+from hovi.free_duration import FreeDuration, solve_duration
+from hovi.goals import Via
 from hovi.grid import Grid
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
-from hovi.solver import Solution, Status, guess_path
+from hovi.solver import Solution, Status, guess_path, solve
 from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
 
@@ -33,9 +36,11 @@ EXPLORING = 0.7
 def plan(
     scene: Scene,
     start: State | npt.ArrayLike | str,
-    goal: State | npt.ArrayLike | str,
-    duration: float,
+    goal: State | FrameGoal | npt.ArrayLike | str,
+    duration: float | tuple[float, float],
     *,
+    time_weight: float = 0.0,
+    via: Sequence[Via] = (),
     scheme: str | Scheme = "galerkin-2",
     intervals: int = 16,
     limits: str | Limits | Mapping[str, Any] = "urdf",
@@ -48,11 +53,15 @@ def plan(
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """The motion of least 1/2 integral |tau|^2 between two states in a given time.
+    """The motion of least 1/2 integral |tau|^2 from a state to a goal.
 
     scene: what is simulated.
-    start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose.
-    duration: T in [s]. scheme, intervals: how the action is discretised.
+    start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose; the goal
+        may be a FrameGoal.
+    duration: T in [s], or a pair (lower, upper) between which the best one is looked for.
+    time_weight: cost per [s] of a duration that is free.
+    via: what the motion passes through at given times.
+    scheme, intervals: how the action is discretised.
     limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
         "none", a Limits, or a mapping as as_limits takes it.
     starts: number of solves from seeded random perturbations; all minima found are refined on
@@ -72,17 +81,22 @@ def plan(
     if time_limit is not None and not time_limit > 0:
         raise InputError(f"time_limit must be positive, in seconds, got {time_limit}.")
     table = by_name(scheme) if isinstance(scheme, str) else scheme
+    free = _free(duration, time_weight, via)
+    T = duration if free is None else free.first
+    passed = tuple(sorted(via, key=lambda each: each.time))
+    grid = Grid.uniform(cast(float, T), intervals, table)
     fine = Job(
         scene,
         tuple(scene.effort_lagrangian(weight).weight),
-        Grid.uniform(duration, intervals, table),
+        grid.with_nodes([each.time for each in passed]) if passed else grid,
         as_state(start, scene.robot),
-        as_state(goal, scene.robot),
+        goal if isinstance(goal, FrameGoal) else as_state(goal, scene.robot),
         max_iterations,
         as_limits(scene.robot, limits),
+        passed,
     )
     ends = None if time_limit is None else time.monotonic() + time_limit
-    search = _Search(fine, processes or default_processes(), ends, progress or _silent)
+    search = _Search(fine, processes or default_processes(), ends, progress or _silent, free)
     problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
@@ -103,6 +117,7 @@ class _Search:
     processes: int
     deadline: float | None
     progress: Progress
+    free: FreeDuration | None = None
 
     def run(
         self, guess: str | Trajectory, starts: int, seed: int
@@ -115,6 +130,8 @@ class _Search:
         found = search.minima
         if job is not self.fine:
             found = _on_coarse_grid(found[:1]) if search.interrupted else self._refine(found)
+        if self.free is not None and not search.interrupted:
+            found = self._freed(self.free, found[:REFINED])
         best = found[0]
         if search.done < starts:
             ended = f"{best.message} The search ended after {search.done} of {starts} starts."
@@ -133,6 +150,8 @@ class _Search:
         if grid.intervals <= 2 * COARSE_INTERVALS:
             return self.fine
         coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2))
+        if self.fine.via:
+            coarse = coarse.with_nodes([each.time for each in self.fine.via])
         return dataclasses.replace(self.fine, grid=coarse)
 
     def _refine(self, found: list[Solution]) -> list[Solution]:
@@ -142,11 +161,45 @@ class _Search:
         pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, self.deadline)
         return distinct(pool.solve_all(guesses))
 
+    def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
+        """Every motion with the duration that is best for it, the cheapest first."""
+
+        def solve_for(T: float, guess: Trajectory | None) -> Solution:
+            steps = self.fine.grid.steps * (T / self.fine.grid.duration)
+            grid = Grid(steps, self.fine.grid.schemes)
+            problem = dataclasses.replace(self.fine, grid=grid).problem()
+            left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+            iterations = self.fine.max_iterations
+            return solve(problem, guess or "cubic", max_iterations=iterations, time_limit=left)
+
+        freed = []
+        for i, solution in enumerate(found):
+            self.progress(f"best duration of {i + 1} of {len(found)} motions", 0.9)
+            first = solve_for(free.first, solution.trajectory)
+            freed.append(solve_duration(free, solve_for, first))
+        return distinct(freed)
+
+
+def _free(
+    duration: float | tuple[float, float], weight: float, via: Sequence[Via]
+) -> FreeDuration | None:
+    """Bounds of a free duration, or None where it is given."""
+    if isinstance(duration, float | int | np.number):
+        if weight != 0:
+            raise InputError("a weight of time needs a free duration, a pair (lower, upper).")
+        return None
+    pair = tuple(np.asarray(duration, dtype=float).ravel())
+    if len(pair) != 2:
+        raise InputError(f"the duration is a number or a pair (lower, upper), got {duration!r}.")
+    if via:
+        raise InputError("via points at given times need a given duration, not a free one.")
+    return FreeDuration(pair[0], pair[1], weight)
+
 
 def _on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
     """The problem on the grid that the solution needed, where limits split its intervals."""
     grid = solution.trajectory.grid
-    same = grid.intervals == problem.grid.intervals
+    same = np.array_equal(grid.steps, problem.grid.steps)
     return problem if same else problem.on(grid)
 
 

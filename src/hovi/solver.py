@@ -7,25 +7,28 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.budget import Deadline
+from hovi.budget import TimeLeft
 from hovi.equality_rounds import satisfy
 from hovi.errors import InputError
+from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
 from hovi.guess import check_path, moved, named_curve, stretched
+from hovi.lagrangian import PointTerms
 from hovi.limited_solver import LimitedOutcome, solve_limited
 from hovi.multipliers import Multipliers
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.problem import TrajectoryProblem
+from hovi.robot import Robot
 from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective, follow
 
-Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
 """What is told the number of each step and the least cost so far."""
 
@@ -60,6 +63,7 @@ class Solution:
     history: what each step did.
     setup_seconds, solve_seconds: wall time before and during the solve.
     problem: what was solved; `replan` starts from it.
+    forces: multipliers of limits and of passive joints' torques at the quadrature points.
     """
 
     success: bool
@@ -75,6 +79,17 @@ class Solution:
     history: tuple[Iteration, ...] = field(default=(), repr=False)
     setup_seconds: float = 0.0
     solve_seconds: float = 0.0
+    forces: list[PointTerms] | None = field(default=None, repr=False)
+
+    @cached_property
+    def duration_derivative(self) -> float:
+        """d cost / d T with all else as it was asked, per [s]: minus Pontryagin's Hamiltonian.
+
+        For an effort that does not depend on time. Raises InputError without a problem.
+        """
+        if self.problem is None:
+            raise InputError("this solution does not know its problem; plan again instead.")
+        return self.problem.ld.duration_derivative(self.trajectory.path, self.forces)
 
     def replan(
         self,
@@ -97,7 +112,7 @@ class Solution:
         old = self.problem
         problem = old.between(
             old.start if start is None else as_state(start, old.robot),
-            old.goal if goal is None else as_state(goal, old.robot),
+            old.goal if goal is None else _as_goal(goal, old.robot),
         )
         origin = self if guess is None else guess
         path = origin.trajectory.path
@@ -105,6 +120,10 @@ class Solution:
             return solve(problem, path, **options)
         solution = solve(problem, follow(path, problem), **options)
         return dataclasses.replace(solution, nit=solution.nit + 1)
+
+
+def _as_goal(goal: State | FrameGoal | npt.ArrayLike, robot: Robot) -> State | FrameGoal:
+    return goal if isinstance(goal, FrameGoal) else as_state(goal, robot)
 
 
 def solve(
@@ -120,7 +139,7 @@ def solve(
 
     problem: the boundary data and the discrete Lagrangian.
     guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
-    max_iterations: steps; with limits, of every round of tightening. time_limit: in [s]. Both
+    max_iterations: steps; with limits or equations, of every round. time_limit: in [s]. Both
         return the best motion so far.
     escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
     report: called with the number of each step and the least cost so far.
@@ -153,6 +172,7 @@ def solve(
         history=tuple(answer.history),
         setup_seconds=started - began,
         solve_seconds=solved - started,
+        forces=answer.forces,
     )
 
 
@@ -168,7 +188,7 @@ class _Answer:
     nit: int
     n_neg: int
     history: list[Iteration]
-    momenta: Array
+    forces: list[PointTerms] | None
 
     def trajectory(self) -> Trajectory:
         """The motion with its momenta and where it came from."""
@@ -180,7 +200,8 @@ class _Answer:
         }
         if problem.limits is not None and problem.limited:
             metadata["limits"] = problem.limits.to_dict()
-        return Trajectory(problem.grid, self.path, self.momenta, problem.scene, metadata)
+        momenta = problem.ld.momenta(self.path, self.forces)
+        return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
 
 
 def _without_limits(
@@ -194,36 +215,38 @@ def _without_limits(
     n_neg, outcome = _certify(objective, outcome)
     status, message = _verdict(outcome, n_neg)
     nit, history = outcome.iterations, outcome.history
-    momenta = objective.momenta(outcome.x)
-    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, momenta)
+    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None)
 
 
 def _with_equations(
     problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
 ) -> _Answer:
     """By trust regions in rounds of an augmented Lagrangian."""
-    deadline = Deadline(options)
+    if problem.unreachable:
+        value = problem.ld.action(path)
+        message = f"{problem.unreachable}."
+        return _Answer(problem, path, value, Status.INFEASIBLE, message, 0, -1, [], None)
     history: list[Iteration] = []
+    time_left = TimeLeft(options.time_limit)
 
     def round_(known: Multipliers, x: DiscretePath, decrease: float) -> Outcome[DiscretePath]:
         objective = ActionObjective(problem, multipliers=known)
-        limits = deadline.left(len(history), max(decrease, DECREASE))
-        outcome = minimize(objective, x, limits, _shifted(report, len(history)))
+        tolerance = max(decrease, options.decrease)
+        chosen = dataclasses.replace(options, decrease=tolerance, time_limit=time_left())
+        outcome = minimize(objective, x, chosen, _shifted(report, len(history)))
         history.extend(outcome.history)
         return outcome
 
     rounds = satisfy(problem, path, round_)
-    outcome = rounds.result
     objective = ActionObjective(problem, multipliers=rounds.multipliers)
-    n_neg, outcome = _certify(objective, outcome)
-    outcome.value, outcome.iterations = problem.ld.action(outcome.x), len(history)
+    n_neg, outcome = _certify(objective, rounds.result)
+    nit = len(history)
+    outcome.value, outcome.iterations = problem.ld.action(outcome.x), nit
     status, message = _verdict(outcome, n_neg)
     if rounds.reason:
         status, message = Status.INFEASIBLE, f"{rounds.reason}."
-    momenta = objective.momenta(outcome.x)
-    return _Answer(
-        problem, outcome.x, outcome.value, status, message, len(history), n_neg, history, momenta
-    )
+    forces, value = objective.forces, outcome.value
+    return _Answer(problem, outcome.x, value, status, message, nit, n_neg, history, forces)
 
 
 def _shifted(report: Report | None, done: int) -> Report | None:
@@ -249,7 +272,7 @@ def _with_limits(
         outcome.iterations,
         outcome.n_neg,
         outcome.history,
-        outcome.momenta,
+        outcome.forces,
     )
 
 

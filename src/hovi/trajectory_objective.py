@@ -177,9 +177,10 @@ class ActionObjective(Objective[DiscretePath]):
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
 
-    def momenta(self, x: DiscretePath) -> Array:
-        """Momenta at the nodes, the multipliers' share included: see DiscreteLagrangian.momenta."""
-        return self.ld.momenta(x, None if self.multipliers is None else self.multipliers.torque)
+    @property
+    def forces(self) -> list[PointTerms] | None:
+        """Multipliers of the passive joints' torques at the quadrature points; None without."""
+        return None if self.multipliers is None else _with_forces(None, self.multipliers.torque)
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """What conditions at nodes add to the intervals that have these nodes."""

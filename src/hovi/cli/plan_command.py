@@ -102,6 +102,8 @@ def _plan(
             task.start,
             task.goal,
             task.duration,
+            time_weight=task.time_weight,
+            via=task.via,
             scheme=task.scheme,
             intervals=task.intervals,
             limits=task.limits,

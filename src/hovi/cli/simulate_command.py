@@ -39,7 +39,8 @@ def simulate(
     if out is not None:
         check_output(out, ".npz")
     task = load_task(find_scene(scene))
-    T = task.duration if duration is None else duration
+    longest = max(task.duration) if isinstance(task.duration, tuple) else task.duration
+    T = longest if duration is None else duration
     if not 0 < T < math.inf:
         raise InputError(f"--duration must be a positive number of seconds, not {T}.")
     N = max(1, math.ceil(100 * T)) if intervals is None else intervals

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import ValidationError
 
-from hovi.errors import HoviError, InputError, SceneError, SchemeError, nearest
+from hovi.errors import HoviError, SceneError, SchemeError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name
-from hovi.state import State
 from hovi.task_file.effect_tables import read_effects
+from hovi.task_file.goal_tables import read_goal, read_state, read_via
 from hovi.task_file.limit_tables import read_limits
-from hovi.task_file.schema import EndTable, TaskTable
+from hovi.task_file.schema import TaskTable
 from hovi.task_file.sentences import TomlText, first_sentence
 from hovi.task_file.task import Task
-
-Array = npt.NDArray[np.float64]
 
 
 def load_task(path: str | Path) -> Task:
@@ -37,10 +33,12 @@ def load_task(path: str | Path) -> Task:
     _check_names(table, toml)
     robot = _load_robot(table, toml)
     return Task(
-        scene=Scene(robot, effects=read_effects(table.effects, robot, toml)),
-        start=_read_end(table.start, "start", robot, toml),
-        goal=_read_end(table.goal, "goal", robot, toml),
-        duration=table.duration,
+        scene=_scene(table, robot, toml),
+        start=read_state(table.start, ("start",), robot, toml),
+        goal=read_goal(table.goal, ("goal",), robot, toml),
+        via=read_via(table.via, robot, toml),
+        duration=_duration(table.duration, toml),
+        time_weight=table.time_weight,
         scheme=table.scheme.name,
         intervals=table.scheme.intervals,
         starts=table.starts,
@@ -48,6 +46,23 @@ def load_task(path: str | Path) -> Task:
         limits=read_limits(table.limits, robot, toml),
         name=toml.path.stem,
     )
+
+
+def _scene(table: TaskTable, robot: Robot, toml: TomlText) -> Scene:
+    effects = read_effects(table.effects, robot, toml)
+    try:
+        return Scene(robot, effects=effects, passive=table.passive)
+    except SceneError as wrong:
+        raise toml.error(("passive",), str(wrong)) from None
+
+
+def _duration(given: float | list[float], toml: TomlText) -> float | tuple[float, float]:
+    """A length of time, or the bounds of one."""
+    numbers = given if isinstance(given, list) else [given]
+    if not all(math.isfinite(each) and each > 0 for each in numbers) or numbers != sorted(numbers):
+        expected = TaskTable.model_fields["duration"].description
+        raise toml.error(("duration",), f"`duration` must be {expected}, but it is {given}")
+    return (given[0], given[1]) if isinstance(given, list) else given
 
 
 def _read_text(path: Path) -> TomlText:
@@ -106,67 +121,3 @@ def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
     except HoviError as refused:
         line = toml.line(("robot",))
         raise type(refused)(f"{toml.path}, line {line}: {refused}") from None
-
-
-def _read_end(end: EndTable, name: str, robot: Robot, toml: TomlText) -> State:
-    q = _configuration(end.q, name, robot, toml)
-    v = end.v if not isinstance(end.v, dict) else _velocity(end.v, name, robot, toml)
-    try:
-        robot.check_configuration(q, f"{name}.q")
-    except InputError as wrong:
-        raise toml.error((name, "q"), str(wrong)) from None
-    try:
-        robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")
-    except InputError as wrong:
-        raise toml.error((name, "v"), str(wrong)) from None
-    return State(q, v)
-
-
-def _configuration(
-    given: list[float] | dict[str, Any] | str, end: str, robot: Robot, toml: TomlText
-) -> list[float]:
-    if isinstance(given, str):
-        try:
-            return [float(each) for each in robot.pose(given)]
-        except HoviError as unknown:
-            raise toml.error((end, "q"), str(unknown)) from None
-    return given if isinstance(given, list) else _by_joint(given, end, robot, toml)
-
-
-def _by_joint(by_joint: dict[str, Any], end: str, robot: Robot, toml: TomlText) -> list[float]:
-    left_out = [joint for joint in robot.joint_names if joint not in by_joint]
-    _check_joints(by_joint, (end, "q"), robot, toml)
-    if left_out:
-        raise toml.error((end, "q"), f"`{end}.q` leaves out joint {left_out[0]!r}")
-    q: list[float] = []
-    for joint in robot.joint_names:
-        size = robot.model.joints[robot.model.getJointId(joint)].nq
-        q += _numbers(by_joint[joint], size, (end, "q", joint), toml)
-    return q
-
-
-def _velocity(by_joint: dict[str, Any], end: str, robot: Robot, toml: TomlText) -> list[float]:
-    """Joints that are left out stand still."""
-    _check_joints(by_joint, (end, "v"), robot, toml)
-    v: list[float] = []
-    for joint in robot.joint_names:
-        size = robot.model.joints[robot.model.getJointId(joint)].nv
-        v += _numbers(by_joint.get(joint, [0.0] * size), size, (end, "v", joint), toml)
-    return v
-
-
-def _check_joints(
-    by_joint: dict[str, Any], keys: tuple[str, ...], robot: Robot, toml: TomlText
-) -> None:
-    for joint in by_joint:
-        if joint not in robot.joint_names:
-            sentence = f"`{'.'.join(keys)}` names a joint {joint!r} that the robot does not have; "
-            raise toml.error((*keys, joint), sentence + nearest(joint, robot.joint_names))
-
-
-def _numbers(value: Any, size: int, keys: tuple[str, ...], toml: TomlText) -> list[float]:
-    numbers = [float(each) for each in value] if isinstance(value, list) else [float(value)]
-    if len(numbers) != size:
-        expected = "one number" if size == 1 else f"{size} numbers"
-        raise toml.error(keys, f"`{'.'.join(keys)}` must be {expected}, but it has {len(numbers)}")
-    return numbers

@@ -46,6 +46,13 @@ _BOUNDS = (
 )
 
 
+Duration = Annotated[
+    Annotated[float, Tag("<number>")]
+    | Annotated[list[float], Field(min_length=2, max_length=2), Tag("<list>")],
+    Discriminator(_kind),
+]
+
+
 class Table(BaseModel):
     """A table that takes no other keys and converts nothing."""
 
@@ -63,6 +70,56 @@ class EndTable(Table):
         default=None,
         description="a list of finite numbers, one per velocity, or a table of joint names",
     )
+
+
+_JOINTS = 'a list of joint names, or ["all"]'
+
+
+class StartTable(EndTable):
+    """[start]."""
+
+    free: list[str] = Field(default=[], description=_JOINTS)
+    free_velocity: list[str] = Field(default=[], description=_JOINTS)
+
+
+Direction = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class AxisTable(Table):
+    """axis of a goal."""
+
+    frame: Direction = Field(description="a list of three finite numbers: a direction in the frame")
+    world: Direction = Field(description="a list of three finite numbers: a direction in the world")
+
+
+class GoalTable(Table):
+    """[goal], or what a table [[via]] asks: a state, or a goal of a frame."""
+
+    q: Configuration | None = Field(
+        default=None,
+        description="a list of finite numbers, one per coordinate, a table of joint names, or the "
+        "name of a pose",
+    )
+    v: Coordinates | None = Field(
+        default=None,
+        description="a list of finite numbers, one per velocity, or a table of joint names",
+    )
+    free: list[str] = Field(default=[], description=_JOINTS)
+    free_velocity: list[str] = Field(default=[], description=_JOINTS)
+    frame: str | None = Field(default=None, description="the name of a frame of the robot")
+    position: Direction | None = Field(default=None, description="a list of three finite numbers")
+    rpy: Direction | None = Field(
+        default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
+    )
+    axis: AxisTable | None = Field(
+        default=None, description="a table with two directions, `frame` and `world`"
+    )
+
+
+class ViaTable(GoalTable):
+    """[[via]]."""
+
+    time: FiniteFloat = Field(gt=0, description="a positive number of seconds")
 
 
 class SchemeTable(Table):
@@ -102,12 +159,21 @@ class TaskTable(Table):
     )
     srdf: str | None = Field(default=None, description="the path of an .srdf relative to this file")
     free_flyer: bool = Field(default=False, description="true or false")
-    duration: FiniteFloat = Field(gt=0, description="a positive number of seconds")
+    passive: list[str] = Field(default=[], description="a list of joint names")
+    duration: Duration = Field(
+        description="a positive number of seconds, or a list [lower, upper] of two"
+    )
+    time_weight: FiniteFloat = Field(
+        default=0.0, ge=0, description="a number, 0 or more: the cost of a second"
+    )
     limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
     starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
     seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
-    start: EndTable = Field(description="a table [start] with q and, if moving, v")
-    goal: EndTable = Field(description="a table [goal] with q and, if moving, v")
+    start: StartTable = Field(description="a table [start] with q and, if moving, v")
+    goal: GoalTable = Field(
+        description="a table [goal] with q and, if moving, v, or with a frame and where it is to be"
+    )
+    via: list[ViaTable] = Field(default=[], description="tables [[via]] with time and a goal")
     scheme: SchemeTable = Field(
         default=SchemeTable(), description="a table [scheme] with name and intervals"
     )

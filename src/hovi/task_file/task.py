@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from hovi.errors import InputError
+from hovi.frame_goal import FrameGoal
+from hovi.goals import Via
 from hovi.limits import Limits, as_limits
 from hovi.scene import Scene
 from hovi.schemes import by_name
@@ -21,8 +23,10 @@ class Task:
     """A planning task, valid once built.
 
     scene: the robot and the effects that act on it.
-    start, goal: the two ends of the motion, q in [rad] or [m], v per second.
-    duration: length of the motion, in [s].
+    start, goal: the two ends of the motion, q in [rad] or [m], v per second; the goal may be one
+        of a frame. via: what the motion passes through.
+    duration: length of the motion, in [s], or the bounds of a free one. time_weight: cost of a
+        second of a free duration.
     scheme: name of the scheme, as in `hovi.schemes.by_name`.
     intervals: number N of intervals of equal length.
     starts: number of guesses that are tried.
@@ -33,18 +37,21 @@ class Task:
 
     scene: Scene
     start: State
-    goal: State
-    duration: float
+    goal: State | FrameGoal
+    duration: float | tuple[float, float]
     scheme: str = "galerkin-2"
     intervals: int = 16
     starts: int = 1
     seed: int = 0
     limits: str | Limits | Mapping[str, Any] = "urdf"
     name: str = "task"
+    via: tuple[Via, ...] = ()
+    time_weight: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse numbers that make no task, limits that do not fit, and unknown schemes."""
-        if not (math.isfinite(self.duration) and self.duration > 0):
+        ends = self.duration if isinstance(self.duration, tuple) else (self.duration,)
+        if not all(math.isfinite(each) and each > 0 for each in ends):
             raise InputError(f"duration must be a positive number of seconds, not {self.duration}.")
         if not 1 <= self.intervals <= MOST_INTERVALS:
             raise InputError(

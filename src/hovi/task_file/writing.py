@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from hovi.example_robots import example_robot
 from hovi.robot_source import RobotSource
 from hovi.srdf import read_srdf_file
 from hovi.task_file.effect_tables import effect_table
+from hovi.task_file.goal_tables import goal_table, state_table, via_table
 from hovi.task_file.limit_tables import limits_value
 from hovi.task_file.task import Task
 from hovi.whole_file import reason, whole_file
@@ -52,7 +53,12 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
         document["srdf"] = _srdf_name(source)
     if source.free_flyer:
         document["free_flyer"] = True
-    document["duration"] = float(task.duration)
+    if task.scene.passive:
+        document["passive"] = list(task.scene.passive)
+    free = isinstance(task.duration, tuple)
+    document["duration"] = _floats(task.duration) if free else float(cast(float, task.duration))
+    if task.time_weight:
+        document["time_weight"] = float(task.time_weight)
     limits = limits_value(task.limits, task.scene.robot)
     if isinstance(limits, str):
         document["limits"] = limits
@@ -60,9 +66,13 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     document["seed"] = task.seed
     if isinstance(limits, dict):
         document["limits"] = _table(limits)
-    for name, state in (("start", task.start), ("goal", task.goal)):
-        q, v = state.on(task.scene.robot, name)
-        document[name] = _table({"q": _floats(q)} | ({"v": _floats(v)} if np.any(v) else {}))
+    document["start"] = _table(state_table(task.start, task.scene.robot, "start"))
+    document["goal"] = _table(goal_table(task.goal, task.scene.robot))
+    if task.via:
+        tables = tomlkit.aot()
+        for via in task.via:
+            tables.append(_table(via_table(via, task.scene.robot)))
+        document["via"] = tables
     document["scheme"] = _table({"name": task.scheme, "intervals": task.intervals})
     if task.scene.effects:
         effects = tomlkit.table(is_super_table=True)

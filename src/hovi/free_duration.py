@@ -1,0 +1,133 @@
+"""The duration of least cost plus weight times duration.
+
+Where the cost J(T) of the motion that solves the problem in time T is least together with w T, its
+derivative is J'(T) = -w: Pontryagin's Hamiltonian is w. The derivative comes exactly from the
+discrete action (see DiscreteLagrangian.duration_derivative), every motion is the guess of the
+next, and the root is bracketed, so that limits and equations need nothing of their own.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hovi.errors import InputError
+from hovi.solver import Solution
+from hovi.trajectory import Trajectory
+
+SolveFor = Callable[[float, "Trajectory | None"], Solution]
+"""The solution for a duration in [s], from a guess or from the first one."""
+
+STRIDE = 1.3
+"""Ratio of two durations while a bracket is looked for."""
+PRECISION = 1e-12
+"""Of the duration, relative."""
+
+
+@dataclass(frozen=True)
+class FreeDuration:
+    """Bounds and weight of a free duration.
+
+    lower, upper: in [s]. weight: w, in cost per [s]; 0 asks for the cost alone.
+    Raises InputError for bounds that do not rise or a weight that is not finite.
+    """
+
+    lower: float
+    upper: float
+    weight: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (0 < self.lower < self.upper < np.inf):
+            raise InputError(
+                f"a free duration is a pair 0 < lower < upper in seconds, got "
+                f"({self.lower}, {self.upper})."
+            )
+        if not (np.isfinite(self.weight) and self.weight >= 0):
+            raise InputError(f"the weight of time must be 0 or more, got {self.weight}.")
+
+    @property
+    def first(self) -> float:
+        """Where the search starts: the geometric mean of the bounds, in [s]."""
+        return float(np.sqrt(self.lower * self.upper))
+
+
+def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
+    """A motion whose duration is a local minimum of cost + w T between the bounds.
+
+    first: a solution for some duration between them; its valley is followed.
+    The cost of the answer includes w T. A motion that is not a minimum is returned as it is.
+    """
+    search = _Search(free, solve, first)
+    best = search.run()
+    T = best.trajectory.duration
+    cost = best.cost + free.weight * T
+    message = f"{best.message} {search.ending} {T:.10g} s."
+    if best.success:
+        message = (
+            f"a minimum of cost {cost:.10g}, {free.weight * T:.6g} of it for time, after "
+            f"{search.steps} steps. {search.ending} {T:.10g} s."
+        )
+    minima = (cost,) if best.success else ()
+    return dataclasses.replace(
+        best, cost=cost, message=message, nit=search.steps, minima=minima, history=()
+    )
+
+
+class _Search:
+    """A bracket by strides from the first duration, then Brent's root of J' + w."""
+
+    def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution) -> None:
+        self.free = free
+        self.solve = solve
+        self.last = first
+        self.steps = first.nit
+        self.ending = "The best duration is"
+
+    def run(self) -> Solution:
+        """The motion at the best duration, or the last one where a solve failed."""
+        T = self.last.trajectory.duration
+        slope = self.slope(self.last)
+        while self.last.success and slope != 0.0:
+            bound = self.free.lower if slope > 0 else self.free.upper
+            if bound == T:
+                self.ending = "The duration is kept at its bound,"
+                return self.last
+            further = T / STRIDE if slope > 0 else T * STRIDE
+            further = float(np.clip(further, self.free.lower, self.free.upper))
+            before, origin = slope, self.last
+            slope = self.at(further)
+            if not self.last.success:
+                self.ending = f"No minimum was found for {further:.6g} s; the duration is"
+                return dataclasses.replace(origin, nit=self.steps)
+            if np.sign(slope) != np.sign(before):
+                return self.between(T, further)
+            T = further
+        return self.last
+
+    def between(self, a: float, b: float) -> Solution:
+        """Brent's method on a bracket; the motion where J' + w vanishes."""
+        known = {b: self.slope(self.last)}
+
+        def slope_at(T: float) -> float:
+            if T not in known:
+                known[T] = self.at(T)
+            return known[T]
+
+        root = brentq(slope_at, a, b, xtol=PRECISION * min(a, b), rtol=4 * np.finfo(float).eps)
+        if self.last.trajectory.duration != root:
+            self.at(float(root))
+        return self.last
+
+    def at(self, T: float) -> float:
+        """Solve for a duration from the last motion; J' + w there."""
+        self.last = self.solve(T, self.last.trajectory)
+        self.steps += self.last.nit
+        return self.slope(self.last)
+
+    def slope(self, solution: Solution) -> float:
+        """J' + w, in cost per [s]."""
+        return solution.duration_derivative + self.free.weight
