@@ -70,7 +70,7 @@ FLOORS = [
     },
     {"multipliers", "stepper", "variational_error", "contradictions", "highlights"},
     {"trajectory_objective"},
-    {"limited_action", "equality_rounds"},
+    {"limited_action", "equality_rounds", "predictor"},
     {"limited_solver"},
     {"solver", "task_file", "simulator"},
     {"finer_solution", "multistart", "free_duration"},

@@ -15,6 +15,7 @@ from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import check_path, regularised
 from hovi.model_files import example
+from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
 from hovi.rigid_body import casadi_functions
 from hovi.robot import Robot
@@ -23,7 +24,7 @@ from hovi.schemes import by_name
 from hovi.solver import Solution, Status, guess_path, solve
 from hovi.state import State
 from hovi.task_file import load_task
-from hovi.trajectory_objective import ActionObjective, follow
+from hovi.trajectory_objective import ActionObjective
 from ipopt_oracle import least_action
 from paper_arm import HANG, REACH_COST, REACH_Q, REACH_V, REST, extremal
 
@@ -561,3 +562,32 @@ def test_a_motion_follows_its_ends_to_first_order(arm_scene: Scene, reach: Solut
         errors.append(np.abs(ahead.q - truth.q).max())
     order = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
     assert order == pytest.approx(2.0, abs=0.3)
+
+
+def test_corrections_bring_a_motion_nearer_than_first_order(
+    arm_scene: Scene, reach: Solution
+) -> None:
+    problem = problem_on(arm_scene, START, State(REACH_Q + 0.05, REACH_V))
+    truth = solve(problem, follow(reach.trajectory.path, problem)).trajectory
+    errors = []
+    for corrections in (0, 1, 6):
+        ahead = follow(reach.trajectory.path, problem, corrections)
+        check_path(ahead, problem.grid, problem.robot)
+        errors.append(np.abs(ahead.q - truth.q).max())
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[2] < 0.02 * errors[0]
+
+
+def test_an_arm_replans_to_a_goal_nearby_in_at_most_four_steps() -> None:
+    task = load_task(example("ur5_reach"))
+    grid = Grid.uniform(task.duration, 16, by_name("galerkin-2"))
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    motion = solve(TrajectoryProblem(ld, task.start, task.goal))
+    home = goal = np.asarray(task.goal.q, dtype=float)
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        direction = random.standard_normal(6) + 40 * (home - goal)
+        goal = goal + 0.05 * direction / np.linalg.norm(direction)
+        motion = motion.replan(goal=goal)
+        assert motion.status is Status.MINIMUM
+        assert motion.nit <= 4

@@ -23,15 +23,18 @@ from hovi.lagrangian import PointTerms
 from hovi.limited_solver import LimitedOutcome, solve_limited
 from hovi.multipliers import Multipliers
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
+from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 from hovi.state import State, as_state
 from hovi.trajectory import Trajectory
-from hovi.trajectory_objective import ActionObjective, follow
+from hovi.trajectory_objective import ActionObjective
 
 Report = Callable[[int, float], None]
 """What is told the number of each step and the least cost so far."""
 
+CORRECTIONS = 6
+"""Quasi-Newton steps that may correct the guess of a motion between other states."""
 DECREASE = 1e-9
 """Relative decrease that the last step but one may predict; the last has the exact Hessian."""
 
@@ -101,7 +104,8 @@ class Solution:
         """The motion between other states, from this one or another as the guess.
 
         Everything that was built is used again, so that this can run in a loop. The guess is
-        where the earlier motion goes to first order, which counts as one of the steps.
+        where the earlier motion goes to first order, which counts as one of the steps, corrected
+        by a few gradients, which do not: see hovi.predictor.
         start, goal: a State, a configuration at rest or the name of a pose; as before when None.
         guess: an earlier answer on the same grid; this one when None.
         options: as for `solve`.
@@ -118,7 +122,7 @@ class Solution:
         path = origin.trajectory.path
         if problem.limited:
             return solve(problem, path, **options)
-        solution = solve(problem, follow(path, problem), **options)
+        solution = solve(problem, follow(path, problem, CORRECTIONS), **options)
         return dataclasses.replace(solution, nit=solution.nit + 1)
 
 

@@ -14,7 +14,6 @@ import numpy.typing as npt
 from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian, Expansion, Jet
 from hovi.grid import DiscretePath
-from hovi.guess import moved
 from hovi.lagrangian import EffortLagrangian, PointTerms
 from hovi.multipliers import Multipliers, Residuals, node_residuals
 from hovi.optimize.band import BandModel
@@ -251,31 +250,3 @@ def _with_forces(terms: list[PointTerms] | None, forces: list[Array]) -> list[Po
         dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
         for term, force in zip(terms, forces, strict=True)
     ]
-
-
-def follow(solved: DiscretePath, problem: TrajectoryProblem) -> DiscretePath:
-    """Where a stationary path goes, to first order, when its boundary data move.
-
-    dx = cubic - H^-1 H cubic, with the cubic that carries the old ends to the new ones and H the
-    action's Hessian at the old path: one Newton step of the equations linearised there. Just the
-    cubic where H is not positive definite.
-
-    solved: a stationary path on the problem's grid, between other ends.
-    """
-    ends = problem.ends(solved.q[[0, -1]], solved.v[[0, -1]])
-    path = moved(solved, problem.grid, ends, problem.robot)
-    if not problem.plain:
-        return path
-    objective = ActionObjective(problem, "tree", problem.structure)
-    model = objective.model(solved, None, None)
-    factor = model.factor(0.0)
-    if factor is None:
-        return path
-    h = problem.grid.steps[:, None]
-    shift = np.zeros_like(model.intervals.gradient)
-    shift[:, 0] = problem.robot.difference(solved.q, path.q)[:-1]
-    shift[:, 1] = h * (path.v - solved.v)[:-1]
-    shift[:, 2:4] = h[:, None] ** 2 * (path.z - solved.z)
-    residual = np.einsum("kijab,kjb->kia", model.intervals.hessian, shift)
-    step = factor.solve(-model.scatter(residual) - model.gradient)
-    return objective.retract(path, step, model)
