@@ -18,8 +18,13 @@ def estimate_error(solution: Solution, frame: str | None = None) -> MotionError 
     Raises InputError for what is no stationary motion, or was planned under limits.
     """
     finer = finer_than(solution)
-    if finer is None:
-        return None
+    return None if finer is None else estimate_against(solution, finer, frame)
+
+
+def estimate_against(
+    solution: Solution, finer: FinerSolution, frame: str | None = None
+) -> MotionError:
+    """The error of a solution from a finer one that is known already; frame as above."""
     costs = solution.cost, finer.cost
     return deviation(solution.trajectory, finer.trajectory, costs, frame)
 

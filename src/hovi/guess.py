@@ -119,8 +119,8 @@ def stretched(trajectory: Trajectory, duration: float) -> Curve:
     stretch = trajectory.duration / duration
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
-        sample = trajectory.sample(np.clip(t * stretch, 0.0, trajectory.duration))
-        return sample.q, sample.v * stretch, sample.a * stretch**2
+        q, v, a = trajectory.jet(np.clip(t * stretch, 0.0, trajectory.duration))
+        return q, v * stretch, a * stretch**2
 
     return curve
 

@@ -28,6 +28,7 @@ class MotionError:
     q, v, tau: of every joint coordinate, shape (N, nv), in [rad], [rad/s] and [N m]; metres and
         newtons for sliding joints.
     tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
+    q_at_nodes, tip_at_nodes: the same at the nodes alone, shape (N + 1, nv) and (N + 1,).
     sliding: which joint coordinates slide, shape (nv,).
     """
 
@@ -36,6 +37,8 @@ class MotionError:
     v: Array = field(repr=False)
     tau: Array = field(repr=False)
     tip: Array = field(repr=False)
+    q_at_nodes: Array = field(repr=False)
+    tip_at_nodes: Array = field(repr=False)
     frame: str
     sliding: npt.NDArray[np.bool_] = field(repr=False)
 
@@ -83,12 +86,16 @@ def deviation(
     k, s = places(trajectory)
     one, other = trajectory.sample_intervals(k, s), _at_places(reference, trajectory, k, s)
     tips = [robot.frame_position(name, q) for q in (one.q, other.q)]
+    tip = np.linalg.norm(tips[0] - tips[1], axis=1)
+    q = np.abs(robot.difference(other.q, one.q))
     return MotionError(
         relative_difference(*costs),
-        _by_interval(trajectory, np.abs(robot.difference(other.q, one.q))),
+        _by_interval(trajectory, q),
         _by_interval(trajectory, np.abs(one.v - other.v)),
         _by_interval(trajectory, np.abs(one.tau - other.tau)),
-        _by_interval(trajectory, np.linalg.norm(tips[0] - tips[1], axis=1)),
+        _by_interval(trajectory, tip),
+        _at_nodes(trajectory, q),
+        _at_nodes(trajectory, tip),
         name,
         sliding_coordinates(robot),
     )
@@ -134,6 +141,12 @@ def _by_interval(trajectory: Trajectory, errors: Array) -> Array:
     """The largest of each interval from values at its places."""
     N = trajectory.grid.intervals
     return np.asarray(errors.reshape(N, -1, *errors.shape[1:]).max(axis=1))
+
+
+def _at_nodes(trajectory: Trajectory, errors: Array) -> Array:
+    """The values at the nodes from values at the places."""
+    by_place = errors.reshape(trajectory.grid.intervals, -1, *errors.shape[1:])
+    return np.concatenate([by_place[:, 0], by_place[-1:, -1]])
 
 
 def _robot_of(trajectory: Trajectory, reference: Trajectory) -> Robot:

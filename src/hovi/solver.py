@@ -27,6 +27,7 @@ from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 from hovi.state import State, as_state
+from hovi.tolerance import Accuracy
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
 
@@ -60,6 +61,7 @@ class Solution:
     trajectory: the motion, the best so far where no minimum was found.
     cost: the discrete action of L~, 1/2 integral |tau|^2 where nothing else was asked.
     error_estimate: relative, in the cost; None where there is none.
+    accuracy: what was reached of a tolerance; None where none was asked for.
     nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 where it
         was not counted.
     minima: costs of all minima that a multi-start found, ascending.
@@ -78,6 +80,7 @@ class Solution:
     n_neg: int
     problem: TrajectoryProblem | None = field(default=None, repr=False)
     error_estimate: float | None = None
+    accuracy: Accuracy | None = field(default=None, repr=False)
     minima: tuple[float, ...] = ()
     history: tuple[Iteration, ...] = field(default=(), repr=False)
     setup_seconds: float = 0.0

@@ -117,6 +117,10 @@ class Trajectory:
         """q alone, shape (M, nq), as `sample` gives it: cheap, since no torque is computed."""
         return self._interpolate(*self._locate(t))[0]
 
+    def jet(self, t: npt.ArrayLike) -> tuple[Array, Array, Array]:
+        """q, v and a as `sample` gives them, without torques."""
+        return self._interpolate(*self._locate(t))
+
     def sample_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> Sample:
         """q, v, a and tau in given intervals, both limits at a node within reach.
 

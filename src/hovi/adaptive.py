@@ -1,0 +1,250 @@
+"""Solve to a tolerance: start coarse, estimate the error, refine where it is, and stop in time."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.error_estimate import estimate_against
+from hovi.finer_solution import FinerSolution, finer_solution
+from hovi.grid import DiscretePath, Grid
+from hovi.guess import path_on_grid, stretched
+from hovi.motion_error import relative_difference
+from hovi.problem import TrajectoryProblem
+from hovi.refinement import Demand, decay, refined
+from hovi.solver import Report, Solution, Status, solve
+from hovi.tolerance import Accuracy, Quantity, Round, Tolerance
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+
+ROUNDS = 14
+"""Grids that are tried."""
+AIM = 0.3
+"""Share of the tolerance that a refined grid aims at."""
+ACCEPTED = 0.8
+"""Share of the tolerance that an estimated error may have."""
+CANCELLED = 20.0
+"""How many times the tolerance the contributions of the intervals may sum up to where they
+cancel in the cost."""
+FLOOR = 2e-14
+"""Relative error of the cost that rounding leaves: nothing smaller is asked of it."""
+STALLED = 2
+"""Rounds without a smaller error after which rounding, or the motion, sets the limit."""
+MOST_POINTS = 400_000
+"""Quadrature points of the finest grid."""
+
+
+def solve_to_tolerance(
+    problem: TrajectoryProblem,
+    tolerance: Tolerance,
+    guess: str | Trajectory | DiscretePath = "cubic",
+    *,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    report: Report | None = None,
+) -> Solution:
+    """A minimum whose estimated error is within a tolerance, on a grid that is just fine enough.
+
+    problem: on the grid to begin with. guess, max_iterations, report: as for `solve`.
+    time_limit: of everything, in [s].
+    The solution's `accuracy` says what was reached, and why not more where it was not.
+    """
+    began = time.monotonic()
+    deadline = None if time_limit is None else began + time_limit
+    search = _Search(tolerance, max_iterations, deadline, report)
+    return search.run(problem, guess)
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A solution with what is known of its error."""
+
+    solution: Solution
+    finer: FinerSolution | None
+    error: float
+    whole: float
+    """As the error, but for contributions to the cost that do not cancel."""
+
+
+@dataclass(eq=False)
+class _Search:
+    """The rounds of a search, which share budgets."""
+
+    tolerance: Tolerance
+    max_iterations: int
+    deadline: float | None
+    report: Report | None
+    rounds: list[Round] = field(default_factory=list)
+    nit: int = 0
+
+    def run(
+        self, problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath
+    ) -> Solution:
+        """Refine until the error is small enough, or something ends it."""
+        best = candidate = self._candidate(problem, guess)
+        stalled, reason = 0, ""
+        while not self._enough(candidate):
+            reason = self._ended(candidate, stalled)
+            if reason:
+                break
+            candidate = self._next(candidate)
+            smaller = candidate.error < 0.5 * best.error
+            stalled = 0 if smaller or np.isnan(best.error) else stalled + 1
+            if _better(candidate, best):
+                best = candidate
+        return self._finished(candidate if self._enough(candidate) else best, reason)
+
+    def _candidate(
+        self, problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath
+    ) -> _Candidate:
+        """Solve and estimate."""
+        began = time.perf_counter()
+        solution = solve(
+            problem,
+            guess,
+            max_iterations=self.max_iterations,
+            time_limit=self._left(),
+            report=self.report,
+        )
+        self.nit += solution.nit
+        finer = None
+        if solution.success:
+            finer = finer_solution(problem, solution.trajectory.path, solution.cost)
+        error, whole = self._measure(solution, finer)
+        grid = problem.grid
+        points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
+        seconds = time.perf_counter() - began
+        self.rounds.append(
+            Round(grid.intervals, points, solution.cost, error, solution.nit, seconds)
+        )
+        return _Candidate(solution, finer, error, whole)
+
+    def _measure(self, solution: Solution, finer: FinerSolution | None) -> tuple[float, float]:
+        if finer is None:
+            return np.nan, np.nan
+        if self.tolerance.quantity is Quantity.COST:
+            error = relative_difference(solution.cost, finer.cost)
+            return error, max(error, _contributions(finer).sum())
+        estimate = estimate_against(solution, finer, self.tolerance.frame)
+        error = self.tolerance.measure(estimate)
+        return error, error
+
+    def _enough(self, candidate: _Candidate) -> bool:
+        size = self.tolerance.size
+        return candidate.error <= ACCEPTED * size and candidate.whole <= CANCELLED * size
+
+    def _ended(self, candidate: _Candidate, stalled: int) -> str:
+        """Why no finer grid is tried, or ""."""
+        solution = candidate.solution
+        if not solution.success:
+            return f"the last solve ended in {solution.status}"
+        if self.deadline is not None and time.monotonic() > self.deadline:
+            return "the time limit was reached"
+        cost = self.tolerance.quantity is Quantity.COST
+        if stalled >= STALLED or (cost and candidate.whole <= FLOOR):
+            return "rounding leaves no smaller error"
+        if len(self.rounds) >= ROUNDS:
+            return f"{ROUNDS} grids were tried"
+        if self.rounds[-1].points > MOST_POINTS:
+            return f"a grid has {self.rounds[-1].points:,} points"
+        return ""
+
+    def _next(self, candidate: _Candidate) -> _Candidate:
+        """The next grid, from the finer solution."""
+        problem = candidate.solution.problem
+        assert problem is not None
+        finer = candidate.finer
+        if finer is None:
+            grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
+            return self._candidate(problem.on(grid), candidate.solution.trajectory)
+        rho = decay(finer.problem.grid, finer.path)
+        grid = refined(problem.grid, rho, self._demands(candidate, finer))
+        fine = problem.on(grid)
+        return self._candidate(fine, moved_to(finer, fine))
+
+    def _demands(self, candidate: _Candidate, finer: FinerSolution) -> list[Demand]:
+        """What each interval has to contribute."""
+        contributions = _contributions(finer)
+        N, aim = len(contributions), AIM * self.tolerance.size
+        if self.tolerance.quantity is Quantity.COST:
+            short = max(1.0, candidate.error / max(contributions.sum(), 1e-300))
+            return [Demand(aim / (N * np.maximum(short * contributions, 1e-300)), 2)]
+        return self._demands_on_curve(candidate, finer, contributions)
+
+    def _demands_on_curve(
+        self, candidate: _Candidate, finer: FinerSolution, contributions: Array
+    ) -> list[Demand]:
+        """Of the curve where it is off between good nodes, of everything where the nodes are."""
+        estimate = estimate_against(candidate.solution, finer, self.tolerance.frame)
+        if self.tolerance.quantity is Quantity.FRAME:
+            along, ends = estimate.tip, estimate.tip_at_nodes
+        else:
+            along, ends = estimate.q.max(axis=1), estimate.q_at_nodes.max(axis=1)
+        aim = AIM * self.tolerance.size
+        nearby = np.maximum(ends[:-1], ends[1:])
+        own = np.where(along > 3 * nearby, along, 0.0)
+        nodes = aim / max(float(ends.max()), 1e-300)
+        share = contributions * len(contributions) / max(contributions.sum(), 1e-300)
+        return [
+            Demand(aim / np.maximum(own, 1e-300), 1),
+            Demand(nodes / np.maximum(share, 1e-300), 2),
+        ]
+
+    def _finished(self, chosen: _Candidate, reason: str) -> Solution:
+        """The solution with what is known of its accuracy."""
+        solution, finer = chosen.solution, chosen.finer
+        estimate = None
+        if finer is not None:
+            estimate = estimate_against(solution, finer, self.tolerance.frame)
+        elif not reason or solution.success:
+            reason = reason or "no finer solution was found nearby"
+        reached = chosen.error <= self.tolerance.size
+        accuracy = Accuracy(
+            self.tolerance,
+            chosen.error,
+            estimate,
+            reached,
+            "" if reached else reason,
+            tuple(self.rounds),
+        )
+        return dataclasses.replace(
+            solution,
+            nit=self.nit,
+            error_estimate=None if estimate is None else estimate.cost,
+            accuracy=accuracy,
+        )
+
+    def _left(self) -> float | None:
+        return None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+
+
+def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
+    """The finer solution's curve on another grid of the same problem."""
+    grid, path = problem.grid, finer.path
+    if np.array_equal(grid.steps, finer.problem.grid.steps):
+        inner = np.zeros((grid.intervals, grid.inner_modes, path.v.shape[1]))
+        for scheme, index in grid.groups:
+            r = min(scheme.inner_modes, path.inner.shape[1])
+            inner[index, :r] = path.inner[index, :r]
+        return DiscretePath(path.q, path.v, path.z, inner)
+    curve = stretched(finer.trajectory, grid.duration)
+    return path_on_grid(curve, grid, problem.boundary, problem.robot)
+
+
+def _contributions(finer: FinerSolution) -> Array:
+    """What each interval adds to the error of the cost, relative, without its sign."""
+    return np.asarray(np.abs(finer.gains) / max(abs(finer.cost), np.finfo(float).tiny))
+
+
+def _better(one: _Candidate, other: _Candidate) -> bool:
+    """Whether a solution is to be preferred: a minimum to none, then the smaller error."""
+    if one.solution.success != other.solution.success:
+        return one.solution.success
+    if np.isnan(other.error):
+        return True
+    return one.error < other.error
