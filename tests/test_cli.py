@@ -147,6 +147,31 @@ def test_split_intervals_are_counted(run: Run) -> None:
     assert fields["intervals"] > 16
 
 
+def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
+    code, out, _ = run("plan", "ur5_reach", "--tolerance", "1e-6", "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert 0 < told["error_estimate"] <= 1e-6
+    assert told["tolerance_reached"] is True
+    assert told["errors"]["cost"] == pytest.approx(told["error_estimate"])
+    assert told["errors"]["frame"] == "tool0"
+    assert told["grids"][-1]["intervals"] == told["intervals"]
+    assert told["grids"][-1]["error"] < 1e-2 * told["grids"][0]["error"]
+    _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm")
+    assert re.search(r"estimated error \S+ mm at the tip, 0.1 mm at the tip asked for", out)
+    assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
+
+
+def test_a_scene_may_name_a_tolerance(run: Run, tmp_path: Path) -> None:
+    path = scene(tmp_path, "tolerance = '0.01 deg'\n" + REACH)
+    told = json.loads(run("plan", path, "--json")[1])
+    assert told["tolerance"] == "0.01 deg"
+    assert told["errors"]["q_rad"] <= np.deg2rad(0.01)
+    told = json.loads(run("plan", path, "--intervals", "8", "--json")[1])
+    assert (told["scheme"], told["intervals"], told["error_estimate"]) == ("galerkin-2", 8, None)
+    assert "tolerance 0.01 deg" in run("info", path)[1]
+
+
 def test_limits_are_overridden_by_a_word(run: Run) -> None:
     fields = only_object(run("plan", "ur5_reach_limited", "--limits", "none", "--json")[1])
     assert fields["limits"] is None
@@ -312,6 +337,7 @@ SCENES = {
     "N = 0": ("intervals = 16", "intervals = 0", ["intervals"]),
     "unknown effect": ("[effects.gravity]", "[effects.gravitas]", ["'gravity'"]),
     "unknown scheme": ("galerkin-2", "galerkin-two", ["'galerkin-2'"]),
+    "unit": ("duration", 'tolerance = "1 mmm"\nduration', ["tolerance", "'mm'", "line"]),
     "degenerate scheme": ("galerkin-2", "mean-difference", ["mean-difference"]),
     "unknown key": ("intervals =", "intervalls =", ["'intervals'", "line 17"]),
 }
@@ -327,7 +353,12 @@ def test_a_bad_scene_is_refused(mistake: str, run: Run, tmp_path: Path) -> None:
 COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "no such scene": (["plan", "nowhere.toml"], ["nowhere.toml"]),
     "nearly a shipped scene": (["plan", "two_link_swingup"], ["'two_link_swing_up'"]),
-    "tolerance": (["plan", "two_link_reach", "--tolerance", "1e-6"], ["not available yet"]),
+    "tolerance": (["plan", "two_link_reach", "--tolerance", "1 mmm"], ["'1 mmm'", "'mm'"]),
+    "frame": (["plan", "two_link_reach", "--tolerance", "1 mm at foot"], ["'foot'"]),
+    "two ways": (
+        ["plan", "two_link_reach", "--tolerance", "1e-6", "--intervals", "8"],
+        ["--tolerance chooses"],
+    ),
     "N = 0": (["plan", "two_link_reach", "--intervals", "0"], ["intervals"]),
     "no starts": (["plan", "two_link_reach", "--starts", "0"], ["starts"]),
     "scheme": (["plan", "two_link_reach", "--scheme", "galerkn-2"], ["'galerkin-2'"]),

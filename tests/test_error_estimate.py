@@ -13,7 +13,6 @@ from hovi.error_estimate import estimate_error, finer_than
 from hovi.errors import InputError
 from hovi.finer_solution import MORE_MODES, finer_grid
 from hovi.grid import Grid
-from hovi.limits import as_limits
 from hovi.motion_error import MotionError, deviation, relative_difference, sliding_coordinates
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot, load_robot
@@ -210,14 +209,6 @@ def test_what_is_not_a_minimum_has_no_estimate(reach_reference: Solution) -> Non
     unknown = dataclasses.replace(reach_reference, problem=None)
     with pytest.raises(InputError, match="does not know its problem"):
         estimate_error(unknown)
-
-
-def test_limits_are_not_passed_over_in_silence(arm_scene: Scene, reach_reference: Solution) -> None:
-    limits = as_limits(arm_scene.robot, {"base": "none", "v": 50.0})
-    assert reach_reference.problem is not None
-    limited = dataclasses.replace(reach_reference.problem, limits=limits)
-    with pytest.raises(InputError, match="limits"):
-        estimate_error(dataclasses.replace(reach_reference, problem=limited))
 
 
 def test_schemes_with_no_room_for_more_modes_are_refused() -> None:

@@ -360,3 +360,10 @@ def test_an_end_may_be_the_name_of_a_pose(folder: Path, tmp_path: Path) -> None:
     )
     assert "did you mean 'ready'?" in sentence
     assert "line" in sentence
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, "0.1 mm", "0.01 deg"])
+def test_a_tolerance_survives_a_file(folder: Path, tolerance: float | str) -> None:
+    task = load_task(write(folder, REACH))
+    wanted = dataclasses.replace(task, tolerance=tolerance)
+    assert load_task(save_task(wanted, folder / "again.toml")).tolerance == tolerance

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.error_estimate import estimate_against
-from hovi.finer_solution import FinerSolution, finer_solution
-from hovi.grid import DiscretePath, Grid
-from hovi.guess import path_on_grid, stretched
+from hovi.error_estimate import estimate_against, finer_than
+from hovi.finer_solution import FinerSolution
+from hovi.grid import DiscretePath
+from hovi.guess import stretched
 from hovi.motion_error import relative_difference
 from hovi.problem import TrajectoryProblem
 from hovi.refinement import Demand, decay, refined
-from hovi.solver import Report, Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.tolerance import Accuracy, Quantity, Round, Tolerance
 from hovi.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
+Told = Callable[[Round], None]
+"""What is told how far a search is."""
 
 ROUNDS = 14
 """Grids that are tried."""
@@ -31,8 +35,8 @@ ACCEPTED = 0.8
 CANCELLED = 20.0
 """How many times the tolerance the contributions of the intervals may sum up to where they
 cancel in the cost."""
-FLOOR = 2e-14
-"""Relative error of the cost that rounding leaves: nothing smaller is asked of it."""
+ROUNDING = 1e-14
+"""Relative error of the cost that rounding may leave: no smaller one is claimed."""
 STALLED = 2
 """Rounds without a smaller error after which rounding, or the motion, sets the limit."""
 MOST_POINTS = 400_000
@@ -46,18 +50,33 @@ def solve_to_tolerance(
     *,
     max_iterations: int = 500,
     time_limit: float | None = None,
-    report: Report | None = None,
+    told: Told | None = None,
 ) -> Solution:
     """A minimum whose estimated error is within a tolerance, on a grid that is just fine enough.
 
-    problem: on the grid to begin with. guess, max_iterations, report: as for `solve`.
-    time_limit: of everything, in [s].
+    problem: on the grid to begin with. guess, max_iterations: as for `solve`.
+    time_limit: of everything, in [s]. told: called with every grid that was solved on.
     The solution's `accuracy` says what was reached, and why not more where it was not.
     """
     began = time.monotonic()
-    deadline = None if time_limit is None else began + time_limit
-    search = _Search(tolerance, max_iterations, deadline, report)
-    return search.run(problem, guess)
+    first = solve(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
+    left = None if time_limit is None else max(time_limit - (time.monotonic() - began), 0.0)
+    return refine_to_tolerance(
+        first, tolerance, max_iterations=max_iterations, time_limit=left, told=told
+    )
+
+
+def refine_to_tolerance(
+    solution: Solution,
+    tolerance: Tolerance,
+    *,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    told: Told | None = None,
+) -> Solution:
+    """The same motion within a tolerance; arguments as for `solve_to_tolerance`."""
+    deadline = None if time_limit is None else time.monotonic() + time_limit
+    return _Search(tolerance, max_iterations, deadline, told).run(solution)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,15 +97,12 @@ class _Search:
     tolerance: Tolerance
     max_iterations: int
     deadline: float | None
-    report: Report | None
+    told: Told | None
     rounds: list[Round] = field(default_factory=list)
-    nit: int = 0
 
-    def run(
-        self, problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath
-    ) -> Solution:
+    def run(self, solution: Solution) -> Solution:
         """Refine until the error is small enough, or something ends it."""
-        best = candidate = self._candidate(problem, guess)
+        best = candidate = self._estimated(solution)
         stalled, reason = 0, ""
         while not self._enough(candidate):
             reason = self._ended(candidate, stalled)
@@ -99,38 +115,32 @@ class _Search:
                 best = candidate
         return self._finished(candidate if self._enough(candidate) else best, reason)
 
-    def _candidate(
-        self, problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath
-    ) -> _Candidate:
+    def _solved(self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath) -> _Candidate:
         """Solve and estimate."""
+        steps, left = self.max_iterations, self._left()
+        return self._estimated(solve(problem, guess, max_iterations=steps, time_limit=left))
+
+    def _estimated(self, solution: Solution) -> _Candidate:
+        """A solution with what can be found out about its error."""
         began = time.perf_counter()
-        solution = solve(
-            problem,
-            guess,
-            max_iterations=self.max_iterations,
-            time_limit=self._left(),
-            report=self.report,
-        )
-        self.nit += solution.nit
-        finer = None
-        if solution.success:
-            finer = finer_solution(problem, solution.trajectory.path, solution.cost)
+        finer = finer_than(solution) if solution.success else None
         error, whole = self._measure(solution, finer)
-        grid = problem.grid
+        grid = solution.trajectory.grid
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
-        seconds = time.perf_counter() - began
-        self.rounds.append(
-            Round(grid.intervals, points, solution.cost, error, solution.nit, seconds)
-        )
+        seconds = solution.solve_seconds + time.perf_counter() - began
+        done = Round(grid.intervals, points, solution.cost, error, solution.nit, seconds)
+        self.rounds.append(done)
+        if self.told is not None:
+            self.told(done)
         return _Candidate(solution, finer, error, whole)
 
     def _measure(self, solution: Solution, finer: FinerSolution | None) -> tuple[float, float]:
         if finer is None:
             return np.nan, np.nan
         if self.tolerance.quantity is Quantity.COST:
-            error = relative_difference(solution.cost, finer.cost)
-            return error, max(error, _contributions(finer).sum())
-        estimate = estimate_against(solution, finer, self.tolerance.frame)
+            error = _error_of_cost(finer)
+            return error, max(error, float(_contributions(finer).sum()))
+        estimate = estimate_against(solution, finer, self._frame)
         error = self.tolerance.measure(estimate)
         return error, error
 
@@ -146,7 +156,7 @@ class _Search:
         if self.deadline is not None and time.monotonic() > self.deadline:
             return "the time limit was reached"
         cost = self.tolerance.quantity is Quantity.COST
-        if stalled >= STALLED or (cost and candidate.whole <= FLOOR):
+        if stalled >= STALLED or (cost and candidate.whole <= ROUNDING):
             return "rounding leaves no smaller error"
         if len(self.rounds) >= ROUNDS:
             return f"{ROUNDS} grids were tried"
@@ -161,11 +171,11 @@ class _Search:
         finer = candidate.finer
         if finer is None:
             grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
-            return self._candidate(problem.on(grid), candidate.solution.trajectory)
+            return self._solved(problem.on(grid), candidate.solution.trajectory)
         rho = decay(finer.problem.grid, finer.path)
         grid = refined(problem.grid, rho, self._demands(candidate, finer))
         fine = problem.on(grid)
-        return self._candidate(fine, moved_to(finer, fine))
+        return self._solved(fine, moved_to(finer, fine))
 
     def _demands(self, candidate: _Candidate, finer: FinerSolution) -> list[Demand]:
         """What each interval has to contribute."""
@@ -180,7 +190,7 @@ class _Search:
         self, candidate: _Candidate, finer: FinerSolution, contributions: Array
     ) -> list[Demand]:
         """Of the curve where it is off between good nodes, of everything where the nodes are."""
-        estimate = estimate_against(candidate.solution, finer, self.tolerance.frame)
+        estimate = estimate_against(candidate.solution, finer, self._frame)
         if self.tolerance.quantity is Quantity.FRAME:
             along, ends = estimate.tip, estimate.tip_at_nodes
         else:
@@ -198,26 +208,34 @@ class _Search:
     def _finished(self, chosen: _Candidate, reason: str) -> Solution:
         """The solution with what is known of its accuracy."""
         solution, finer = chosen.solution, chosen.finer
-        estimate = None
-        if finer is not None:
-            estimate = estimate_against(solution, finer, self.tolerance.frame)
-        elif not reason or solution.success:
-            reason = reason or "no finer solution was found nearby"
+        if finer is None and not reason:
+            reason = "no finer solution was found nearby"
         reached = chosen.error <= self.tolerance.size
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,
-            estimate,
             reached,
             "" if reached else reason,
             tuple(self.rounds),
+            None if finer is None else partial(estimate_against, solution, finer, self._frame),
         )
+        known = None if finer is None else _error_of_cost(finer)
+        steps = sum(done.nit for done in self.rounds)
+        message = solution.message
+        if solution.success:
+            message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"
+            message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
         return dataclasses.replace(
             solution,
-            nit=self.nit,
-            error_estimate=None if estimate is None else estimate.cost,
+            message=f"{message.removesuffix('.')}; {accuracy}",
+            nit=steps,
+            error_estimate=known,
             accuracy=accuracy,
         )
+
+    @property
+    def _frame(self) -> str | None:
+        return self.tolerance.frame
 
     def _left(self) -> float | None:
         return None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
@@ -233,7 +251,13 @@ def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
             inner[index, :r] = path.inner[index, :r]
         return DiscretePath(path.q, path.v, path.z, inner)
     curve = stretched(finer.trajectory, grid.duration)
-    return path_on_grid(curve, grid, problem.boundary, problem.robot)
+    return problem.path(curve)
+
+
+def _error_of_cost(finer: FinerSolution) -> float:
+    """Relative; 0 where there is no cost, and else not below rounding."""
+    error = relative_difference(finer.known, finer.cost)
+    return max(error, ROUNDING) if finer.known != 0 else error
 
 
 def _contributions(finer: FinerSolution) -> Array:

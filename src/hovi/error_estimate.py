@@ -15,7 +15,7 @@ def estimate_error(solution: Solution, frame: str | None = None) -> MotionError 
     whose own error is smaller by orders where the motion is resolved.
     frame: whose origin is followed, by default the robot's tip_frame.
     None where no such solution was found nearby: nothing is known of the error then.
-    Raises InputError for what is no stationary motion, or was planned under limits.
+    Raises InputError for what is no minimum.
     """
     finer = finer_than(solution)
     return None if finer is None else estimate_against(solution, finer, frame)
@@ -25,7 +25,7 @@ def estimate_against(
     solution: Solution, finer: FinerSolution, frame: str | None = None
 ) -> MotionError:
     """The error of a solution from a finer one that is known already; frame as above."""
-    costs = solution.cost, finer.cost
+    costs = finer.known, finer.cost
     return deviation(solution.trajectory, finer.trajectory, costs, frame)
 
 
@@ -36,6 +36,4 @@ def finer_than(solution: Solution) -> FinerSolution | None:
         raise InputError("this solution does not know its problem; plan again instead.")
     if not solution.success:
         raise InputError(f"errors of minima are estimated, and this ended in {solution.status}.")
-    if problem.limited:
-        raise InputError("errors of motions under limits are not estimated this way.")
-    return finer_solution(problem, solution.trajectory.path, solution.cost)
+    return finer_solution(problem, solution.trajectory.path)

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from hovi.discrete_lagrangian import Expansion
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
+from hovi.motion_error import places
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.problem import TrajectoryProblem
 from hovi.schemes import Scheme, galerkin
@@ -42,9 +43,10 @@ ROUNDING = 1e-15
 
 @dataclass(frozen=True, eq=False)
 class FinerSolution:
-    """A solution of a problem on a finer grid of the same intervals.
+    """A solution of a problem on a finer grid.
 
-    problem: on the finer grid. path: its solution. cost: its discrete action.
+    problem: on the finer grid; its intervals may be fewer or more where limits split them.
+    path: its solution. cost: its discrete action. known: that of the coarser solution.
     gains: L_d of every interval of the coarser solution less what it would be with the finer
         interval's modes between the same end data, shape (N,). Their sum is the difference of
         costs to first order: what an interval contributes to the error.
@@ -53,36 +55,59 @@ class FinerSolution:
     problem: TrajectoryProblem
     path: DiscretePath
     cost: float
+    known: float
     gains: Array
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion, without its momenta, which nothing here needs."""
-        momenta = np.zeros((self.path.intervals + 1, 2, self.path.v.shape[1]))
-        return Trajectory(self.problem.grid, self.path, momenta, self.problem.scene)
+        """The motion, for sampling: without its momenta."""
+        return motion(self.problem, self.path)
 
 
-def finer_solution(
-    problem: TrajectoryProblem, path: DiscretePath, cost: float
-) -> FinerSolution | None:
-    """The finer solution next to a stationary path of a problem without limits.
-
-    cost: the discrete action of the path. None where none was found nearby.
-    """
+def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
+    """The finer solution next to a solution of a problem; None where none was found nearby."""
     fine = problem.on(finer_grid(problem.grid))
-    objective = ActionObjective(fine)
     start = prolonged(path, fine.grid)
+    if problem.limited or problem.constrained:
+        return _solved(fine, start, problem, path)
+    objective = ActionObjective(fine)
     first = objective.model(start, None, None)
-    gains = _gains(objective.expansion, problem, path)
+    values = problem.ld.values(path)
+    gains, known = _gains(objective.expansion, values), float(np.sum(values))
     found = _newton(objective, start, first)
     if found is not None:
         value = objective.value(found)
         if np.isfinite(value):
-            return FinerSolution(fine, found, value, gains)
+            return FinerSolution(fine, found, value, known, gains)
     solution = solve(fine, start)
     if not solution.success:
         return None
-    return FinerSolution(fine, solution.trajectory.path, solution.cost, gains)
+    return FinerSolution(fine, solution.trajectory.path, solution.cost, known, gains)
+
+
+def _solved(
+    fine: TrajectoryProblem, start: DiscretePath, problem: TrajectoryProblem, path: DiscretePath
+) -> FinerSolution | None:
+    """By the optimiser, which may split intervals for limits.
+
+    Gains are then half the integral of the squared difference of the torques.
+    """
+    solution = solve(fine, start)
+    if not solution.success or solution.problem is None:
+        return None
+    coarse, finer = motion(problem, path), solution.trajectory
+    k, s = places(coarse)
+    t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, coarse.duration)
+    squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
+    gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
+    cost = problem.ld.action(path)
+    return FinerSolution(solution.problem, finer.path, solution.cost, cost, gains)
+
+
+def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
+    """A path as a trajectory, without its momenta, for sampling."""
+    momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+    return Trajectory(problem.grid, path, momenta, problem.scene)
 
 
 def _newton(
@@ -141,7 +166,7 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     return DiscretePath(path.q, path.v, path.z, inner)
 
 
-def _gains(expansion: Expansion, problem: TrajectoryProblem, path: DiscretePath) -> Array:
+def _gains(expansion: Expansion, values: Array) -> Array:
     """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
     N, m, n = expansion.gradient.shape
     modes = m - 4
@@ -151,4 +176,4 @@ def _gains(expansion: Expansion, problem: TrajectoryProblem, path: DiscretePath)
     absent = np.asarray(~H.any(axis=2))
     H = H + absent[:, :, None] * np.eye(modes * n)
     drop = 0.5 * np.einsum("ki,ki->k", g, np.linalg.solve(H, g[:, :, None])[:, :, 0])
-    return np.asarray(problem.ld.values(path) - expansion.values + drop)
+    return np.asarray(values - expansion.values + drop)

@@ -6,11 +6,13 @@ import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.adaptive import refine_to_tolerance
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
@@ -23,6 +25,7 @@ from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
 from hovi.solver import Solution, Status, guess_path, solve
 from hovi.state import State, as_state
+from hovi.tolerance import Round, Tolerance
 from hovi.trajectory import Trajectory
 
 COARSE_INTERVALS = 60
@@ -43,6 +46,7 @@ def plan(
     via: Sequence[Via] = (),
     scheme: str | Scheme = "galerkin-2",
     intervals: int = 16,
+    tolerance: float | str | Tolerance | None = None,
     limits: str | Limits | Mapping[str, Any] = "urdf",
     starts: int = 1,
     seed: int = 0,
@@ -62,6 +66,10 @@ def plan(
     time_weight: cost per [s] of a duration that is free.
     via: what the motion passes through at given times.
     scheme, intervals: how the action is discretised.
+    tolerance: the largest error over the whole motion, in place of a scheme: a number is relative
+        in the cost, "0.1 mm" at the robot's tip_frame, "0.1 mm at tool0" at another frame,
+        "0.01 deg" or "1e-4 rad" in the joints. The grid to begin with has up to 60 of the
+        `intervals`; the solution's `accuracy` says what was reached.
     limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
         "none", a Limits, or a mapping as as_limits takes it.
     starts: number of solves from seeded random perturbations; all minima found are refined on
@@ -80,10 +88,17 @@ def plan(
         processes = _count("processes", processes, 1)
     if time_limit is not None and not time_limit > 0:
         raise InputError(f"time_limit must be positive, in seconds, got {time_limit}.")
+    wanted = None if tolerance is None else Tolerance.of(tolerance, scene.robot)
     table = by_name(scheme) if isinstance(scheme, str) else scheme
     free = _free(duration, time_weight, via)
+    if wanted is not None and free is not None:
+        raise InputError(
+            "a tolerance is for a given duration: find the best duration first, and plan with it."
+        )
     T = duration if free is None else free.first
     passed = tuple(sorted(via, key=lambda each: each.time))
+    if wanted is not None:
+        table, intervals = galerkin(2), min(_count("intervals", intervals, 1), COARSE_INTERVALS)
     grid = Grid.uniform(cast(float, T), intervals, table)
     fine = Job(
         scene,
@@ -96,13 +111,14 @@ def plan(
         passed,
     )
     ends = None if time_limit is None else time.monotonic() + time_limit
-    search = _Search(fine, processes or default_processes(), ends, progress or _silent, free)
+    chatter = progress or _silent
+    search = _Search(fine, processes or default_processes(), ends, chatter, free, wanted)
     problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
     return dataclasses.replace(
         best,
-        problem=_on_grid_of(problem, best),
+        problem=best.problem or _on_grid_of(problem, best),
         minima=minima,
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
@@ -118,6 +134,7 @@ class _Search:
     deadline: float | None
     progress: Progress
     free: FreeDuration | None = None
+    tolerance: Tolerance | None = None
 
     def run(
         self, guess: str | Trajectory, starts: int, seed: int
@@ -128,7 +145,9 @@ class _Search:
         first = guess_path(job.problem(), guess)
         search = explore(pool, first, starts, seed, self.progress)
         found = search.minima
-        if job is not self.fine:
+        if self.tolerance is not None and not search.interrupted:
+            found = self._refine_to(self.tolerance, found)
+        elif job is not self.fine:
             found = _on_coarse_grid(found[:1]) if search.interrupted else self._refine(found)
         if self.free is not None and not search.interrupted:
             found = self._freed(self.free, found[:REFINED])
@@ -140,7 +159,7 @@ class _Search:
 
     def _explore_until(self, job: Job) -> float | None:
         """The search's deadline, which leaves time for refining."""
-        if self.deadline is None or job is self.fine:
+        if self.deadline is None or (job is self.fine and self.tolerance is None):
             return self.deadline
         now = time.monotonic()
         return now + EXPLORING * (self.deadline - now)
@@ -160,6 +179,32 @@ class _Search:
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
         pool = Pool(self.fine, self.processes if len(guesses) > 1 else 1, self.deadline)
         return distinct(pool.solve_all(guesses))
+
+    def _refine_to(self, tolerance: Tolerance, found: list[Solution]) -> list[Solution]:
+        """Minima to a tolerance, each on a grid of its own."""
+        problem, refined = self.fine.problem(), []
+        for i, solution in enumerate(found[:REFINED]):
+            if i > 0 and self.deadline is not None and time.monotonic() > self.deadline:
+                break
+            which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
+            known = dataclasses.replace(solution, problem=_on_grid_of(problem, solution))
+            refined.append(
+                refine_to_tolerance(
+                    known,
+                    tolerance,
+                    max_iterations=self.fine.max_iterations,
+                    time_limit=None if self.deadline is None else self._left(self.deadline),
+                    told=partial(self._tell, which),
+                )
+            )
+        return distinct(refined)
+
+    def _tell(self, which: str, done: Round) -> None:
+        text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
+        self.progress(text, 0.9)
+
+    def _left(self, deadline: float) -> float:
+        return max(deadline - time.monotonic(), 0.0)
 
     def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
         """Every motion with the duration that is best for it, the cheapest first."""

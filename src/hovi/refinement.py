@@ -1,4 +1,4 @@
-"""Where a grid has to be finer: more inner modes where the motion is smooth, shorter intervals else.
+"""Where a grid has to be finer: more inner modes where it is smooth, more intervals elsewhere.
 
 How fast the Legendre coefficients of an interval's acceleration decay says which of the two pays:
 they fall like rho^j, where 1/rho is the size of the ellipse of analyticity around the interval.
@@ -7,6 +7,7 @@ More modes lower the error by rho per mode; cutting the interval makes rho itsel
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -29,8 +30,8 @@ DEGREES = np.array([0, 1, 2, 3, 4, 6, 8, 10, 12])
 together."""
 OVERHEAD = 1.0
 """What an interval costs besides its quadrature points, in points."""
-UNIFORM = 1.5
-"""How many times as many points one scheme for all intervals may take rather than several."""
+GROUP = 24.0
+"""What a scheme costs besides, since its intervals are evaluated on their own, in points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +73,7 @@ def refined(grid: Grid, rho: Array, demands: Sequence[Demand]) -> Grid:
     """
     degrees = np.array([scheme.inner_modes for scheme in grid.schemes])
     pieces, chosen = _choice(degrees, rho, demands)
-    most = int(chosen.max())
-    if np.sum(pieces) * (most + 2) <= UNIFORM * np.sum(pieces * (chosen + 2)):
-        chosen = np.full_like(chosen, most)
+    chosen = _fewer_schemes(pieces, chosen)
     steps = np.repeat(grid.steps / pieces, pieces)
     return Grid(steps, tuple(table(int(r)) for r in np.repeat(chosen, pieces)))
 
@@ -97,6 +96,20 @@ def _choice(degrees: Index, rho: Array, demands: Sequence[Demand]) -> tuple[Inde
     hopeless = ~np.isfinite(work[np.arange(len(rho)), best])
     pieces = np.where(hopeless, PIECES[-1], PIECES[s])
     return pieces, np.where(hopeless, np.maximum(degrees, 2), more[np.arange(len(rho)), d])
+
+
+def _fewer_schemes(pieces: Index, chosen: Index) -> Index:
+    """Inner modes raised to the next of a few values that cost the least together."""
+    values = np.unique(chosen)
+    best, least = chosen, np.inf
+    for size in range(1, min(len(values), 4) + 1):
+        for kept in itertools.combinations(values[:-1], size - 1):
+            levels = np.array([*kept, values[-1]])
+            raised = levels[np.searchsorted(levels, chosen)]
+            work = float(np.sum(pieces * (raised + 2))) + GROUP * size
+            if work < least:
+                best, least = raised, work
+    return best
 
 
 def _decay_of_pieces(rho: Array) -> Array:

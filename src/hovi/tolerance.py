@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -135,18 +137,23 @@ class Accuracy:
     """How accurate a plan is, as far as that was estimated.
 
     tolerance: what was asked for. error: the estimate of the plan that is returned, in the same
-        unit; not a number where none could be made. estimate: the same in every unit.
+        unit; not a number where none could be made.
     reached: whether error <= tolerance. reason: why the search ended before, in a sentence; ""
         where it did not.
-    rounds: the grids on the way.
+    rounds: the grids on the way. compare: what `estimate` calls.
     """
 
     tolerance: Tolerance
     error: float
-    estimate: MotionError | None
     reached: bool
     reason: str
     rounds: tuple[Round, ...] = ()
+    compare: Callable[[], MotionError] | None = field(default=None, repr=False)
+
+    @cached_property
+    def estimate(self) -> MotionError | None:
+        """The estimate in every unit, worked out when first asked for; None where there is none."""
+        return None if self.compare is None else self.compare()
 
     def __str__(self) -> str:
         """One sentence."""

@@ -37,7 +37,13 @@ def plan(
         Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
-    tolerance: Annotated[float | None, typer.Option(help="Not available yet.")] = None,
+    tolerance: Annotated[
+        str | None,
+        typer.Option(
+            metavar="1e-6|'0.1 mm'|'0.01 deg'",
+            help="Largest error: of the cost, of the tip or of the joints; chooses the scheme.",
+        ),
+    ] = None,
 ) -> None:
     """Plan the least-torque motion of a scene.
 
@@ -46,8 +52,8 @@ def plan(
     from hovi.cli.files import check_output
     from hovi.errors import InputError, nearest
 
-    if tolerance is not None:
-        raise InputError("--tolerance is not available yet; choose --scheme and --intervals.")
+    if tolerance is not None and (scheme is not None or intervals is not None):
+        raise InputError("--tolerance chooses the scheme and the intervals: leave them out.")
     if time_limit is not None and not 0 < time_limit < float("inf"):
         raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
     if limits not in (None, *LIMITS):
@@ -61,8 +67,12 @@ def plan(
         "starts": starts,
         "seed": seed,
         "limits": limits,
+        "tolerance": tolerance,
     }
-    task = _task(scene, {key: value for key, value in chosen.items() if value is not None})
+    overrides: dict[str, Any] = {k: value for k, value in chosen.items() if value is not None}
+    if scheme is not None or intervals is not None:
+        overrides["tolerance"] = None
+    task = _task(scene, overrides)
     raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json))
 
 
@@ -106,6 +116,7 @@ def _plan(
             via=task.via,
             scheme=task.scheme,
             intervals=task.intervals,
+            tolerance=task.tolerance,
             limits=task.limits,
             starts=task.starts,
             seed=task.seed,

@@ -12,6 +12,12 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from hovi.cli.accuracy_report import (
+    accuracy_json,
+    errors_in_words,
+    scheme_in_words,
+    steps_in_words,
+)
 from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.peaks import Peaks, peaks
 from hovi.json_numbers import finite
@@ -29,7 +35,7 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "message": solution.message,
         "cost": solution.cost,
         "error_estimate": solution.error_estimate,
-        "scheme": task.scheme,
+        "scheme": scheme_in_words(task, trajectory.grid),
         "intervals": trajectory.grid.intervals,
         "nit": solution.nit,
         "n_neg": solution.n_neg,
@@ -42,6 +48,7 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "limits": None if room is None else room.by_kind(),
         "excess": None if room is None else room.excess,
         "out": None if out is None else str(out),
+        **accuracy_json(solution, task),
     }
     return json.dumps(finite(fields), allow_nan=False)
 
@@ -64,15 +71,18 @@ def print_report(solution: Solution, task: Task, out: Path | None) -> None:
 
 
 def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
+    grid = solution.trajectory.grid
     rows = [
         ("status", str(solution.status)),
         ("message", solution.message),
         ("cost", f"{solution.cost:.10g}"),
         ("n_neg", f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
-        ("scheme", f"{task.scheme} on {_intervals(solution, task)}"),
+        ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
+    if solution.accuracy is not None and solution.accuracy.estimate is not None:
+        rows.insert(3, ("errors", errors_in_words(solution.accuracy.estimate)))
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
@@ -82,6 +92,8 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
 
 def _intervals(solution: Solution, task: Task) -> str:
     taken = solution.trajectory.grid.intervals
+    if task.tolerance is not None:
+        return f"{taken} intervals{steps_in_words(solution.trajectory.grid)}"
     asked = "" if taken == task.intervals else f" ({task.intervals} asked for)"
     return f"{taken} intervals{asked}"
 

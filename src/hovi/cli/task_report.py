@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 def describe_task(task: Task) -> str:
     """The ends, the scheme, the scene and the robot of a task."""
     robot = task.scene.robot
-    lines = [f"task {task.name!r}: {_duration(task)}, {task.scheme} on {task.intervals} intervals"]
+    how = f"{task.scheme} on {task.intervals} intervals"
+    if task.tolerance is not None:
+        how = f"tolerance {task.tolerance}"
+    lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {task.starts}, seed {task.seed}, limits {_limits(task)}")
     lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)
     for via in task.via:

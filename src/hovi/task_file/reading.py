@@ -6,10 +6,11 @@ import math
 import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
-from hovi.errors import HoviError, SceneError, SchemeError
+from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name
@@ -19,6 +20,7 @@ from hovi.task_file.limit_tables import read_limits
 from hovi.task_file.schema import TaskTable
 from hovi.task_file.sentences import TomlText, first_sentence
 from hovi.task_file.task import Task
+from hovi.tolerance import Tolerance
 
 
 def load_task(path: str | Path) -> Task:
@@ -44,6 +46,7 @@ def load_task(path: str | Path) -> Task:
         starts=table.starts,
         seed=table.seed,
         limits=read_limits(table.limits, robot, toml),
+        tolerance=_read_tolerance(table.tolerance, robot, toml),
         name=toml.path.stem,
     )
 
@@ -121,3 +124,13 @@ def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
     except HoviError as refused:
         line = toml.line(("robot",))
         raise type(refused)(f"{toml.path}, line {line}: {refused}") from None
+
+
+def _read_tolerance(given: Any, robot: Robot, toml: TomlText) -> float | str | None:
+    if given is None:
+        return None
+    try:
+        Tolerance.of(given, robot)
+    except InputError as wrong:
+        raise toml.error(("tolerance",), str(wrong).removesuffix(".")) from None
+    return given if isinstance(given, str) else float(given)

@@ -177,4 +177,7 @@ class TaskTable(Table):
     scheme: SchemeTable = Field(
         default=SchemeTable(), description="a table [scheme] with name and intervals"
     )
+    tolerance: Any = Field(
+        default=None, description='a number, or a text such as "0.1 mm" or "0.01 deg"'
+    )
     effects: dict[str, dict[str, Any]] = Field(default={}, description="tables [effects.NAME]")

@@ -14,6 +14,7 @@ from hovi.limits import Limits, as_limits
 from hovi.scene import Scene
 from hovi.schemes import by_name
 from hovi.state import State
+from hovi.tolerance import Tolerance
 
 MOST_INTERVALS = 1_000_000
 
@@ -32,6 +33,7 @@ class Task:
     starts: number of guesses that are tried.
     seed: seed of the random guesses.
     limits: what `hovi.plan` takes: "urdf", "none", a Limits, or a mapping as as_limits takes it.
+    tolerance: what `hovi.plan` takes: in place of the scheme, the error that is allowed.
     name: what the task is called in reports.
     """
 
@@ -44,6 +46,7 @@ class Task:
     starts: int = 1
     seed: int = 0
     limits: str | Limits | Mapping[str, Any] = "urdf"
+    tolerance: float | str | None = None
     name: str = "task"
     via: tuple[Via, ...] = ()
     time_weight: float = 0.0
@@ -63,3 +66,5 @@ class Task:
             raise InputError(f"seed must be 0 or more, not {self.seed}.")
         as_limits(self.scene.robot, self.limits)
         by_name(self.scheme)
+        if self.tolerance is not None:
+            Tolerance.of(self.tolerance, self.scene.robot)

@@ -64,6 +64,8 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
         document["limits"] = limits
     document["starts"] = task.starts
     document["seed"] = task.seed
+    if task.tolerance is not None:
+        document["tolerance"] = task.tolerance
     if isinstance(limits, dict):
         document["limits"] = _table(limits)
     document["start"] = _table(state_table(task.start, task.scene.robot, "start"))
