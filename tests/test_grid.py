@@ -26,6 +26,12 @@ def test_a_uniform_grid_divides_the_duration(intervals: int) -> None:
     assert grid.schemes == (grid.schemes[0],) * intervals
 
 
+@pytest.mark.parametrize("duration", [1e-300, 1e-12, 1e12, 1e308])
+def test_steps_whose_powers_overflow_are_refused(duration: float) -> None:
+    with pytest.raises(InputError, match="must lie between 1e-12 and 1e\\+09 s"):
+        Grid.uniform(duration, 10, galerkin(1))
+
+
 def test_steps_may_differ() -> None:
     steps = np.array([0.3, 0.05, 0.9])
     grid = Grid(steps, (galerkin(0), hermite_simpson(), galerkin(2)))

@@ -14,6 +14,7 @@ SOURCE = Path(hovi.__file__).parent
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
     {
+        "bounded_file",
         "errors",
         "newton",
         "conditions",
@@ -45,7 +46,15 @@ FLOORS = [
         "meshcat_server",
         "figure_file",
     },
-    {"plain_urdf", "stored_torque", "trajectory_file", "torque_model", "effort_term", "segment"},
+    {
+        "continuity",
+        "plain_urdf",
+        "stored_torque",
+        "trajectory_file",
+        "torque_model",
+        "effort_term",
+        "segment",
+    },
     {"chain_urdf", "robot_model", "robot_report", "moving_base_torque"},
     {"robot_geometry", "robot_reading"},
     {"robot"},

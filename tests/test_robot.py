@@ -311,6 +311,11 @@ def test_a_bad_configuration_is_refused_by_name(
             two_link.check_velocity(q, "start")
 
 
+def test_a_coordinate_beyond_all_bounds_is_refused_by_name(two_link: Robot) -> None:
+    with pytest.raises(InputError, match=r"start is 1e\+308 at joint 'elbow': at most 1e\+09"):
+        two_link.check_configuration([0.0, 1e308], "start")
+
+
 def test_a_quaternion_or_angle_without_unit_norm_is_refused() -> None:
     kinova, hector = load_robot("kinova"), load_robot("hector")
     for robot, joint in ((kinova, "j2s6s200_joint_4"), (hector, "root_joint")):

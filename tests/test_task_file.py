@@ -179,6 +179,12 @@ def test_an_unknown_example_robot_gets_the_nearest_name(folder: Path) -> None:
         (b"\xff\xfe\x00", "UTF-8"),
         (b"a = " + b"[" * 100_000, "nested"),
         (b"a = 1" + b"0" * 5000, ""),
+        (b"a = 0x" + b"f" * 5000, "unknown key `a`"),
+        (b"robot = 0x" + b"f" * 5000, "a number of too many digits"),
+        (b"robot = 1 # " + b" " * 500_000 + b"\n", "`robot` must be"),
+        (b" " * 500_000 + b"robot = 1", "line 1: `robot` must be"),
+        (b'"a\\nb" = 1', "unknown key"),
+        (b"x" * 10_000 + b" = 1", "unknown key"),
     ],
 )
 def test_a_file_that_is_no_scene_is_refused(content: bytes, expected: str, tmp_path: Path) -> None:
@@ -188,6 +194,7 @@ def test_a_file_that_is_no_scene_is_refused(content: bytes, expected: str, tmp_p
         load_task(path)
     assert expected in str(raised.value)
     assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 1_000
 
 
 @pytest.mark.parametrize("name", ["nowhere.toml", "."])

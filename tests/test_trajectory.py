@@ -7,6 +7,7 @@ import os
 import pickle
 import subprocess
 import sys
+import warnings
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -270,6 +271,13 @@ BROKEN: dict[str, tuple[Callable[[Entries], object], str]] = {
     "another format": (edited("format", "something"), "not a hovi trajectory"),
     "a later version": (edited("version", 2), "format version 2"),
     "no metadata": (lambda c: c["header"].pop("metadata"), "lacks 'metadata'"),
+    "NaN in the metadata": (edited("metadata", {"cost": np.nan}), "NaN is not a finite number"),
+    "a node that does not follow": (array("q", spoil(0.5)), "q at the end of interval"),
+    "a velocity that does not follow": (
+        array("v", lambda x: np.vstack([x[:-1], x[-1:] + 1])),
+        "v at the end of interval",
+    ),
+    "steps of no length": (array("steps", lambda x: 0 * x + 1e-300), "between 1e-12 and"),
     "metadata of another kind": (edited("metadata", []), "metadata is not a table"),
 }
 
@@ -294,7 +302,7 @@ def test_files_of_another_kind_are_refused(tmp_path: Path, content: bytes) -> No
 def test_no_file_and_a_folder_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TrajectoryFileError, match="there is no"):
         Trajectory.load(tmp_path / "motion.npz")
-    with pytest.raises(TrajectoryFileError, match="Is a directory"):
+    with pytest.raises(TrajectoryFileError, match="that is a folder"):
         Trajectory.load(tmp_path)
 
 
@@ -361,6 +369,32 @@ def test_a_file_that_unpacks_to_too_much_is_refused(
     monkeypatch.setattr("hovi.trajectory_file.MAX_BYTES", 50_000)
     replace_entry(saved, "q.npy", b"\0" * 10_000_000)
     with pytest.raises(TrajectoryFileError, match="more than the 50000 allowed"):
+        Trajectory.load(saved)
+
+
+def test_a_header_that_unpacks_to_too_much_is_refused(
+    saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hovi.trajectory_file.MAX_HEADER_BYTES", 50_000)
+    replace_entry(saved, "header.npy", b"\0" * 10_000_000)
+    with pytest.raises(TrajectoryFileError, match="a header of 10000000 bytes, more than the 50"):
+        Trajectory.load(saved)
+
+
+def test_a_header_with_an_infinite_number_is_refused(saved: Path) -> None:
+    text = b'{"format": "hovi-trajectory", "version": 1, "cost": 1e999}'
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, np.frombuffer(text, np.uint8), version=(1, 0))
+    replace_entry(saved, "header.npy", stream.getvalue())
+    with pytest.raises(TrajectoryFileError, match="1e999 is not a finite number"):
+        Trajectory.load(saved)
+
+
+def test_an_entry_that_is_there_twice_is_refused(saved: Path) -> None:
+    with warnings.catch_warnings(), zipfile.ZipFile(saved, "a") as archive:
+        warnings.simplefilter("ignore")  # zipfile's own, about the duplicate
+        archive.writestr("q.npy", archive.read("q.npy"))
+    with pytest.raises(TrajectoryFileError, match="an entry is there twice"):
         Trajectory.load(saved)
 
 

@@ -12,6 +12,9 @@ from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
+LARGEST = 1e9
+"""Of a coordinate, in [rad] or [m]: squares of torques stay far from overflow."""
+
 UNIT_TOLERANCE = 1e-4
 """How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
 
@@ -53,6 +56,8 @@ def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str]) -> Arr
     for number, entry in zip(vector, entries, strict=True):
         if not np.isfinite(number):
             raise InputError(f"{name} is {number} at joint {entry!r}: give a finite number.")
+        if abs(number) > LARGEST:
+            raise InputError(f"{name} is {number} at joint {entry!r}: at most {LARGEST:g} in size.")
     return vector
 
 

@@ -6,14 +6,23 @@ Every message is one sentence or two: what was expected, what came, what to do.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 
 _LONGEST = 256  # characters that are compared: the time grows with their square
 _MOST = 60  # names that are listed
+_WORD = re.compile(r"\S{160,}")
 
 
 class HoviError(Exception):
-    """Root of everything that hovi raises on purpose."""
+    """Root of everything that hovi raises on purpose.
+
+    Its sentence quotes what strangers wrote, so it stays on one line, holds no control characters
+    and shortens words that nobody would read.
+    """
+
+    def __init__(self, sentence: str = "") -> None:
+        super().__init__(_readable(sentence))
 
 
 class InputError(HoviError):
@@ -56,3 +65,8 @@ def nearest(name: str, valid: Iterable[str]) -> str:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
     more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
     return "valid names are " + ", ".join(repr(n) for n in names[:_MOST]) + more + "."
+
+
+def _readable(sentence: str) -> str:
+    shorter = _WORD.sub(lambda word: f"{word[0][:80]}...{word[0][-40:]}", sentence)
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in shorter)

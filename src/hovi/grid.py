@@ -13,6 +13,9 @@ from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 
+SHORTEST, LONGEST = 1e-12, 1e9
+"""Steps, in [s], whose powers stay far from the ends of double precision."""
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:
@@ -36,6 +39,12 @@ class Grid:
             )
         if not (np.isfinite(steps).all() and (steps > 0).all()):
             raise InputError("every step of a grid must be positive and finite.")
+        if steps.min() < SHORTEST or steps.max() > LONGEST:
+            raise InputError(
+                f"the steps of a grid must lie between {SHORTEST:g} and {LONGEST:g} s, and these "
+                f"reach from {steps.min():.3g} to {steps.max():.3g} s: change the duration or the "
+                "number of intervals."
+            )
         steps.setflags(write=False)
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "groups", _groups(self.schemes))

@@ -19,7 +19,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.bounded_file import require_file
 from hovi.errors import ModelError
+from hovi.whole_file import reason
 
 Array = npt.NDArray[np.float64]
 
@@ -55,11 +57,10 @@ class Srdf:
 def read_srdf_file(path: Path) -> str:
     """The text of an SRDF file. Raises ModelError: no such file, too large, not UTF-8."""
     try:
-        if path.stat().st_size > MAXIMUM_BYTES:
-            raise ModelError(f"the SRDF {path.name!r} has more than {MAXIMUM_BYTES // 10**6} MB.")
+        require_file(path, MAXIMUM_BYTES)
         return path.read_bytes().decode()
     except OSError as error:
-        raise ModelError(f"cannot read the SRDF {str(path)!r}: {error.strerror}.") from error
+        raise ModelError(f"cannot read the SRDF {str(path)!r}: {reason(error)}.") from error
     except UnicodeDecodeError as error:
         raise ModelError(f"the SRDF {path.name!r} is not UTF-8 text: save it as UTF-8.") from error
 

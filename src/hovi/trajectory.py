@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from hovi.continuity import require_continuous
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.grid import DiscretePath, Grid
 from hovi.robot import Robot
@@ -217,7 +218,7 @@ class Trajectory:
             scene = _scene(header["scene"], header["scene_sha256"])
             if scene is None:
                 _check_coordinates(metadata["coordinates"], arrays["v"].shape)
-            return cls(
+            loaded = cls(
                 grid=Grid(arrays["steps"], schemes),
                 path=DiscretePath(arrays["q"], arrays["v"], arrays["z"], arrays["inner"]),
                 momenta=arrays["momenta"],
@@ -225,6 +226,9 @@ class Trajectory:
                 metadata=metadata,
                 torque=StoredTorque(arrays[_TORQUE]) if scene is None else None,
             )
+            if loaded.robot is None or loaded.robot.vector_joints:
+                require_continuous(loaded.path, loaded.grid)
+            return loaded
         except KeyError as error:
             raise TrajectoryFileError(
                 f"trajectory file {Path(path).name!r} lacks {error.args[0]!r}."

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.bounded_file import require_file
 from hovi.errors import TrajectoryFileError
 from hovi.whole_file import reason, whole_file
 
@@ -28,6 +29,9 @@ Array = npt.NDArray[np.float64]
 FORMAT = "hovi-trajectory"
 VERSION = 1
 MAX_BYTES = 2**30
+MAX_HEADER_BYTES = 2**26
+"""As Python objects a header may take twenty times its size."""
+_MARGIN = 2**16  # what zip and npy put around the data
 _HEADER = "header"
 _DOUBLES = np.dtype("<f8")
 _BYTES = np.dtype("u1")
@@ -44,6 +48,11 @@ def write_arrays(
     Raises TrajectoryFileError.
     """
     entries = {_HEADER: _encode_header(header)}
+    if entries[_HEADER].nbytes > MAX_HEADER_BYTES:
+        raise TrajectoryFileError(
+            f"the scene and metadata take {entries[_HEADER].nbytes} bytes, and a trajectory file "
+            f"holds at most {MAX_HEADER_BYTES} of them."
+        )
     entries |= {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
     size = sum(entry.nbytes for entry in entries.values())
     if size > MAX_BYTES:
@@ -73,8 +82,11 @@ def read_arrays(
     """
     label = f"trajectory file {Path(path).name!r}"
     try:
+        require_file(path, MAX_BYTES + _MARGIN)
         with zipfile.ZipFile(path) as archive:
             members = {info.filename: info for info in archive.infolist()}
+            if len(members) < len(archive.infolist()):
+                raise ValueError("an entry is there twice")
             wanted = [_HEADER, *names]
             wanted += [name for name in optional if f"{name}.npy" in members]
             _check_members(members, wanted, label)
@@ -95,9 +107,14 @@ def _check_members(members: Mapping[str, zipfile.ZipInfo], names: list[str], lab
     missing = [name for name in names if f"{name}.npy" not in members]
     if missing:
         raise TrajectoryFileError(f"{label} lacks the entry {missing[0]!r}.")
+    header = members[f"{_HEADER}.npy"].file_size
     size = sum(members[f"{name}.npy"].file_size for name in names)
-    if size > MAX_BYTES + 4096:  # the npy headers come on top of the data
+    if size > MAX_BYTES + _MARGIN:
         raise TrajectoryFileError(f"{label} holds {size} bytes, more than the {MAX_BYTES} allowed.")
+    if header > MAX_HEADER_BYTES + _MARGIN:
+        raise TrajectoryFileError(
+            f"{label} has a header of {header} bytes, more than the {MAX_HEADER_BYTES} allowed."
+        )
 
 
 def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
@@ -111,7 +128,7 @@ def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
 
 def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
     try:
-        header = json.loads(data.tobytes())
+        header = json.loads(data.tobytes(), parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise TrajectoryFileError(f"{label} has a header that is not JSON: {error}.") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
@@ -122,6 +139,14 @@ def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
             f"version {VERSION}."
         )
     return header
+
+
+def _finite(text: str) -> float:
+    """A number of JSON; Python's reader would take NaN, and 1e999 for infinity."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is not a finite number")
+    return number
 
 
 def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[Any]:

@@ -14,8 +14,10 @@ from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
 
+from hovi.bounded_file import require_file
 from hovi.errors import ModelError
 from hovi.urdf_rules import RULES
+from hovi.whole_file import reason
 
 MAXIMUM_BYTES = 32_000_000
 MAXIMUM_LINKS = 1_000
@@ -31,16 +33,13 @@ _FREEDOM = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floati
 
 def read_urdf(path: Path) -> str:
     """The text of a URDF file. Raises ModelError: no such file, too large, not UTF-8."""
-    if not path.is_file():
-        what = "that is a folder" if path.is_dir() else "no such file"
-        raise ModelError(f"cannot read the URDF {str(path)!r}: {what}.")
     try:
-        size = path.stat().st_size
-        if size > MAXIMUM_BYTES:
-            raise ModelError(_too_large(path.name, size))
+        require_file(path, MAXIMUM_BYTES)
         return path.read_bytes().decode()
+    except FileNotFoundError as error:
+        raise ModelError(f"cannot read the URDF {str(path)!r}: no such file.") from error
     except OSError as error:
-        raise ModelError(f"cannot read the URDF {str(path)!r}: {error.strerror}.") from error
+        raise ModelError(f"cannot read the URDF {str(path)!r}: {reason(error)}.") from error
     except UnicodeDecodeError as error:
         raise ModelError(
             f"the URDF {path.name!r} is not UTF-8 text (byte {error.start}): save it as UTF-8."

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from hovi.bounded_file import require_file
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -21,6 +22,9 @@ from hovi.task_file.schema import TaskTable
 from hovi.task_file.sentences import TomlText, first_sentence
 from hovi.task_file.task import Task
 from hovi.tolerance import Tolerance
+from hovi.whole_file import reason
+
+MAXIMUM_BYTES = 2_000_000
 
 
 def load_task(path: str | Path) -> Task:
@@ -70,13 +74,14 @@ def _duration(given: float | list[float], toml: TomlText) -> float | tuple[float
 
 def _read_text(path: Path) -> TomlText:
     try:
+        require_file(path, MAXIMUM_BYTES)
         return TomlText(path, path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise SceneError(f"there is no scene file {path}.") from None
     except UnicodeDecodeError:
         raise SceneError(f"{path}: a scene file is UTF-8 text, and this is not.") from None
     except OSError as refused:
-        raise SceneError(f"{path} cannot be read: {refused.strerror}.") from None
+        raise SceneError(f"{path} cannot be read: {reason(refused)}.") from None
 
 
 def _validated(toml: TomlText) -> TaskTable:

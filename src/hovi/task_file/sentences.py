@@ -15,7 +15,7 @@ from hovi.errors import SceneError, nearest
 
 Keys = tuple[str | int, ...]
 
-_HEADER = re.compile(r"^\s*\[\[?\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
+_HEADER = re.compile(r"\[\[?([^\]]+)\]\]?\s*(#.*)?$")
 _ELEMENTS = {
     "finite_number": "a finite number",
     "float_type": "a finite number",
@@ -24,8 +24,12 @@ _ELEMENTS = {
     "dict_type": "a table",
     "too_long": "a shorter list",
     "missing": "given as well",
+    "tuple_type": "a list",
+    "float_parsing": "a finite number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
 }
-_ENTRY = re.compile(r"^\s*([A-Za-z0-9_.\"'\- ]+?)\s*=")
+_ENTRY = re.compile(r"([A-Za-z0-9_.\"'\- ]+)=")
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,8 @@ class TomlText:
         wanted = tuple(str(key) for key in keys if isinstance(key, str))
         best, where = 0, None
         table: tuple[str, ...] = ()
-        for number, line in enumerate(self.text.splitlines(), start=1):
-            here = table
+        for number, padded in enumerate(self.text.splitlines(), start=1):
+            line, here = padded.strip(), table
             if header := _HEADER.match(line):
                 here = table = _split(header[1])
             elif entry := _ENTRY.match(line):
@@ -94,7 +98,10 @@ def in_toml(value: Any) -> str:
     """A value as TOML spells it, cut to a readable length."""
     if isinstance(value, bool):
         return str(value).lower()
-    text = f'"{value}"' if isinstance(value, str) else f"{value}"
+    try:
+        text = f'"{value}"' if isinstance(value, str) else f"{value}"
+    except ValueError:  # Python spells out no more than 4,300 digits
+        return "a number of too many digits"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -103,7 +110,7 @@ def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:
     field = owner.model_fields.get(str(keys[-1])) if owner else None
     if field and field.description:
         return field.description
-    return _ELEMENTS.get(details["type"], details["msg"].lower())
+    return _ELEMENTS.get(details["type"], details["msg"].lower().removeprefix("input should be "))
 
 
 def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:

@@ -1,0 +1,228 @@
+"""Strange scene files, and what must hold for those that load.
+
+A scene that loads must be a task with finite numbers, and planning it for two steps must end in a
+solution or in a sentence.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+import tomlkit
+from mutated_bytes import mutated_bytes
+from verdict import Mutant, Verdict, judge
+
+import hovi
+from hovi.model_files import example, example_scenes
+from hovi.task_file import Task, load_task
+
+MOST_INTERVALS = 64  # of a plan that is tried
+TOKENS = (
+    *(
+        b"nan",
+        b"inf",
+        b"-inf",
+        b"-1",
+        b"0",
+        b"1e308",
+        b"1e999",
+        b"1,5",
+        b"1_0",
+        b"0x" + b"f" * 5000,
+    ),
+    *(b"9" * 5000, b"[" * 2000, b"a." * 500, b"{" * 50, b"true", b'""', b"'''", b'"""', b"#", b"="),
+    *(b"[[start]]\n", b"[start]\n", b"[effects.gravity]\n", b"\0", b"\xff", b"\xef\xbb\xbf", b"\r"),
+    *(b" " * 5000, b"1979-05-27T07:32:00Z", b"12:00", b'"\\u0000"', b'"\\ud800"', b"\n", b"]]"),
+)
+NOT_NUMBERS = (float("nan"), float("inf"), -float("inf"), "1", "", True, [], {})
+STRANGE_VALUES = (
+    *(*NOT_NUMBERS, 0, -1, 1, 2, 3, 10**6, 10**9, 10**30, -0.0, 1e308, -1e308, 1e-308, 5e-324),
+    *([0.0], [0.0, 0.0], [[0.0, 0.0]], [0.0, "x"], {"elbow": 1.0}, {"elbow": [0.0, 1.0]}, "none"),
+    *(
+        "urdf",
+        "panda",
+        "../../etc/passwd",
+        "two_link.urdf",
+        "x\0y",
+        "taylor-midpoint",
+        "galerkin-0",
+    ),
+    *("galerkin-9", "galerkin-99999999", "mean-difference", "a" * 10_000, "a\nb", "\x9b", 0.3, 2.5),
+)
+
+Place = tuple[dict[str, Any] | list[Any], Any]
+Change = Callable[[dict[str, Any], Random], None]
+
+
+@cache
+def _originals() -> tuple[str, ...]:
+    names = [name for name in example_scenes() if name.startswith("two_link")]
+    return tuple(example(f"{name}.toml").read_text() for name in names)
+
+
+def mutate(random: Random) -> Mutant:
+    """A changed scene: in its bytes, in its values, or with something that must be refused."""
+    text = random.choice(_originals())
+    kind = random.random()
+    if kind < 0.35:
+        return Mutant(mutated_bytes(text.encode(), random, TOKENS))
+    scene = tomllib.loads(text)
+    if kind < 0.75:
+        for _ in range(random.randint(1, 3)):
+            random.choice(_CHANGES)(scene, random)
+        return Mutant(_written(scene))
+    poison = random.choice(_POISONS)
+    poison(scene, random)
+    return Mutant(_written(scene), (poison.__doc__ or "").split("\n")[0])
+
+
+def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
+    """Load it as a user does, from a file in `folder`, and plan a little."""
+    urdf = folder / "two_link.urdf"
+    if not urdf.exists():
+        urdf.write_text(example("two_link.urdf").read_text())
+    path = folder / "scene.toml"
+    path.write_bytes(mutant.content)
+    return judge(lambda: load_task(path), objection, mutant.poison)
+
+
+def objection(task: Task) -> str:
+    """What is wrong with a task that was loaded; "" where nothing is."""
+    robot = task.scene.robot
+    ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
+    if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
+        return "it holds numbers that are not finite"
+    if not (task.duration > 0 and 1 <= task.intervals <= 10**6 and task.starts >= 1):
+        return "its duration, intervals or starts are not positive"
+    task.scene.describe()
+    if task.intervals > MOST_INTERVALS:
+        return ""
+    solution = hovi.plan(
+        task.scene,
+        task.start,
+        task.goal,
+        task.duration,
+        scheme=task.scheme,
+        intervals=task.intervals,
+        limits=task.limits,
+        seed=task.seed,
+        max_iterations=2,
+        time_limit=2.0,
+        processes=1,
+    )
+    if solution.success and not np.isfinite(solution.cost):
+        return f"a minimum of cost {solution.cost} was reported"
+    return "" if solution.message else "its plan says nothing"
+
+
+def _written(scene: dict[str, Any]) -> bytes:
+    try:
+        return tomlkit.dumps(scene).encode("utf-8", "surrogatepass")
+    except (ValueError, TypeError):  # what TOML cannot hold
+        return repr(scene).encode("utf-8", "surrogatepass")
+
+
+def _places(table: dict[str, Any] | list[Any]) -> Iterator[Place]:
+    """Every (container, key) below a table."""
+    keys = list(table) if isinstance(table, dict) else range(len(table))
+    for key in keys:
+        yield table, key
+        if isinstance(table[key], dict | list):  # type: ignore[index]
+            yield from _places(table[key])  # type: ignore[index]
+
+
+def _place(scene: dict[str, Any], random: Random) -> Place:
+    return random.choice([*_places(scene)] or [(scene, "robot")])
+
+
+# Changes that may or may not be allowed
+
+
+def _value(scene: dict[str, Any], random: Random) -> None:
+    owner, key = _place(scene, random)
+    owner[key] = random.choice(STRANGE_VALUES)
+
+
+def _remove(scene: dict[str, Any], random: Random) -> None:
+    owner, key = _place(scene, random)
+    if len(owner) > 1 or owner is not scene:
+        owner.pop(key) if isinstance(owner, list) else owner.pop(key, None)
+
+
+def _rename(scene: dict[str, Any], random: Random) -> None:
+    owner, key = _place(scene, random)
+    if isinstance(owner, dict):
+        name = random.choice((f"{key}s", "", "q", "v", "elbow", "a" * 1_000, "gravity", "\n"))
+        owner[name] = owner.pop(key, 0)
+
+
+def _swap(scene: dict[str, Any], random: Random) -> None:
+    (one, i), (other, j) = _place(scene, random), _place(scene, random)
+    one[i] = other[j] if not isinstance(other[j], dict | list) else 1
+
+
+def _settings(scene: dict[str, Any], random: Random) -> None:
+    choices: dict[str, tuple[Any, ...]] = {
+        "intervals": (1, 2, 5, 33, 64),
+        "name": ("taylor-midpoint", "galerkin-0", "galerkin-1", "hermite-simpson"),
+    }
+    table = scene.setdefault("scheme", {})
+    if isinstance(table, dict):
+        table.update({key: random.choice(values) for key, values in choices.items()})
+    scene["duration"] = random.choice((1e-300, 1e-9, 1e-3, 0.3, 7.0, 1e4, 1e100, 1e308))
+
+
+_CHANGES: tuple[Change, ...] = (_value, _value, _remove, _rename, _swap, _settings)
+
+# Changes that must be refused; the docstring says why
+
+
+def _duration(scene: dict[str, Any], random: Random) -> None:
+    """the duration is not a positive number"""
+    scene["duration"] = random.choice((*NOT_NUMBERS[:6], 0, -1, -1e-9, 0.0))
+
+
+def _intervals(scene: dict[str, Any], random: Random) -> None:
+    """the number of intervals is impossible"""
+    scene["scheme"]["intervals"] = random.choice((0, -1, 10**9, 10**30, 1.5, "16", True))
+
+
+def _end(scene: dict[str, Any], random: Random) -> None:
+    """an end is not a state of the robot"""
+    bad: tuple[Any, ...] = (float("nan"), float("inf"), "0", True)
+    q = random.choice(([random.choice(bad), 0.0], [0.0], [0.0] * 3, [], {"elbow": 0.0}, 0.0))
+    scene[random.choice(("start", "goal"))]["q"] = q
+
+
+def _unknown(scene: dict[str, Any], random: Random) -> None:
+    """a key, effect, scheme or robot is unknown"""
+    where, key, value = random.choice(
+        (
+            (scene, "durration", 1.0),
+            (scene.setdefault("effects", {}), "gravitas", {}),
+            (scene["scheme"], "name", "galerkin"),
+            (scene, "robot", "no_such_robot"),
+            (scene["start"], "w", [0.0, 0.0]),
+        )
+    )
+    where[key] = value
+
+
+def _gravity(scene: dict[str, Any], random: Random) -> None:
+    """gravity is not a finite number"""
+    value = random.choice(NOT_NUMBERS)
+    scene.setdefault("effects", {})["gravity"] = {"acceleration": value}
+
+
+def _lacking(scene: dict[str, Any], random: Random) -> None:
+    """something that is needed is missing"""
+    scene.pop(random.choice(("robot", "duration", "start", "goal")))
+
+
+_POISONS: tuple[Change, ...] = (_duration, _intervals, _end, _unknown, _gravity, _lacking)

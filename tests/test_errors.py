@@ -1,0 +1,44 @@
+"""Every sentence stays one line that a person can read, whatever a file holds."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from hovi.errors import HoviError, InputError, nearest
+
+
+def test_an_ordinary_sentence_is_kept() -> None:
+    sentence = "joint 'Gelenk_ä' has mass -1 kg: give 0 or more."
+    assert str(InputError(sentence)) == sentence
+
+
+@pytest.mark.parametrize("strange", ["a\nb", "\x1b[2J", "\x9b2J", "\u202etxt", "a\x00b"])
+def test_control_characters_are_spelled_out(strange: str) -> None:
+    sentence = str(HoviError(f"there is no {strange}."))
+    assert sentence.isprintable()
+    assert sentence.startswith("there is no ")
+
+
+def test_long_words_are_cut_in_the_middle() -> None:
+    sentence = str(HoviError("there is no " + "x" * 10**6 + "end of it."))
+    assert len(sentence) < 200
+    assert sentence.endswith("end of it.")
+
+
+def test_an_error_survives_the_way_to_another_process() -> None:
+    error = pickle.loads(pickle.dumps(InputError("T is\n0.")))
+    assert type(error) is InputError
+    assert str(error) == "T is\\n0."
+
+
+def test_only_so_many_names_are_listed() -> None:
+    hint = nearest("x", [f"joint{i:03}" for i in range(250)])
+    assert hint.startswith("valid names are 'joint000', ")
+    assert hint.endswith(" and 190 more.")
+
+
+def test_names_without_end_are_not_compared_to_their_ends() -> None:
+    names = ["abcdefgh" * 10**5, "abcdefgi" * 10**5]  # difflib would take hours
+    assert nearest("abcdefgj" * 10**5, names).startswith("valid names are")
