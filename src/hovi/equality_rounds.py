@@ -17,6 +17,10 @@ from hovi.trajectory_objective import ActionObjective
 
 TORQUE_PENALTY = 10.0
 """First penalty of a passive joint's torque, relative to the mean weight of the others."""
+NEARLY = 0.1
+"""The same as TORQUE_SHARE for a guess that is a solution nearby, and keeps its passive joints."""
+WARM = 1e3
+"""Factor of the first penalty for such a guess."""
 NODE_PENALTY = 1e3
 """First penalty of conditions at nodes, relative to the cost, per [rad^2] or [m^2]."""
 GROWTH = 10.0
@@ -109,9 +113,11 @@ def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipl
     """None, with penalties that suit the weights of the torques and the cost of a path."""
     lagrangian = problem.ld.lagrangian
     assert isinstance(lagrangian, EffortLagrangian)
-    active = np.delete(lagrangian.weight, problem.passive)
+    weight = float(np.delete(lagrangian.weight, problem.passive).mean())
     cost = max(abs(problem.ld.action(path)), 1e-6)
-    return Multipliers.zero(problem, TORQUE_PENALTY * float(active.mean()), NODE_PENALTY * cost)
+    none = Multipliers.zero(problem, TORQUE_PENALTY * weight, NODE_PENALTY * cost)
+    share = ActionObjective(problem, multipliers=none).residuals(path).torque_share
+    return none.stiffer(WARM, 1.0) if share <= NEARLY else none
 
 
 def _met(residuals: Residuals, torque_share: float, node_miss: float) -> bool:

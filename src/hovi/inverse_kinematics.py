@@ -23,6 +23,10 @@ MET = 1e-10
 """Largest component of a condition that counts as met, in [m] or [rad]."""
 LONGEST = 0.5
 """Longest step of a joint, in [rad] or [m]."""
+IDLE = 0.98
+"""Share of the residual that a step may leave before it counts as idle."""
+PATIENCE = 8
+"""Idle steps in a row that end a seed."""
 HALF_TURN = 1e-6
 """Largest angle by which a met condition may miss the goal: half a turn away it is met too."""
 
@@ -90,7 +94,7 @@ def _newton(
     """Levenberg-Marquardt steps, cut at the limits."""
     v = np.zeros(robot.nv)
     c, J = condition.evaluate(q, v)
-    damping = 1e-2
+    damping, idle = 1e-2, 0
     for _ in range(ITERATIONS):
         if np.max(np.abs(c)) <= MET * 1e-3:
             break
@@ -99,13 +103,13 @@ def _newton(
         step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-300))
         candidate = _inside(robot, robot.integrate(q, step), lower, upper)
         new, slope = condition.evaluate(candidate, v)
-        if np.linalg.norm(new) < np.linalg.norm(c):
+        share = np.linalg.norm(new) / np.linalg.norm(c)
+        if share < 1.0:
             q, c, J = candidate, new, slope
-            damping = max(0.2 * damping, 1e-14)
-        else:
-            damping *= 8.0
-            if damping > 1e8:
-                break
+        damping = max(0.2 * damping, 1e-14) if share < 1.0 else 8.0 * damping
+        idle = idle + 1 if share > IDLE else 0
+        if idle >= PATIENCE:
+            break
     return q
 
 
