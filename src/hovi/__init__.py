@@ -58,6 +58,8 @@ if TYPE_CHECKING:
     from hovi.symmetry import base_translation as base_translation
     from hovi.task_file import Task as Task
     from hovi.task_file import load_task as load_task
+    from hovi.tracking import Tracking as Tracking
+    from hovi.tracking import play as play
     from hovi.trajectory import Trajectory as Trajectory
     from hovi.variational_error import variational_order as variational_order
 
@@ -86,6 +88,7 @@ _PLACES = {
     "Status": "hovi.solver",
     "Symmetry": "hovi.symmetry",
     "Task": "hovi.task_file",
+    "Tracking": "hovi.tracking",
     "Trajectory": "hovi.trajectory",
     "TrajectoryProblem": "hovi.problem",
     "Via": "hovi.goals",
@@ -109,6 +112,7 @@ _PLACES = {
     "load_task": "hovi.task_file",
     "mechanics": "hovi.lagrangians",
     "plan": "hovi.planner",
+    "play": "hovi.tracking",
     "plot": "hovi.plotting",
     "regularity": "hovi.euler_lagrange",
     "replay": "hovi.playback",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
@@ -69,43 +70,71 @@ def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
     return CasadiLagrangian([q, v, a], ca.dot(force, covariant) / 2)
 
 
+class Drive(Protocol):
+    """Joint efforts that depend on the motion: a feedback."""
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """u (P, nv) and du/d(q, v), shape (P, nv, 2, nv)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prescribed:
+    """A Drive that does not look at the motion: u(t)."""
+
+    torque: Torque
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """u(t), with no slope."""
+        u = np.asarray(self.torque(t), dtype=np.float64).reshape(v.shape)
+        return u, np.zeros((*v.shape, 2, v.shape[1]))
+
+
 @dataclass(frozen=True, eq=False)
 class Force:
-    """A force on TQ x time: f(q, v, t) = u(t) - d(q, v, t).
+    """A force on TQ x time: f = u(q, v, t) - d(q, v, t).
 
-    n: degrees of freedom. torque: u, times (P,) -> (P, n), in [N m] or [N]; none when None.
+    n: degrees of freedom. drive: u; none when None.
     resistance: what a scene's effects ask of the joints, d, or None.
     """
 
     n: int
-    torque: Torque | None = None
+    drive: Drive | None = None
     resistance: PointFunction | None = None
+
+    def driven(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """u (P, n) and its derivatives with respect to (q, v), shape (P, n, 2, n)."""
+        if self.drive is None:
+            return np.zeros((len(q), self.n)), np.zeros((len(q), self.n, 2, self.n))
+        return self.drive.evaluate(q, v, t)
+
+    def resisted(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """d (P, n) and its derivatives with respect to (q, v), shape (P, n, 2, n)."""
+        if self.resistance is None:
+            return np.zeros((len(q), self.n)), np.zeros((len(q), self.n, 2, self.n))
+        d, slope = self.resistance(q, v, times(t, len(q)))
+        shape = (len(q), self.n)
+        return d.reshape(shape), slope.reshape(*shape, 2, self.n)
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """f (P, n) and its derivatives with respect to (q, v), shape (P, n, 2, n)."""
-        f, df = np.zeros((len(q), self.n)), np.zeros((len(q), self.n, 2, self.n))
-        if self.torque is not None:
-            f = f + np.asarray(self.torque(t), dtype=np.float64).reshape(f.shape)
-        if self.resistance is not None:
-            d, slope = self.resistance(q, v, times(t, len(q)))
-            f, df = f - d.reshape(f.shape), df - slope.reshape(df.shape)
-        return f, df
+        (u, du), (d, dd) = self.driven(q, v, t), self.resisted(q, v, t)
+        return u - d, du - dd
 
 
-def scene_force(scene: Scene, torque: Torque | None = None) -> Force:
+def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
     """The torques that are put on a scene's joints, less what its effects resist with.
 
-    torque: u(t), times (P,) -> (P, nv); none when not given.
+    drive: u(q, v, t); none when not given.
     Raises SceneError for an effect whose torque depends on the acceleration in another way than
     an inertia does.
     """
     resistance = resistance_of(scene)
     if resistance is None:
-        return Force(scene.robot.nv, torque)
+        return Force(scene.robot.nv, drive)
     q, v, t = scene.symbols.q, scene.symbols.v, scene.symbols.t
     slope = ca.jacobian(resistance, ca.vertcat(q, v))
     function = ca.Function("resistance", [q, v, t], [resistance, slope])
-    return Force(scene.robot.nv, torque, PointFunction(function))
+    return Force(scene.robot.nv, drive, PointFunction(function, scene.compile))
 
 
 def resistance_of(scene: Scene) -> ca.SX | None:

@@ -14,7 +14,14 @@ import numpy.typing as npt
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import CasadiLagrangian
-from hovi.lagrangians import ForcedLagrangian, Torque, mechanics, scene_force
+from hovi.lagrangians import (
+    Drive,
+    ForcedLagrangian,
+    Prescribed,
+    Torque,
+    mechanics,
+    scene_force,
+)
 from hovi.legendre_transforms import hamiltonian, highest_derivative, legendre
 from hovi.scene import Scene
 from hovi.schemes import galerkin
@@ -43,6 +50,12 @@ class Simulation:
         return self.flow.t
 
     @property
+    def order(self) -> int:
+        """Order of the integrator, 2 (r + 1)."""
+        assert isinstance(self.flow.ld, SchemeLagrangian)
+        return 2 * (self.flow.ld.scheme.inner_modes + 1)
+
+    @property
     def q(self) -> Array:
         """Configurations, shape (N + 1, nv)."""
         return self.flow.q
@@ -63,6 +76,26 @@ class Simulation:
         return hamiltonian(self.lagrangian, self.flow.x, self.flow.p)
 
     @property
+    def work(self) -> tuple[Array, Array]:
+        """Work of the torques, and of the effects, since the start, (N + 1,) each, in [J].
+
+        At the quadrature points of the discrete motion: `energy` changes by their sum, to the
+        order of the integrator.
+        """
+        ld = self.flow.ld
+        assert isinstance(ld, SchemeLagrangian)
+        assert isinstance(ld.lagrangian, ForcedLagrangian)
+        w = ld.regularised.w_of_z(self.flow.z)
+        q, v = ld.jet(self.flow.x[:-1], w, self.flow.inner[:, : ld.scheme.inner_modes])
+        t = (self.t[:-1, None] + ld.h * ld.scheme.points).ravel()
+        done = []
+        for force, sign in ((ld.lagrangian.force.driven, 1), (ld.lagrangian.force.resisted, -1)):
+            power = np.sum(sign * force(q, v, t)[0] * v, axis=1)
+            gained = ld.h * power.reshape(len(w), -1) @ ld.scheme.weights
+            done.append(np.concatenate([[0.0], np.cumsum(gained)]))
+        return done[0], done[1]
+
+    @property
     def trajectory(self) -> Trajectory:
         """The motion to be replayed, plotted and saved: the cubic through (q, v) at the nodes."""
         q, v, h = self.q, self.v, self.flow.ld.h
@@ -81,7 +114,7 @@ def simulate(
     scene: Scene,
     start: State | npt.ArrayLike,
     duration: float,
-    torque: Torque | Trajectory | None = None,
+    torque: Torque | Trajectory | Drive | None = None,
     *,
     intervals: int = 1000,
     inner_modes: int = 1,
@@ -91,8 +124,8 @@ def simulate(
     scene: what is simulated; potentials that effects add to a cost are no forces.
     start: a State, or a configuration of shape (nq,) at rest.
     duration: in [s].
-    torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; none
-        when not given.
+    torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; a
+        Controller for a feedback; none when not given.
     intervals: N. inner_modes: r, from 0 (the midpoint rule).
     Raises InputError or SceneError for what does not fit, or for steps too long to be solved.
     """
@@ -101,20 +134,17 @@ def simulate(
     if intervals < 1:
         raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
     free = mechanics(scene)
-    forced = ForcedLagrangian(free, scene_force(scene, _torque(torque)))
+    forced = ForcedLagrangian(free, scene_force(scene, _drive(torque)))
     ld = SchemeLagrangian(forced, galerkin(inner_modes, 1), duration / intervals)
     q, v = as_state(start, scene.robot).on(scene.robot, "start")
     x, p = legendre(free, q, v)
     return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
 
 
-def _torque(torque: Torque | Trajectory | None) -> Torque | None:
-    if not isinstance(torque, Trajectory):
+def _drive(torque: Torque | Trajectory | Drive | None) -> Drive | None:
+    if torque is None or hasattr(torque, "evaluate"):
         return torque
+    if not isinstance(torque, Trajectory):
+        return Prescribed(torque)
     plan = torque
-    if plan.robot is None:
-        raise InputError(
-            "the torques of a motion without a scene cannot be simulated; hand in a function of "
-            "the times instead."
-        )
-    return lambda t: plan.sample(np.clip(t, 0.0, plan.duration)).tau
+    return Prescribed(lambda t: plan.sample(np.clip(t, 0.0, plan.duration)).tau)

@@ -1,0 +1,125 @@
+"""Torques that play a plan: as planned, or with a feedback that holds the motion to it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import InputError, nearest
+from hovi.robot import Robot
+from hovi.scene import Scene
+from hovi.trajectory import Sample, Trajectory
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Controller(ABC):
+    """u(q, v, t) for a plan that is played from its start.
+
+    plan: the motion and its torques.
+    """
+
+    plan: Trajectory
+    _last: dict[bytes, Sample] = field(default_factory=dict, init=False, repr=False)
+
+    @abstractmethod
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """u (P, nv) in [N m] or [N], and du/d(q, v), shape (P, nv, 2, nv)."""
+
+    def planned(self, t: Array) -> Sample:
+        """q, v, a and tau of the plan at t (P,), its ends held; the last times are remembered."""
+        key = t.tobytes()
+        if key not in self._last:
+            self._last.clear()
+            self._last[key] = self.plan.sample(np.clip(t, 0.0, self.plan.duration))
+        return self._last[key]
+
+
+@dataclass(frozen=True, eq=False)
+class OpenLoop(Controller):
+    """u = tau_plan(t)."""
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """The planned torques, whatever happens."""
+        return self.planned(t).tau, np.zeros((*v.shape, 2, v.shape[1]))
+
+
+@dataclass(frozen=True, eq=False)
+class ProportionalDerivative(Controller):
+    """u = tau_plan + K (q_plan - q) + D (v_plan - v). [SicilianoKhatib2016, sec. 8.3]
+
+    stiffness: K, shape (nv,), in [N m/rad]. damping: D, shape (nv,), in [N m s/rad].
+    """
+
+    stiffness: Array
+    damping: Array
+
+    @classmethod
+    def of_bandwidth(cls, plan: Trajectory, robot: Robot, omega: float) -> ProportionalDerivative:
+        """K = M_ii omega^2 and D = 2 M_ii omega, with the masses at the plan's start.
+
+        omega: what each joint would have alone, critically damped, in [rad/s].
+        """
+        model = robot.model.copy()
+        mass = np.diag(pin.crba(model, model.createData(), plan.q[0])).copy()
+        return cls(plan, mass * omega**2, 2 * mass * omega)
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """Feedback by joint."""
+        wanted = self.planned(t)
+        u = wanted.tau + self.stiffness * (wanted.q - q) + self.damping * (wanted.v - v)
+        slope = np.stack([-np.diag(self.stiffness), -np.diag(self.damping)], axis=1)
+        return u, np.broadcast_to(slope, (len(t), *slope.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class ComputedTorque(Controller):
+    """u = tau(q, v, a_plan + w^2 (q_plan - q) + 2 w (v_plan - v)) of the plan's own scene.
+
+    Where the world is as planned, the error decays like exp(-w t) (1 + w t) in every joint.
+    [SicilianoKhatib2016, sec. 8.5]
+
+    scene: what is believed. omega: w, in [rad/s].
+    """
+
+    scene: Scene
+    omega: float
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """Inverse dynamics of the corrected acceleration."""
+        wanted, w, n = self.planned(t), self.omega, v.shape[1]
+        a = wanted.a + w**2 * (wanted.q - q) + 2 * w * (wanted.v - v)
+        u, J = self.scene.torques.linearize(q, v, a, t)
+        J = J.reshape(len(t), n, 3, n)
+        slope = np.stack([J[:, :, 0] - w**2 * J[:, :, 2], J[:, :, 1] - 2 * w * J[:, :, 2]], axis=2)
+        return u, slope
+
+
+FEEDBACKS = ("none", "pd", "computed-torque")
+
+
+def controller(plan: Trajectory, feedback: str, robot: Robot, bandwidth: float) -> Controller:
+    """The controller of a name.
+
+    feedback: "none", "pd" or "computed-torque". robot: whose masses scale the gains.
+    bandwidth: of the feedback, in [rad/s]. Raises InputError.
+    """
+    if feedback not in FEEDBACKS:
+        raise InputError(f"there is no feedback {feedback!r}: {nearest(feedback, FEEDBACKS)}")
+    if feedback == "none":
+        return OpenLoop(plan)
+    if not 0 < bandwidth < np.inf:
+        raise InputError(f"the bandwidth must be positive and finite, got {bandwidth} rad/s.")
+    if feedback == "pd":
+        return ProportionalDerivative.of_bandwidth(plan, robot, bandwidth)
+    if plan.scene is None:
+        raise InputError(
+            "computed torques need the plan's scene, which a robot given as a pinocchio.Model does "
+            "not leave in a file; choose the feedback 'pd'."
+        )
+    return ComputedTorque(plan, plan.scene, bandwidth)
