@@ -61,7 +61,7 @@ FLOORS = [
     {"state", "lagrangian", "effects", "limits"},
     {"frame_goal"},
     {"inverse_kinematics"},
-    {"goals"},
+    {"goals", "scene_account"},
     {"scene"},
     {"discrete_lagrangian", "lagrangians"},
     {"action_structure"},

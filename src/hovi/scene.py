@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -20,6 +20,7 @@ from hovi.lagrangian import EffortLagrangian, PotentialTerm
 from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics
 from hovi.rigid_body import InverseDynamicsKernel, joints_without_kernel
 from hovi.robot import Robot
+from hovi.scene_account import SceneAccount, account
 from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 
 Array = npt.NDArray[np.float64]
@@ -153,8 +154,22 @@ class Scene:
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
+    def evaluation(self) -> Callable[..., Any]:
+        """(q, v, a, t) -> L~ with its derivatives at a batch of points, as an optimiser asks.
+
+        Where configurations are not vectors, tau alone.
+        """
+        if not self.robot.vector_joints:
+            return self.torques.torque
+        lagrangian = self.effort_lagrangian()
+        return lambda q, v, a, t: lagrangian.expand(q, v, a, t=t)
+
+    def account(self) -> SceneAccount:
+        """What each effect costs in instructions and in measured time."""
+        return account(self)
+
     def describe(self) -> str:
-        """What is simulated, and what the URDF holds but the scene leaves out."""
+        """What is simulated, what the URDF holds but the scene leaves out, and what it costs."""
         lines = [f"scene of robot {self.robot.name!r}", "simulated:"]
         lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
         if self.passive:
@@ -164,7 +179,7 @@ class Scene:
         lines.append(self._derivatives())
         if self.compile:
             lines.append("what CasADi evaluates is compiled to machine code")
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.account().lines()])
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as JSON-able data, the URDF's text included."""
@@ -236,10 +251,14 @@ class Scene:
     def _left_out(self) -> list[str]:
         robot, keys = self.robot, {effect.key for effect in self.effects}
         lines = [] if "gravity" in keys else ["gravity"]
-        held = (("damping", robot.damping), ("friction", robot.friction))
-        for name, values in (*held, ("armature", robot.armature)):
+        held = (
+            ("damping", "viscous_friction", robot.damping),
+            ("friction", "dry_friction", robot.friction),
+            ("armature", "armature", robot.armature),
+        )
+        for name, effect, values in held:
             joints = [j for j, x in zip(robot.coordinate_names, values, strict=True) if x != 0]
-            if joints:
+            if joints and effect not in keys:
                 lines.append(f"{name} of {', '.join(joints)}")
         return lines
 

@@ -17,7 +17,7 @@ from hovi.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 
-STEPS_PER_SECOND = 200
+STEPS_PER_SECOND = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,8 @@ def play(
     plan: a motion with its torques, which may come from a simpler scene.
     feedback: "none", "pd" or "computed-torque": see `controllers`.
     bandwidth: of the feedback, in [rad/s].
-    intervals: steps of the simulation, 200 a second when not given. inner_modes: as `simulate`.
+    intervals: steps of the simulation, from `steps_on_nodes` when not given.
+    inner_modes: as `simulate`.
     Raises InputError when the plan is another robot's, or the steps are too long to be solved.
     """
     names = scene.robot.coordinate_names
@@ -86,7 +87,21 @@ def play(
             f"{scene.robot.name!r} has {', '.join(names)}; play it on a scene of its own robot."
         )
     drive = controller(plan, feedback, scene.robot, bandwidth)
-    count = intervals or max(1, math.ceil(STEPS_PER_SECOND * plan.duration))
+    count = intervals or steps_on_nodes(plan)
     start = State(plan.q[0], plan.v[0])
     motion = simulate(scene, start, plan.duration, drive, intervals=count, inner_modes=inner_modes)
     return Tracking(plan, motion, drive)
+
+
+def steps_on_nodes(plan: Trajectory) -> int:
+    """At least 400 steps a second that end at every node of the plan, where its torques jump.
+
+    A step across a jump is of first order, whatever the integrator. Where the nodes are no
+    multiples of the shortest interval, just that many steps.
+    """
+    wanted = max(1, math.ceil(STEPS_PER_SECOND * plan.duration))
+    places = plan.t / plan.grid.steps.min()
+    if np.abs(places - np.round(places)).max() > 1e-6:
+        return wanted
+    units = round(float(places[-1]))
+    return units * math.ceil(wanted / units)

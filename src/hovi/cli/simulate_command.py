@@ -32,7 +32,7 @@ def simulate(
     ] = None,
     intervals: Annotated[
         int | None,
-        typer.Option(help="Steps; when not given, 100 a second, or 200 with a plan."),
+        typer.Option(help="Steps; when not given, 100 a second, or 400 with a plan."),
     ] = None,
     inner_modes: Annotated[int, typer.Option(help="R; the order is 2 (R + 1).")] = 1,
     out: Annotated[
