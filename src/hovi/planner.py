@@ -18,6 +18,7 @@ from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
 from hovi.goals import Via
 from hovi.grid import Grid
+from hovi.ladder import climb, may_help
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
 from hovi.problem import TrajectoryProblem
@@ -56,6 +57,7 @@ def plan(
     time_limit: float | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
+    continuation: bool = True,
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
 
@@ -79,6 +81,8 @@ def plan(
     max_iterations: of one solve. time_limit: of everything, in [s]; returns the best so far.
     processes: for the starts; all processors by default.
     progress: called with a line of text and the fraction done.
+    continuation: where no start ends in a minimum, solve easier problems that lead to this one,
+        in inertia, gravity, duration, intervals and limits; the message says which led there.
     Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
     """
     began = time.perf_counter()
@@ -116,6 +120,9 @@ def plan(
     problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
+    if continuation and may_help(best):
+        best = climb(fine, best, guess, ends, progress)
+        minima = (best.cost,) if best.success else ()
     return dataclasses.replace(
         best,
         problem=best.problem or _on_grid_of(problem, best),
