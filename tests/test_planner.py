@@ -225,7 +225,7 @@ def test_no_time_gives_the_guess_and_says_so(arm_scene: Scene) -> None:
 
 
 def test_the_iteration_limit_is_of_one_solve(arm_scene: Scene) -> None:
-    found = swing_up(arm_scene, max_iterations=2)
+    found = swing_up(arm_scene, max_iterations=2, continuation=False)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
     assert found.nit == 2
 

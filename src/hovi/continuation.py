@@ -9,12 +9,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import pinocchio as pin
 
 from hovi.easing import HeavierRotors, WeakerGravity
 from hovi.effects import Effect
+from hovi.frame_goal import FrameGoal
+from hovi.goals import Via
 from hovi.grid import Grid
 from hovi.limits import Limits
 from hovi.multistart import Job
@@ -46,6 +49,7 @@ class Rung:
     job: Job
 
 
+Goal = TypeVar("Goal", State, State | FrameGoal)
 Way = Callable[[Job], list[Rung]]
 """Rungs from the easiest; none where the way leads nowhere. The job itself is not among them."""
 
@@ -87,8 +91,6 @@ def growing_gravity(job: Job) -> list[Rung]:
 
 def other_durations(job: Job) -> list[Rung]:
     """From a shorter time, or from a longer one where limits bind; velocities in proportion."""
-    if not (isinstance(job.start, State) and isinstance(job.goal, State)):
-        return []
     limited = bool(job.limits.bounded.any())
     return [
         Rung(f"a duration of {share * job.grid.duration:.4g} s", _lasting(job, share))
@@ -103,6 +105,8 @@ def finer_grids(job: Job) -> list[Rung]:
     while N >= 2 * FEWEST:
         N = (N + 1) // 2
         grid = Grid.uniform(job.grid.duration, N, galerkin(2))
+        if job.via:
+            grid = grid.with_nodes([via.time for via in job.via])
         rungs.append(Rung(f"{N} intervals", dataclasses.replace(job, grid=grid)))
     return rungs[::-1]
 
@@ -138,9 +142,14 @@ def _widened(limits: Limits, share: float) -> Limits:
 
 def _lasting(job: Job, share: float) -> Job:
     """The job in another time, its ends passed through faster or slower in proportion."""
-    grid = dataclasses.replace(job.grid, steps=share * job.grid.steps)
-    start, goal = (
-        state if state.v is None else dataclasses.replace(state, v=np.asarray(state.v) / share)
-        for state in (job.start, job.goal)
-    )
-    return dataclasses.replace(job, grid=grid, start=start, goal=goal)
+    grid = Grid(share * job.grid.steps, job.grid.schemes)
+    via = tuple(Via(share * each.time, _passed(each.goal, share)) for each in job.via)
+    start, goal = _passed(job.start, share), _passed(job.goal, share)
+    return dataclasses.replace(job, grid=grid, start=start, goal=goal, via=via)
+
+
+def _passed(state: Goal, share: float) -> Goal:
+    """A state passed through faster by 1/share; goals of frames leave the velocity free."""
+    if isinstance(state, FrameGoal) or state.v is None:
+        return state
+    return dataclasses.replace(state, v=np.asarray(state.v) / share)

@@ -10,6 +10,8 @@ from hovi.effects import Effect
 if TYPE_CHECKING:
     import pinocchio as pin
 
+    from hovi.robot import Robot
+
 
 @dataclass(frozen=True)
 class HeavierRotors(Effect):
@@ -23,7 +25,7 @@ class HeavierRotors(Effect):
     inertia: float
     key: ClassVar[str] = "heavier_rotors"
 
-    def configure(self, model: pin.Model) -> None:
+    def configure(self, model: pin.Model, robot: Robot) -> None:
         """Rotors are simulated by Pinocchio itself."""
         model.armature = model.armature + self.inertia
 
@@ -42,7 +44,7 @@ class WeakerGravity(Effect):
     share: float
     key: ClassVar[str] = "weaker_gravity"
 
-    def configure(self, model: pin.Model) -> None:
+    def configure(self, model: pin.Model, robot: Robot) -> None:
         """Gravity is simulated by Pinocchio itself."""
         model.gravity.linear = self.share * model.gravity.linear
 

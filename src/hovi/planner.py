@@ -116,13 +116,11 @@ def plan(
     )
     ends = None if time_limit is None else time.monotonic() + time_limit
     chatter = progress or _silent
-    search = _Search(fine, processes or default_processes(), ends, chatter, free, wanted)
+    count = processes or default_processes()
+    search = _Search(fine, count, ends, chatter, free, wanted, continuation)
     problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
-    if continuation and may_help(best):
-        best = climb(fine, best, guess, ends, progress)
-        minima = (best.cost,) if best.success else ()
     return dataclasses.replace(
         best,
         problem=best.problem or _on_grid_of(problem, best),
@@ -142,6 +140,7 @@ class _Search:
     progress: Progress
     free: FreeDuration | None = None
     tolerance: Tolerance | None = None
+    continuation: bool = True
 
     def run(
         self, guess: str | Trajectory, starts: int, seed: int
@@ -151,11 +150,14 @@ class _Search:
         pool = Pool(job, self.processes, self._explore_until(job))
         first = guess_path(job.problem(), guess)
         search = explore(pool, first, starts, seed, self.progress)
-        found = search.minima
+        found = self._climbed(job, search.minima, guess)
         if self.tolerance is not None and not search.interrupted:
             found = self._refine_to(self.tolerance, found)
         elif job is not self.fine:
-            found = _on_coarse_grid(found[:1]) if search.interrupted else self._refine(found)
+            if search.interrupted:
+                found = _on_coarse_grid(found[:1])
+            else:
+                found = self._climbed(self.fine, self._refine(found), guess)
         if self.free is not None and not search.interrupted:
             found = self._freed(self.free, found[:REFINED])
         best = found[0]
@@ -163,6 +165,12 @@ class _Search:
             ended = f"{best.message} The search ended after {search.done} of {starts} starts."
             best = dataclasses.replace(best, message=ended)
         return best, tuple(s.cost for s in found if s.success)
+
+    def _climbed(self, job: Job, found: list[Solution], guess: str | Trajectory) -> list[Solution]:
+        """What continuation leads to where there is no minimum among what was found."""
+        if not self.continuation or not may_help(found[0]):
+            return found
+        return [climb(job, found[0], guess, self.deadline, self.progress)]
 
     def _explore_until(self, job: Job) -> float | None:
         """The search's deadline, which leaves time for refining."""
