@@ -22,7 +22,13 @@ PACKAGE = str(Path(hovi.__file__).parent)
 
 PARTS = {
     "kernel": ("rigid_body/", "point_function"),
-    "assembly": ("discrete_lagrangian", "lagrangian", "torque_model", "trajectory_objective"),
+    "assembly": (
+        "discrete_lagrangian",
+        "lagrangian",
+        "torque_model",
+        "trajectory_objective",
+        "optimize/contraction",
+    ),
     "factorisation": ("optimize/band", "optimize/merge_tree"),
 }
 """Modules of each part; the rest is Python."""

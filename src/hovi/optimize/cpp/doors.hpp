@@ -22,7 +22,7 @@ constexpr std::size_t panel_columns = 4;
 // The lower triangle of a symmetric matrix by panels of four columns. A panel's columns lie one
 // after the other, each from the panel's first row on: entry (i, j) at j stride + i - (j - j % 4).
 struct Band {
-  std::size_t panels;
+  std::size_t size, panels;
   std::size_t stride;        // from one column to the next
   const std::int64_t* rows;  // of each panel, a multiple of 4; where panels end does not fall
 };
@@ -38,9 +38,11 @@ struct Doors {
   void (*contract)(const Contraction& shape, const double* gradient, const double* hessian,
                    double* workspace, double* columns_gradient, double* columns_hessian);
 
-  // L of A = L L^T in A's place, with the reciprocals of its diagonal in the diagonal's place;
-  // false where A is not positive definite.
-  bool (*factor)(const Band& shape, double* band);
+  // L of A = band + shift metric = L L^T, with the reciprocals of its diagonal in the diagonal's
+  // place; false where A is not positive definite. Columns from `size` on only fill up the last
+  // panel: they are taken for those of the unit matrix.
+  bool (*factor)(const Band& shape, const double* band, const double* metric, double shift,
+                 double* factor);
 
   // x = A^-1 x with that L.
   void (*solve)(const Band& shape, const double* factor, double* x);

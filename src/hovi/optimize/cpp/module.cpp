@@ -61,10 +61,6 @@ void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& st
                            columns_gradient.data(), columns_hessian.data());
 }
 
-inline void add(const double* a, double factor, const double* b, std::size_t size, double* sum) {
-  for (std::size_t i = 0; i < size; ++i) sum[i] = a[i] + factor * b[i];
-}
-
 void assemble(const Input<5>& hessian, const Index& starts, const Index& positions,
               const Index& lengths, const std::optional<Input<1>>& scales,
               const Output<2>& band) {
@@ -74,31 +70,29 @@ void assemble(const Input<5>& hessian, const Index& starts, const Index& positio
   const std::int64_t *start = starts.data(), *position = positions.data(), *length = lengths.data();
   const double *const numbers = hessian.data(), *const scale = scales ? scales->data() : nullptr;
   double* const entries = band.data();
-  for (std::size_t run = 0; run < runs; ++run)
-    add(entries + position[run], scale ? scale[run] : 1.0, numbers + start[run], length[run],
-        entries + position[run]);
+  for (std::size_t run = 0; run < runs; ++run) {
+    const double factor = scale ? scale[run] : 1.0;
+    const double* from = numbers + start[run];
+    double* to = entries + position[run];
+    for (std::int64_t i = 0; i < length[run]; ++i) to[i] += factor * from[i];
+  }
 }
 
-// Columns that only fill up the last panel are those of the unit matrix.
 bool factor(const Input<2>& band, const Input<2>& metric, double shift, const Index& rows,
             std::size_t size, const Output<2>& out, bool portable) {
-  const hovi::Band shape{rows.shape(0), band.shape(1), rows.data()};
+  const hovi::Band shape{size, rows.shape(0), band.shape(1), rows.data()};
   const nb::gil_scoped_release released;
-  const std::size_t columns = band.shape(0);
-  add(band.data(), shift, metric.data(), columns * shape.stride, out.data());
-  for (std::size_t j = size; j < columns; ++j)
-    out.data()[j * shape.stride + j % hovi::panel_columns] = 1.0;
-  return doors(portable).factor(shape, out.data());
+  return doors(portable).factor(shape, band.data(), metric.data(), shift, out.data());
 }
 
 void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const Output<1>& out,
            bool portable) {
-  const hovi::Band shape{rows.shape(0), factor.shape(1), rows.data()};
-  const std::size_t size = rhs.shape(0);
+  const std::size_t size = rhs.shape(0), columns = factor.shape(0);
+  const hovi::Band shape{size, rows.shape(0), factor.shape(1), rows.data()};
   const nb::gil_scoped_release released;
-  const auto x = room(factor.shape(0));
+  const auto x = room(columns);
   std::copy_n(rhs.data(), size, x.get());
-  std::fill_n(x.get() + size, factor.shape(0) - size, 0.0);
+  std::fill_n(x.get() + size, columns - size, 0.0);
   doors(portable).solve(shape, factor.data(), x.get());
   std::copy_n(x.get(), size, out.data());
 }

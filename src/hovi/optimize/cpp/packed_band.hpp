@@ -65,7 +65,19 @@ inline void subtract_panel(double* const column[panel_columns], std::size_t firs
   }
 }
 
-bool factor(const Band& shape, double* band) {
+inline void add(const Band& shape, const double* band, const double* metric, double shift,
+                double* sum) {
+  const Pack factor = broadcast(shift);
+  const std::size_t columns = shape.panels * panel_columns, entries = columns * shape.stride;
+  for (std::size_t i = 0; i < entries; i += lanes)
+    store(sum + i, load(band + i) + factor * load(metric + i));
+  for (std::size_t j = shape.size; j < columns; ++j)
+    sum[j * shape.stride + j % panel_columns] = 1.0;
+}
+
+bool factor(const Band& shape, const double* unshifted, const double* metric, double shift,
+            double* band) {
+  add(shape, unshifted, metric, shift, band);
   for (std::size_t panel = 0; panel < shape.panels; ++panel) {
     const std::size_t rows = shape.rows[panel];
     double* const start = panel_of(shape, band, panel);

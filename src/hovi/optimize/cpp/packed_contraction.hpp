@@ -9,7 +9,7 @@
 namespace hovi {
 namespace {
 
-constexpr std::size_t largest_tile = 128;  // numbers of an n x n block that are done at a time
+constexpr std::size_t largest_tile = 64;  // numbers of an n x n block that are done at a time
 
 // Rows of the n x n blocks that are done at a time, and the room of what they hold.
 inline std::size_t tile_rows(std::size_t n) {
@@ -20,8 +20,8 @@ inline std::size_t tile_room(std::size_t n) {
 }
 
 std::size_t workspace(const Contraction& shape) {
-  const std::size_t m = shape.columns;
-  return (9 + 3 * m + m * (m + 1) / 2) * tile_room(shape.dof) + 6 * shape.points * m;
+  const std::size_t m = shape.columns, terms = 3 * shape.points;
+  return (9 + terms * m + m * (m + 1) / 2) * tile_room(shape.dof) + 2 * terms * m;
 }
 
 // The table of one interval, by its length: A = table / (1, h, h^2) and h w A, each (Q, 3, m).
@@ -53,37 +53,60 @@ inline void read_tile(const double* hessian, std::size_t n, std::size_t first, s
     }
 }
 
-// out (+)= x[0] a + x[1] b + x[2] c over whole packs.
-template <bool add>
-inline void combine(const double* x, std::size_t stride, const double* a, const double* b,
-                    const double* c, std::size_t room, double* out) {
-  const Pack x0 = broadcast(x[0]), x1 = broadcast(x[stride]), x2 = broadcast(x[2 * stride]);
-  for (std::size_t p = 0; p < room; p += lanes) {
-    const Pack term = x0 * load(a + p) + x1 * load(b + p) + x2 * load(c + p);
-    store(out + p, add ? load(out + p) + term : term);
-  }
+// H_q A_q: for each column j the three n x n blocks of rows (q, v, a).
+inline void multiply_point(const double* tile, const double* A, std::size_t m, std::size_t terms,
+                           std::size_t room, double* halves) {
+  for (std::size_t r = 0; r < 3; ++r, tile += 3 * room)
+    for (std::size_t j = 0; j < m; ++j) {
+      const Pack x = broadcast(A[j]), y = broadcast(A[m + j]), z = broadcast(A[2 * m + j]);
+      double* out = halves + (terms * j + r) * room;
+      for (std::size_t p = 0; p < room; p += lanes)
+        store(out + p,
+              x * load(tile + p) + y * load(tile + room + p) + z * load(tile + 2 * room + p));
+    }
 }
 
-// One point's share of the lower triangle of the blocks.
-inline void add_point(const double* tile, const double* A, const double* weighted, std::size_t m,
-                      std::size_t room, double* half, double* sums) {
-  for (std::size_t r = 0; r < 3; ++r)
-    for (std::size_t j = 0; j < m; ++j) {
-      const double* row = tile + 3 * r * room;
-      combine<false>(A + j, m, row, row + room, row + 2 * room, room, half + (3 * j + r) * room);
+// Some packs of some blocks (i, j), (i + 1, j), ...: the sums over the terms of A_i (H A)_j.
+template <std::size_t blocks, std::size_t packs>
+inline void sum_terms(const double* weighted, const double* half, std::size_t m,
+                      std::size_t terms, std::size_t room, double* sums) {
+  Pack total[blocks][packs] = {};
+  for (std::size_t t = 0; t < terms; ++t, weighted += m, half += room)
+    for (std::size_t b = 0; b < blocks; ++b) {
+      const Pack factor = broadcast(weighted[b]);
+      for (std::size_t p = 0; p < packs; ++p) total[b][p] += factor * load(half + p * lanes);
     }
-  for (std::size_t i = 0; i < m; ++i)
-    for (std::size_t j = 0; j <= i; ++j, sums += room) {
-      const double* column = half + 3 * j * room;
-      combine<true>(weighted + i, m, column, column + room, column + 2 * room, room, sums);
-    }
+  for (std::size_t b = 0; b < blocks; ++b)
+    for (std::size_t p = 0; p < packs; ++p) store(sums + b * room + p * lanes, total[b][p]);
+}
+
+template <std::size_t blocks>
+inline void sum_blocks(const double* weighted, const double* half, std::size_t m,
+                       std::size_t terms, std::size_t room, double* sums) {
+  std::size_t p = 0;
+  for (; p + 3 * lanes <= room; p += 3 * lanes)
+    sum_terms<blocks, 3>(weighted, half + p, m, terms, room, sums + p);
+  for (; p < room; p += lanes)
+    sum_terms<blocks, 1>(weighted, half + p, m, terms, room, sums + p);
+}
+
+// The blocks (i, j) of the lower triangle, column by column.
+inline void sum_points(const double* weighted, const double* halves, std::size_t m,
+                       std::size_t terms, std::size_t room, double* sums) {
+  for (std::size_t j = 0; j < m; ++j, halves += terms * room) {
+    std::size_t i = j;
+    for (; i + 3 <= m; i += 3, sums += 3 * room)
+      sum_blocks<3>(weighted + i, halves, m, terms, room, sums);
+    for (; i < m; ++i, sums += room)
+      sum_blocks<1>(weighted + i, halves, m, terms, room, sums);
+  }
 }
 
 // Both triangles from the lower one.
 inline void write_tile(const double* sums, std::size_t m, std::size_t n, std::size_t first,
                        std::size_t rows, std::size_t room, double* out) {
-  for (std::size_t i = 0; i < m; ++i)
-    for (std::size_t j = 0; j <= i; ++j, sums += room) {
+  for (std::size_t j = 0; j < m; ++j)
+    for (std::size_t i = j; i < m; ++i, sums += room) {
       double* lower = out + ((i * m + j) * n + first) * n;
       double* upper = out + (j * m + i) * n * n + first;
       std::copy(sums, sums + rows * n, lower);
@@ -104,22 +127,22 @@ inline void contract_gradient(const Contraction& shape, const double* weighted,
 
 void contract(const Contraction& shape, const double* gradient, const double* hessian,
               double* work, double* columns_gradient, double* columns_hessian) {
-  const std::size_t Q = shape.points, m = shape.columns, n = shape.dof;
-  const std::size_t room = tile_room(n), rows = tile_rows(n), pairs = m * (m + 1) / 2;
-  double *tile = work, *half = tile + 9 * room, *sums = half + 3 * m * room;
-  double *A = sums + pairs * room, *weighted = A + 3 * Q * m;
+  const std::size_t Q = shape.points, m = shape.columns, n = shape.dof, terms = 3 * Q;
+  const std::size_t room = tile_room(n), rows = tile_rows(n);
+  double *tile = work, *halves = tile + 9 * room, *sums = halves + terms * m * room;
+  double *A = sums + m * (m + 1) / 2 * room, *weighted = A + terms * m;
   std::fill(tile, tile + 9 * room, 0.0);
   for (std::size_t k = 0; k < shape.intervals; ++k) {
     if (k == 0 || shape.steps[k] != shape.steps[k - 1])
       scale_table(shape, shape.steps[k], A, weighted);
-    contract_gradient(shape, weighted, gradient + k * Q * 3 * n, columns_gradient + k * m * n);
+    contract_gradient(shape, weighted, gradient + k * terms * n, columns_gradient + k * m * n);
     for (std::size_t first = 0; first < n; first += rows) {
       const std::size_t count = std::min(rows, n - first);
-      std::fill(sums, sums + pairs * room, 0.0);
       for (std::size_t q = 0; q < Q; ++q) {
         read_tile(hessian + (k * Q + q) * 9 * n * n, n, first, count, room, tile);
-        add_point(tile, A + 3 * q * m, weighted + 3 * q * m, m, room, half, sums);
+        multiply_point(tile, A + 3 * q * m, m, terms, room, halves + 3 * q * room);
       }
+      sum_points(weighted, halves, m, terms, room, sums);
       write_tile(sums, m, n, first, count, room, columns_hessian + k * m * m * n * n);
     }
   }
