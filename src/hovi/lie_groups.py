@@ -1,0 +1,203 @@
+"""The groups that joints move on, SO(2), SE(2), SO(3) and SE(3): exp and log over batches.
+
+Elements and tangent vectors are those of Pinocchio: (cos, sin); (x, y, cos, sin) with (v, w); a
+unit quaternion (x, y, z, w) with w in the body's axes; (p, quaternion) with (v, w). Tangent
+vectors are left-invariant: g (+) d = g exp(d).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+SERIES_BELOW = 1.0
+"""Angles squared below which coefficients are summed as series."""
+_TERMS = 10
+
+
+@dataclass(frozen=True)
+class Group:
+    """One of the groups.
+
+    name: as files name it. nq: numbers of an element. nv: of a tangent vector.
+    angular: places of the rotation in a tangent vector.
+    unit: places in an element of what has unit norm.
+    """
+
+    name: str
+    nq: int
+    nv: int
+    angular: tuple[int, ...]
+    unit: tuple[int, ...]
+    _compose: Callable[[Array, Array], Array]
+    _log: Callable[[Array, Array], Array]
+
+    def integrate(self, g: Array, d: Array) -> Array:
+        """g exp(d): elements (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
+        return self.normalized(self._compose(g, d))
+
+    def difference(self, g0: Array, g1: Array) -> Array:
+        """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
+        return self._log(g0, g1)
+
+    def normalized(self, g: Array) -> Array:
+        """Elements (..., nq) with their unit part of unit norm."""
+        result = np.array(g, dtype=np.float64)
+        part = result[..., list(self.unit)]
+        size = np.sqrt(np.sum(part * part, axis=-1, keepdims=True))
+        result[..., list(self.unit)] = part / size
+        return result
+
+
+def _turn(c: Array, s: Array) -> Array:
+    """(cos, sin) of the sum of two angles."""
+    return np.stack(
+        [c[..., 0] * s[..., 0] - c[..., 1] * s[..., 1], c[..., 1] * s[..., 0] + c[..., 0] * s[..., 1]],
+        axis=-1,
+    )
+
+
+def _circle(angle: Array) -> Array:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _so2_compose(g: Array, d: Array) -> Array:
+    return _turn(g, _circle(d[..., 0]))
+
+
+def _angle_between(g0: Array, g1: Array) -> Array:
+    cosine = np.sum(g0 * g1, axis=-1)
+    sine = g0[..., 0] * g1[..., 1] - g0[..., 1] * g1[..., 0]
+    return np.asarray(np.arctan2(sine, cosine))
+
+
+def _so2_log(g0: Array, g1: Array) -> Array:
+    return _angle_between(g0, g1)[..., None]
+
+
+def _se2_compose(g: Array, d: Array) -> Array:
+    w = d[..., 2]
+    # V(w) d = (sin w / w) d + ((1 - cos w) / w) (-d_y, d_x)
+    along, across = np.sinc(w / np.pi), 0.5 * w * np.sinc(w / (2 * np.pi)) ** 2
+    local = _turn(np.stack([along, across], axis=-1), d[..., :2])
+    return np.concatenate(
+        [g[..., :2] + _turn(g[..., 2:], local), _turn(g[..., 2:], _circle(w))], axis=-1
+    )
+
+
+def _se2_log(g0: Array, g1: Array) -> Array:
+    w = _angle_between(g0[..., 2:], g1[..., 2:])
+    back = g0[..., 2:] * np.array([1.0, -1.0])
+    p = _turn(back, g1[..., :2] - g0[..., :2])
+    along = 1.0 - w * w * half_cotangent(w * w)  # (w / 2) cot(w / 2)
+    v = _turn(np.stack([along, -0.5 * w], axis=-1), p)
+    return np.concatenate([v, w[..., None]], axis=-1)
+
+
+def _quaternion(w: Array) -> Array:
+    """exp(w) as (x, y, z, w), shape (..., 4)."""
+    angle = np.sqrt(np.sum(w * w, axis=-1, keepdims=True))
+    return np.concatenate([0.5 * np.sinc(angle / (2 * np.pi)) * w, np.cos(0.5 * angle)], axis=-1)
+
+
+def quaternion_product(a: Array, b: Array) -> Array:
+    """a b, shape (..., 4)."""
+    vector = a[..., 3:] * b[..., :3] + b[..., 3:] * a[..., :3] + np.cross(a[..., :3], b[..., :3])
+    scalar = a[..., 3:] * b[..., 3:] - np.sum(a[..., :3] * b[..., :3], axis=-1, keepdims=True)
+    return np.concatenate([vector, scalar], axis=-1)
+
+
+def rotated(quaternion: Array, x: Array) -> Array:
+    """R x for a unit quaternion, shape (..., 3)."""
+    u, w = quaternion[..., :3], quaternion[..., 3:]
+    t = 2.0 * np.cross(u, x)
+    return np.asarray(x + w * t + np.cross(u, t))
+
+
+def conjugate(quaternion: Array) -> Array:
+    """The quaternion of the inverse rotation."""
+    return quaternion * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def _so3_compose(g: Array, d: Array) -> Array:
+    return quaternion_product(g, _quaternion(d))
+
+
+def _so3_log(g0: Array, g1: Array) -> Array:
+    product = quaternion_product(conjugate(g0), g1)
+    product = np.where(product[..., 3:] < 0, -product, product)
+    u, w = product[..., :3], product[..., 3:]
+    size = np.sqrt(np.sum(u * u, axis=-1, keepdims=True))
+    tiny = size < 1e-150
+    angle = 2.0 * np.arctan2(size, w)
+    return np.asarray(np.where(tiny, 2.0, angle / np.where(tiny, 1.0, size)) * u)
+
+
+def _se3_compose(g: Array, d: Array) -> Array:
+    v, w = d[..., :3], d[..., 3:]
+    square = np.sum(w * w, axis=-1, keepdims=True)
+    across = np.cross(w, v)
+    half = np.sinc(np.sqrt(square) / (2 * np.pi))
+    local = v + 0.5 * half * half * across + sine_defect(square) * np.cross(w, across)
+    return np.concatenate(
+        [g[..., :3] + rotated(g[..., 3:], local), _so3_compose(g[..., 3:], w)], axis=-1
+    )
+
+
+def _se3_log(g0: Array, g1: Array) -> Array:
+    w = _so3_log(g0[..., 3:], g1[..., 3:])
+    p = rotated(conjugate(g0[..., 3:]), g1[..., :3] - g0[..., :3])
+    across = np.cross(w, p)
+    square = np.sum(w * w, axis=-1, keepdims=True)
+    v = p - 0.5 * across + half_cotangent(square) * np.cross(w, across)
+    return np.concatenate([v, w], axis=-1)
+
+
+def sine_defect(square: Array) -> Array:
+    """(t - sin t) / t^3 of t^2."""
+    series, factorial = np.zeros_like(square), 1.0
+    coefficients = []
+    for k in range(_TERMS + 1):
+        factorial *= (2 * k + 2) * (2 * k + 3) if k else 6.0
+        coefficients.append((-1) ** k / factorial)
+    for c in reversed(coefficients):
+        series = series * square + c
+    t = np.sqrt(np.maximum(square, SERIES_BELOW))
+    return np.where(square < SERIES_BELOW, series, (t - np.sin(t)) / t**3)
+
+
+def half_cotangent(square: Array) -> Array:
+    """(1 - (t / 2) cot(t / 2)) / t^2 of t^2, for |t| < 2 pi."""
+    # (t / 2) cot(t / 2) = sum_k B_2k (-1)^k t^2k / (2 k)!, with Bernoulli's numbers
+    series = np.zeros_like(square)
+    for c in reversed(_COTANGENT):
+        series = series * square + c
+    t = np.sqrt(np.maximum(square, SERIES_BELOW))
+    closed = (1.0 - 0.5 * t * np.cos(0.5 * t) / np.sin(0.5 * t)) / t**2
+    return np.where(square < SERIES_BELOW, series, closed)
+
+
+_COTANGENT = (
+    1 / 12,
+    1 / 720,
+    1 / 30240,
+    1 / 1209600,
+    1 / 47900160,
+    691 / 1307674368000,
+    1 / 74724249600,
+    3617 / 10670622842880000,
+    43867 / 5109094217170944000,
+    174611 / 802857662698291200000,
+    77683 / 14101100039391805440000,
+)
+
+SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), _so2_compose, _so2_log)
+SE2 = Group("SE(2)", 4, 3, (2,), (2, 3), _se2_compose, _se2_log)
+SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _so3_compose, _so3_log)
+SE3 = Group("SE(3)", 7, 6, (3, 4, 5), (3, 4, 5, 6), _se3_compose, _se3_log)
+GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}
