@@ -16,6 +16,7 @@ from hovi.effects import Effect, Gravity, JointLimitPotential
 from hovi.errors import ModelError, SceneError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
+from manifold_robots import chain, mimicking
 
 Array = npt.NDArray[np.float64]
 
@@ -73,7 +74,6 @@ def test_joints_that_are_no_vectors_have_torques_too(name: str, free_flyer: bool
     robot = load_robot(name, free_flyer=free_flyer)
     assert robot.nq != robot.nv
     scene = Scene(robot, [Gravity()])
-    assert not scene.analytic
     jet = random_points(robot.model)
     expected = rnea(robot, 9.81, *jet)
     tau = scene.inverse_dynamics(*jet)
@@ -118,9 +118,10 @@ def test_a_weight_that_is_none_is_refused(two_link: Robot, weight: Any) -> None:
         Scene(two_link).effort_lagrangian(weight)
 
 
-def test_a_robot_whose_joints_are_no_vectors_has_no_effort_yet() -> None:
-    with pytest.raises(ModelError, match=r"'j2s6s200_joint_1'.*locked="):
-        Scene(load_robot("kinova"), [Gravity()]).effort_lagrangian()
+def test_a_robot_whose_joints_are_of_no_known_kind_has_no_effort() -> None:
+    robot = load_robot(mimicking())
+    with pytest.raises(ModelError, match=r"'last' mimic.*locked="):
+        Scene(robot, [Gravity()]).effort_lagrangian()
 
 
 # What a scene is
@@ -197,4 +198,6 @@ def test_the_account_names_what_is_simulated_and_what_is_left_out(two_link: Robo
 
 def test_the_account_says_whose_derivatives_are_used(two_link: Robot) -> None:
     assert "Pinocchio's analytic ones" in Scene(two_link).describe()
-    assert "CasADi's" in Scene(load_robot("kinova")).describe()
+    assert "Pinocchio's analytic ones" in Scene(load_robot("kinova")).describe()
+    text = Scene(load_robot(chain([pin.JointModelRX(), pin.JointModelSpherical()]))).describe()
+    assert "CasADi's, since there are no analytic second ones for 'j1'" in text

@@ -95,12 +95,9 @@ class Chart:
 
     def linear_points(self, x: Array, dx: Array, ddx: Array) -> list[tuple[Factor, Array]]:
         """The Jacobians of `points` alone."""
-        found = []
-        for f in self.space.curved:
-            functions = chart_functions(f.group)
-            J = functions.jacobians(x[:, f.v], dx[:, f.v], ddx[:, f.v])
-            found.append((f, _Variation(functions.structure, x[:, f.v], dx[:, f.v], ddx[:, f.v], J)))
-        return [(f, variation.first) for f, variation in found]
+        return [
+            (f, _variation(f, x[:, f.v], dx[:, f.v], ddx[:, f.v]).first) for f in self.space.curved
+        ]
 
     def ends(self, x: Array, dx: Array, weight: Array) -> list[Bend]:
         """How (x1, x1') depends on (q0, q1, v1), in the tangent, per curved factor.
@@ -139,13 +136,11 @@ class _Variation:
         return D
 
 
-def _point(
-    factor: Factor, x: Array, dx: Array, ddx: Array, weight: Array
-) -> tuple[Array, Array]:
+def _point(factor: Factor, x: Array, dx: Array, ddx: Array, weight: Array) -> tuple[Array, Array]:
     """First and second derivatives of one factor: see Chart.points."""
     functions = chart_functions(factor.group)
     structure, k = functions.structure, factor.group.nv
-    variation = _Variation(structure, x, dx, ddx, functions.jacobians(x, dx, ddx))
+    variation = _variation(factor, x, dx, ddx)
     ad_v, ad_a = variation.ad_v, variation.ad_a
     n_q, n_v, n_a = weight[:, 0], weight[:, 1], weight[:, 2]
     # what weighs z, z' and z'' where they are of second order
@@ -169,6 +164,11 @@ def _point(
     return variation.first, H
 
 
+def _variation(factor: Factor, x: Array, dx: Array, ddx: Array) -> _Variation:
+    functions = chart_functions(factor.group)
+    return _Variation(functions.structure, x, dx, ddx, functions.jacobians(x, dx, ddx))
+
+
 def _quadratic(zz: Array, zdz: Array, zddz: Array) -> Array:
     """The Hessian in (z, z', z'') with blocks zz, -zdz / 2 and -zddz / 2, (P, 3 k, 3 k)."""
     zero = np.zeros_like(zz)
@@ -181,11 +181,10 @@ def _end(factor: Factor, x: Array, dx: Array, weight: Array) -> tuple[Array, Arr
 
     From q1 = q0 (+) x1 and v1 = J(x1) x1', which are differentiated implicitly.
     """
-    functions = chart_functions(factor.group)
-    structure, k = functions.structure, factor.group.nv
+    structure, k = chart_functions(factor.group).structure, factor.group.nv
     still = np.zeros_like(x)
-    variation = _Variation(structure, x, dx, still, functions.jacobians(x, dx, still))
-    inverse = np.linalg.inv(variation.J)
+    variation = _variation(factor, x, dx, still)
+    inverse: Array = np.asarray(np.linalg.inv(variation.J))
     slope = variation.J1 + variation.ad_v @ variation.J  # dv/dx
     force_v = _times(_T(inverse), weight[:, 1])
     force_q = _times(_T(inverse), weight[:, 0] - _times(_T(slope), force_v))

@@ -61,18 +61,21 @@ class IntervalCharts:
             gradients[part], hessians[part] = self._piece(part)._expand(g[part], H[part])
         return gradients, hessians
 
-    def end_derivatives(self, gradient: Array) -> Array:
-        """D1 .. D4 of L_d by (q0, h v0, q1, h v1), shape (B, 4, n), without differences of ends.
+    def nodal_gradient(self, gradient: Array) -> Array:
+        """The gradient (B, m, n) of L_d in nodal columns from that at the points, (P, 3, n)."""
+        return self._pulled(np.einsum("qri,bqra->bia", self.nodal_table, self._lifted(gradient)))
 
-        gradient: (P, 3, n) of the Lagrangian at the points.
-        """
-        weighted = gradient.reshape(self.x.shape) * self._point_weights[..., None]
-        lifted = self._lifted(weighted)
+    def end_gradient(self, gradient: Array) -> Array:
+        """As `nodal_gradient`, by (q0, h v0, q1, h v1) alone and without differences of ends."""
         table = _with_base(self.scheme.regular_table)
-        g = np.einsum("qri,bqra->bia", table, lifted)[:, :4]
+        g = np.einsum("qri,bqra->bia", table, self._lifted(gradient))[:, :4]
         g[:, 1] -= g[:, 2] + g[:, 3]
-        bends = self.chart.ends(self.ends[:, 0], self.ends[:, 1], g[:, 2:4])
-        return _pulled_from_ends(g[:, None], bends)[:, 0]
+        return self._pulled(g)
+
+    def _pulled(self, gradient: Array) -> Array:
+        """A gradient in the charts' columns as one in the nodal ones."""
+        bends = self.chart.ends(self.ends[:, 0], self.ends[:, 1], gradient[:, 2:4])
+        return _pulled_from_ends(gradient[:, None], bends)[:, 0]
 
     def point_steps(self, step: Array) -> Array:
         """Change of (q, h v, h^2 a) at the points in a nodal step (B, m, n), (B, Q, 3, n)."""
@@ -91,7 +94,7 @@ class IntervalCharts:
             i = factor.v
             flat = chart[..., i].reshape(len(first), -1, 1)
             points[..., i] = np.matmul(first, flat).reshape(points[..., i].shape)
-        return points
+        return np.asarray(points)
 
     def _piece(self, part: slice) -> IntervalCharts:
         return IntervalCharts(self.chart, self.scheme, self.h[part], self.x[part], self.ends[part])
@@ -107,10 +110,11 @@ class IntervalCharts:
     def _point_weights(self) -> Array:
         """h w_j / (1, h, h^2), shape (B, Q, 3)."""
         powers = self.h[:, None] ** -np.arange(3.0)
-        return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
+        return np.asarray(self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None])
 
-    def _lifted(self, weighted: Array) -> Array:
-        """The gradient at the points by (q0, x, h x', h^2 x''), (B, Q, 4, n)."""
+    def _lifted(self, gradient: Array) -> Array:
+        """The weighted gradient at the points by (q0, x, h x', h^2 x''), (B, Q, 4, n)."""
+        weighted = gradient.reshape(self.x.shape) * self._point_weights[..., None]
         lifted = np.concatenate([weighted[:, :, :1], weighted], axis=2)
         for factor, first in self.chart.linear_points(*self._rows):
             i = factor.v
@@ -125,7 +129,9 @@ class IntervalCharts:
         g = g.reshape(P, 3, n) * weights[..., None]
         # h w_j / h^(r + s) = (h w_j / h^r) / h^s
         powers = np.repeat(self.h[:, None] ** -np.arange(3.0), Q, axis=0)
-        H = H.reshape(P, 3, n, 3, n) * (weights[:, :, None, None, None] * powers[:, None, None, :, None])
+        H = H.reshape(P, 3, n, 3, n) * (
+            weights[:, :, None, None, None] * powers[:, None, None, :, None]
+        )
         bends = self.chart.points(*self._rows, g)
         lifted = _pulled_from_points(g[:, None], bends)[:, 0]
         half = _pulled_from_points(H.reshape(P, 3 * n, 3, n), bends)  # (P, 3 n, 4, n)
@@ -166,8 +172,8 @@ def _with_base(table: Array) -> Array:
 
 
 def _pulled_from_points(covector: Array, bends: list[Bend]) -> Array:
-    """Covectors of (q, h v, h^2 a), (P, R, 3, n), as those of (q0, x, h x', h^2 x''), (P, R, 4, n)."""
-    P, R, _, n = covector.shape
+    """Covectors of (q, h v, h^2 a), (P, R, 3, n), by (q0, x, h x', h^2 x'')."""
+    P, R = covector.shape[:2]
     pulled = np.concatenate([covector[:, :, :1], covector], axis=2)
     for bend in bends:
         i = bend.factor.v

@@ -12,7 +12,7 @@ dual numbers, SE(2) and SO(3) are parts of SE(3). [Barfoot2024, section 8.1.5]
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property
 from math import factorial
 
 import casadi as ca
@@ -116,9 +116,7 @@ class ChartFunctions:
         zero = ca.SX.zeros(3, 3)
         return [self._part(zero, M[i, 0], M[i, 1], M[i, 0]) for i in range(3)]
 
-    def _part(
-        self, top: ca.SX, right: ca.SX, bottom: ca.SX, left: ca.SX | None = None
-    ) -> ca.SX:
+    def _part(self, top: ca.SX, right: ca.SX, bottom: ca.SX, left: ca.SX | None = None) -> ca.SX:
         """The rows and columns of the group in a matrix of SE(3) made of four blocks."""
         left = ca.SX.zeros(3, 3) if left is None else left
         full = ca.vertcat(ca.horzcat(top, right), ca.horzcat(left, bottom))
@@ -126,14 +124,21 @@ class ChartFunctions:
         return full[places, places]
 
 
-@lru_cache(maxsize=None)
+@cache
 def chart_functions(group: Group) -> ChartFunctions:
     """The chart of a group, built once."""
     return ChartFunctions(group.name)
 
 
-_CROSS = ((0, 1, 2, 1.0), (1, 2, 0, 1.0), (2, 0, 1, 1.0), (0, 2, 1, -1.0), (2, 1, 0, -1.0))
-_CROSS = (*_CROSS, (1, 0, 2, -1.0))
+_CROSS = (
+    (0, 1, 2, 1.0),
+    (1, 2, 0, 1.0),
+    (2, 0, 1, 1.0),
+    (0, 2, 1, -1.0),
+    (2, 1, 0, -1.0),
+    (1, 0, 2, -1.0),
+)
+"""The cross product: its entries (i, j, k) with their signs."""
 
 
 def _cosine(k: int) -> float:
@@ -154,9 +159,7 @@ def _at(power: int, real: ca.SX, dual: ca.SX) -> Truncated:
     return Truncated({(power, 0): real, (power, 1): dual})
 
 
-def _curve(
-    x: tuple[ca.SX, ca.SX], dx: tuple[ca.SX, ca.SX], ddx: tuple[ca.SX, ca.SX]
-) -> Truncated:
+def _curve(x: tuple[ca.SX, ca.SX], dx: tuple[ca.SX, ca.SX], ddx: tuple[ca.SX, ca.SX]) -> Truncated:
     """x + x' t + x'' t^2 / 2."""
     return _at(0, *x) + _at(1, *dx) + 0.5 * _at(2, *ddx)
 

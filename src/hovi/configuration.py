@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 LARGEST = 1e9
 """Of a coordinate, in [rad] or [m]: squares of torques stay far from overflow."""
 
-UNIT_TOLERANCE = 1e-4
+UNIT_TOLERANCE = 1e-6
 """How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
 
 

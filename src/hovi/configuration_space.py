@@ -1,4 +1,4 @@
-"""The configuration space of a robot: a product of vector spaces and of the groups of its joints."""
+"""The configuration space of a robot: a product of vector spaces and groups of its joints."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class ConfigurationSpace:
         return result
 
     def unwound(self, x: Array, expected: Array) -> Array:
-        """Tangent vectors (..., nv) with the full turns of continuous joints nearest to expected."""
+        """Tangent vectors (..., nv) with those full turns that are nearest to `expected`."""
         result = np.array(x, dtype=np.float64)
         for factor in self.angles:
             i = factor.v.start
@@ -143,6 +143,16 @@ class ConfigurationSpace:
         result = np.array(q, dtype=np.float64)
         for group, rows, _ in self._grouped:
             result[..., rows] = group.normalized(result[..., rows])
+        return result
+
+    def nearest(self, q: Array, other: Array) -> Array:
+        """Configurations (..., nq) with those signs of quaternions that are nearest to another."""
+        result = np.array(q, dtype=np.float64)
+        for factor in self.curved:
+            if factor.group is not SE2:
+                part = slice(factor.q.stop - 4, factor.q.stop)
+                against = np.sum(q[..., part] * other[..., part], axis=-1, keepdims=True) < 0
+                result[..., part] = np.where(against, -q[..., part], q[..., part])
         return result
 
     def coordinates(self, q: Array) -> Array:
@@ -212,6 +222,3 @@ def _merged(parts: Sequence[int | str]) -> list[int | str]:
 
 def _sizes(group: Group) -> tuple[int, int]:
     return group.nq, group.nv
-
-
-__all__ = ["SE2", "SE3", "SO2", "SO3", "ConfigurationSpace", "Factor", "configuration_space"]

@@ -14,6 +14,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from hovi.chart import Chart
+from hovi.chart_expansion import IntervalCharts
+from hovi.configuration_space import ConfigurationSpace
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
 from hovi.optimize.contraction import contract
@@ -40,12 +43,14 @@ class Expansion:
     values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
     torque, jacobian: tau and d tau / d(q, v, a) at the quadrature points for an effort
         Lagrangian, one pair per batch, for lifted Newton steps.
+    charts: those of the intervals, one per batch, where configurations are not vectors.
     """
 
     values: Array
     gradient: Array
     hessian: Array
     torque: list[tuple[Array, Array]]
+    charts: list[IntervalCharts] | None = None
 
     @property
     def action(self) -> float:
@@ -88,6 +93,12 @@ class DiscreteLagrangian:
     lagrangian: Lagrangian
     grid: Grid
 
+    @cached_property
+    def chart(self) -> Chart | None:
+        """The chart of the intervals; None where tangent vectors are added to configurations."""
+        space = self.lagrangian.space
+        return None if space is None or space.flat else Chart(space)
+
     def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
         """L_d of every interval, shape (N,).
 
@@ -121,12 +132,17 @@ class DiscreteLagrangian:
         """
         parts = []
         known = jets or self.jets(path)
+        charts = self._charts(path)
         for i, batch in enumerate(self._batches):
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
             value, point_gradient, point_hessian, torque = self._evaluate(
                 batch, known[i], multiplier, term
             )
+            if charts is not None:
+                gradient, hessian = charts[i].expand(point_gradient, point_hessian)
+                parts.append(Expansion(value, gradient, hessian, torque, [charts[i]]))
+                continue
             table = _table(batch.scheme, coordinates)
             gradient, hessian = contract(
                 table, batch.scheme.weights, batch.h, point_gradient, point_hessian
@@ -139,8 +155,11 @@ class DiscreteLagrangian:
         m = 4 + self.grid.inner_modes
         gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
         for batch in self._batches:
-            point_gradient = self.lagrangian.gradient(*_jet(batch, path), t=batch.t)
-            part = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
+            point_gradient = self.lagrangian.gradient(*self._jet(batch, path), t=batch.t)
+            if self.chart is None:
+                part = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
+            else:
+                part = _charts(self.chart, batch, path).nodal_gradient(point_gradient)
             gradient[batch.index, : part.shape[1]] = part
         return gradient
 
@@ -155,7 +174,9 @@ class DiscreteLagrangian:
             values[batch.index] = part.values
             gradient[batch.index, :k] = part.gradient
             hessian[batch.index, :k, :k] = part.hessian
-        return Expansion(values, gradient, hessian, [tau_J for p in parts for tau_J in p.torque])
+        torque = [tau_J for part in parts for tau_J in part.torque]
+        charts = [each for part in parts for each in part.charts or ()] or None
+        return Expansion(values, gradient, hessian, torque, charts)
 
     def predict(
         self, expansion: Expansion, step: Array, coordinates: Coordinates
@@ -167,16 +188,27 @@ class DiscreteLagrangian:
         if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
             return None
         multipliers = []
-        steps = self.point_steps(step, coordinates)
+        steps = self.point_steps(step, coordinates, expansion)
         for dx, (tau, J) in zip(steps, expansion.torque, strict=True):
             predicted = tau + np.matmul(J, dx[:, :, None])[:, :, 0]
             multipliers.append(self.lagrangian.weight * predicted)
         return multipliers
 
-    def point_steps(self, step: Array, coordinates: Coordinates) -> list[Array]:
-        """Change of (q, v, a) at the quadrature points in a step, (P, 3 n) per batch."""
+    def point_steps(
+        self, step: Array, coordinates: Coordinates, expansion: Expansion
+    ) -> list[Array]:
+        """Change of (q, v, a) at the quadrature points in a step, (P, 3 n) per batch.
+
+        expansion: at the path from which the step is taken.
+        """
         steps = []
-        for batch in self._batches:
+        for i, batch in enumerate(self._batches):
+            if expansion.charts is not None:
+                m = 4 + batch.scheme.inner_modes
+                moved = expansion.charts[i].point_steps(step[batch.index, :m])
+                jet = moved * batch.minus_powers
+                steps.append(jet.reshape(len(batch.t), -1))
+                continue
             table = _table(batch.scheme, coordinates)
             Q, _, m = table.shape
             points = np.matmul(table.reshape(Q * 3, m), step[batch.index, :m])  # (B, 3 Q, n)
@@ -186,7 +218,7 @@ class DiscreteLagrangian:
 
     def jets(self, path: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
-        return [_jet(batch, path) for batch in self._batches]
+        return [self._jet(batch, path) for batch in self._batches]
 
     @cached_property
     def point_weights(self) -> list[Array]:
@@ -225,10 +257,15 @@ class DiscreteLagrangian:
         g = np.empty((N, 4, n))
         gradients = self.point_gradients(path, forces)
         for batch, gradient in zip(self._batches, gradients, strict=True):
+            if self.chart is not None:
+                g[batch.index] = _charts(self.chart, batch, path).end_gradient(gradient)
+                continue
             regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
             g[batch.index] = regular[:, :4]
         h = self.grid.steps[:, None]
         d1, d2, d3, d4 = g[:, 0], g[:, 1], g[:, 2], g[:, 3]
+        if self.chart is not None:
+            return np.stack([d1, h * d2, d3, h * d4], axis=1)
         return np.stack([d1 - d3, h * (d2 - d3 - d4), d3, h * d4], axis=1)
 
     def point_gradients(
@@ -237,7 +274,7 @@ class DiscreteLagrangian:
         """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; forces as above."""
         gradients = []
         for i, batch in enumerate(self._batches):
-            jet = _jet(batch, path)
+            jet = self._jet(batch, path)
             if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
                 gradients.append(self.lagrangian.gradient(*jet, t=batch.t, terms=forces[i]))
             else:
@@ -259,6 +296,16 @@ class DiscreteLagrangian:
         d = self.derivatives(path, forces)
         total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
         return total / self.grid.duration
+
+    def _jet(self, batch: _Batch, path: DiscretePath) -> Jet:
+        """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""
+        space = self.lagrangian.space
+        return _jet(batch, path) if space is None else _jet_on(space, batch, path)
+
+    def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
+        if self.chart is None:
+            return None
+        return [_charts(self.chart, batch, path) for batch in self._batches]
 
     @cached_property
     def _batches(self) -> list[_Batch]:
@@ -300,17 +347,40 @@ def _jet(batch: _Batch, path: DiscretePath) -> Jet:
     The chart of an interval is the identity: q = q0 + x.
     """
     h = batch.h[:, None]
-    r = batch.scheme.inner_modes
-    N, n = len(h), path.v.shape[1]
-    q0, v0 = path.q[:-1][batch.index], path.v[:-1][batch.index]
-    z, inner = path.z[batch.index], path.inner[batch.index, :r]
-    local = np.concatenate([(h * v0)[:, None], h[:, None] ** 2 * z, h[:, None] ** 2 * inner], 1)
-    table = batch.scheme.table
-    points = np.matmul(table.reshape(-1, 3 + r), local).reshape(N, -1, 3, n)
-    q = q0[:, None] + points[:, :, 0]
+    n = path.v.shape[1]
+    points = _points(batch, path)
+    q = path.q[:-1][batch.index][:, None] + points[:, :, 0]
     v = points[:, :, 1] / h[:, None]
     a = points[:, :, 2] / h[:, None] ** 2
     return q.reshape(-1, n), v.reshape(-1, n), a.reshape(-1, n)
+
+
+def _points(batch: _Batch, path: DiscretePath) -> Array:
+    """(x, h x', h^2 x'') of q0 (+) x at the quadrature points, shape (B, Q, 3, n)."""
+    h = batch.h[:, None]
+    r = batch.scheme.inner_modes
+    N, n = len(h), path.v.shape[1]
+    v0 = path.v[:-1][batch.index]
+    z, inner = path.z[batch.index], path.inner[batch.index, :r]
+    local = np.concatenate([(h * v0)[:, None], h[:, None] ** 2 * z, h[:, None] ** 2 * inner], 1)
+    table = batch.scheme.table
+    return np.asarray(np.matmul(table.reshape(-1, 3 + r), local).reshape(N, -1, 3, n))
+
+
+def _jet_on(space: ConfigurationSpace, batch: _Batch, path: DiscretePath) -> Jet:
+    """As `_jet`, in the charts q = q0 (+) x."""
+    n = path.v.shape[1]
+    x, dx, ddx = np.moveaxis((_points(batch, path) * batch.minus_powers).reshape(-1, 3, n), 1, 0)
+    q0 = np.repeat(path.q[:-1][batch.index], len(batch.scheme.weights), axis=0)
+    return Chart(space).jet(q0, x, dx, ddx)
+
+
+def _charts(chart: Chart, batch: _Batch, path: DiscretePath) -> IntervalCharts:
+    """The charts of a batch's intervals."""
+    h = batch.h[:, None, None]
+    v0, z = path.v[:-1][batch.index], path.z[batch.index]
+    ends = h * v0[:, None] + h**2 * z
+    return IntervalCharts(chart, batch.scheme, batch.h, _points(batch, path), ends)
 
 
 def _table(scheme: Scheme, coordinates: Coordinates) -> Array:

@@ -18,6 +18,8 @@ Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
 """(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
 
+QUADRATURE = 8
+"""Points by which the turns of continuous joints within an interval are told."""
 BUMP_MODES = 8
 BUMP_AMPLITUDES = (0.2, 1.5)
 """Range of a random bump's amplitude, in [rad] or [m]."""
@@ -31,28 +33,29 @@ class Curve(Protocol):
 
 
 def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The cubic through both ends: the least motion in the sense of 1/2 |a|^2.
+    """The cubic through both ends, x(t) of q0 (+) x: the least motion in the sense of 1/2 |x''|^2.
 
     boundary: (q0, v0, q1, v1). duration: T, in [s].
     """
     q0, v0, q1, v1 = boundary
     T = duration
     x1 = robot.difference(q0, q1)
-    local = np.stack([T * v0, x1 - T * v0, T * (v1 - v0)])  # h v0, Z0, Z1
+    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
+    local = np.stack([T * v0, x1 - T * v0, T * (dx1 - v0)])  # h v0, Z0, Z1
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
         jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
-        q = robot.integrate(np.broadcast_to(q0, (len(jet), robot.nq)), jet[:, 0])
-        return q, jet[:, 1] / T, jet[:, 2] / T**2
+        return _in_chart(robot, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
 
     return curve
 
 
 def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The quintic through both ends whose accelerations vanish there; arguments as for `cubic`."""
+    """The quintic through both ends whose x'' vanish there; arguments as for `cubic`."""
     q0, v0, q1, v1 = boundary
     T = duration
-    dq = robot.difference(q0, q1)
+    x1 = robot.difference(q0, q1)
+    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
     power = np.arange(6)[:, None]
     conditions = np.zeros((6, 6))
     for row, (s, derivative) in enumerate([(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]):
@@ -61,7 +64,7 @@ def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
                 j - derivative
             )
     zero = np.zeros(robot.nv)
-    ends = np.stack([zero, T * v0, zero, dq, T * v1, zero])
+    ends = np.stack([zero, T * v0, zero, x1, T * dx1, zero])
     c = np.linalg.solve(conditions, ends)  # (6, n)
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
@@ -69,9 +72,16 @@ def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
         x = (s**power).T @ c
         dx = (power[1:] * s ** power[:-1]).T @ c[1:]
         ddx = (power[2:] * power[1:-1] * s ** power[:-2]).T @ c[2:]
-        return robot.integrate(np.broadcast_to(q0, (len(t), robot.nq)), x), dx / T, ddx / T**2
+        return _in_chart(robot, q0, x, dx / T, ddx / T**2)
 
     return curve
+
+
+def _in_chart(
+    robot: Robot, q0: Array, x: Array, dx: Array, ddx: Array
+) -> tuple[Array, Array, Array]:
+    """The jet of q0 (+) x(t)."""
+    return robot.chart.jet(np.broadcast_to(q0, (len(x), robot.nq)), x, dx, ddx)
 
 
 def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
@@ -95,7 +105,23 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
         ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
-        return robot.integrate(q, x @ c), v + dx @ c, a + ddx @ c
+        return robot.chart.carried((q, v, a), x @ c, dx @ c, ddx @ c)
+
+    return curve
+
+
+def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curve:
+    """A curve with full turns more, spread over the whole time by a cubic at rest at both ends.
+
+    turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `full_turns`.
+    duration: T, in [s].
+    """
+    angle = 2 * np.pi * turns
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        s = np.asarray(t)[:, None] / duration
+        x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
+        return robot.chart.carried(base(t), x * angle, dx * angle, ddx * angle)
 
     return curve
 
@@ -132,7 +158,9 @@ def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> 
     """
     q, v, _ = (x.copy() for x in curve(grid.t))
     q[0], v[0], q[-1], v[-1] = boundary
-    return DiscretePath(q, v, regularised(robot, grid, q, v), _inner_modes(curve, grid, v.shape[1]))
+    turned = None if robot.vector_joints else _turned(curve, grid)
+    inner = _inner_modes(curve, grid, robot, q)
+    return DiscretePath(q, v, regularised(robot, grid, q, v, turned), inner)
 
 
 def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
@@ -146,10 +174,13 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
                 f"the guess's {name} must be finite and of shape {shape}, got {array.shape}; hand "
                 "in a Trajectory to change grids."
             )
-    gap = (regularised(robot, grid, path.q, path.v) - path.z) * (grid.steps**2)[:, None, None]
+    h = grid.steps[:, None]
+    turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
+    gap = (regularised(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
     if np.max(np.abs(gap)) > 1e-6 * max(1.0, float(np.max(np.abs(path.q)))):
         raise InputError(
-            "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h."
+            "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
+            "where configurations are vectors."
         )
 
 
@@ -177,18 +208,49 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     q[0], q[-1] = q0, q1
     v = path.v + Tdv / T
     v[0], v[-1] = v0, v1
-    return DiscretePath(q, v, path.z + z, path.inner)
+    return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, robot)
 
 
-def regularised(robot: Robot, grid: Grid, q: Array, v: Array) -> Array:
-    """z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h of every interval, shape (N, 2, nv)."""
+def regularised(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | None = None) -> Array:
+    """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
+
+    x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 where tangent vectors add.
+    turned: about how far the continuous joints turn in each interval, shape (N, nv); less than
+        half a turn when None.
+    """
     h = grid.steps[:, None]
-    z0 = (robot.difference(q[:-1], q[1:]) - h * v[:-1]) / h**2
-    return np.stack([z0, np.diff(v, axis=0) / h], axis=1)
+    x1, dx1 = robot.difference(q[:-1], q[1:]), v[1:]
+    if turned is not None:
+        x1 = robot.space.unwound(x1, turned)
+    if not robot.space.flat:
+        dx1 = robot.chart.rates(x1, dx1)[0]
+    return np.stack([(x1 - h * v[:-1]) / h**2, (dx1 - v[:-1]) / h], axis=1)
 
 
-def _inner_modes(curve: Curve, grid: Grid, n: int) -> Array:
-    """c_j = integral of b_j a over the interval, by Gauss quadrature, shape (N, r, n)."""
+def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> DiscretePath:
+    """A path whose z follows its nodes where tangent vectors do not add, and is kept elsewhere."""
+    if robot.space.flat:
+        return path
+    z, known = path.z.copy(), regularised(robot, grid, path.q, path.v)
+    for factor in robot.space.curved:
+        z[:, :, factor.v] = known[:, :, factor.v]
+    return DiscretePath(path.q, path.v, z, path.inner)
+
+
+def _turned(curve: Curve, grid: Grid) -> Array:
+    """The integral of v over every interval, by Gauss quadrature, shape (N, nv)."""
+    x, w = np.polynomial.legendre.leggauss(QUADRATURE)
+    t = grid.t[:-1, None] + grid.steps[:, None] * (x + 1) / 2
+    v = curve(t.ravel())[1].reshape(grid.intervals, QUADRATURE, -1)
+    return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
+
+
+def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
+    """c_j = integral of b_j x'' over the interval, by Gauss quadrature, shape (N, r, n).
+
+    nodes: configurations, shape (N + 1, nq).
+    """
+    n = robot.nv
     inner = np.zeros((grid.intervals, grid.inner_modes, n))
     for scheme, index in grid.groups:
         r = scheme.inner_modes
@@ -197,7 +259,11 @@ def _inner_modes(curve: Curve, grid: Grid, n: int) -> Array:
         x, w = np.polynomial.legendre.leggauss(r + 2)
         s = (x + 1) / 2
         t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
-        a = curve(t.ravel())[2].reshape(len(index), len(s), n)
+        q, v, a = curve(t.ravel())
+        if not robot.space.flat:
+            local = robot.difference(np.repeat(nodes[:-1][index], len(s), axis=0), q)
+            a = robot.chart.rates(local, v, a)[1]
         basis = interval_rows(s, r)[:, 2, 3:]  # (Q, r)
+        a = a.reshape(len(index), len(s), n)
         inner[index, :r] = np.einsum("kqn,qj,q->kjn", a, basis, w / 2)
     return inner

@@ -13,9 +13,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi import tangent
+from hovi.configuration_space import ConfigurationSpace
 from hovi.effort_term import EffortTerm
 from hovi.point_function import PointFunction
 from hovi.robot import Robot
+from hovi.tangent import Symbols
 from hovi.torque_model import TorqueModel, times
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +42,11 @@ class Lagrangian(ABC):
     @abstractmethod
     def nv(self) -> int:
         """Degrees of freedom."""
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The configuration space; None where configurations are vectors."""
+        return None
 
     @abstractmethod
     def value(self, *jet: Array, t: Array | None = None) -> Array:
@@ -118,6 +126,12 @@ class EffortLagrangian(Lagrangian):
     def nv(self) -> int:
         """Degrees of freedom."""
         return self.scene.robot.nv
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The robot's configuration space; None where configurations are vectors."""
+        robot = self.scene.robot
+        return None if robot.vector_joints else robot.space
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> tuple[Array, Array]:
         """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
@@ -213,13 +227,18 @@ class PotentialTerm:
     """A term V(q, v, a, t) of the cost from a CasADi expression.
 
     compile: whether its functions become machine code: see PointFunction.
+    space: the configuration space; None where configurations are vectors.
     """
 
     def __init__(
-        self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], expression: ca.SX, compile: bool = False
+        self,
+        symbols: Symbols,
+        expression: ca.SX,
+        compile: bool = False,
+        space: ConfigurationSpace | None = None,
     ) -> None:
         q, v, a, t = symbols
-        hessian, gradient = ca.hessian(expression, ca.vertcat(q, v, a))
+        hessian, gradient = tangent.hessian(expression, symbols, space)
         expand = ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
         self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]), compile)
         self._expand = PointFunction(expand, compile)

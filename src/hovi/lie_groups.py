@@ -54,12 +54,10 @@ class Group:
         return result
 
 
-def _turn(c: Array, s: Array) -> Array:
-    """(cos, sin) of the sum of two angles."""
-    return np.stack(
-        [c[..., 0] * s[..., 0] - c[..., 1] * s[..., 1], c[..., 1] * s[..., 0] + c[..., 0] * s[..., 1]],
-        axis=-1,
-    )
+def _turn(c: Array, p: Array) -> Array:
+    """The product of complex numbers (real, imaginary): p turned by c."""
+    real = c[..., 0] * p[..., 0] - c[..., 1] * p[..., 1]
+    return np.stack([real, c[..., 1] * p[..., 0] + c[..., 0] * p[..., 1]], axis=-1)
 
 
 def _circle(angle: Array) -> Array:
@@ -121,7 +119,7 @@ def rotated(quaternion: Array, x: Array) -> Array:
 
 def conjugate(quaternion: Array) -> Array:
     """The quaternion of the inverse rotation."""
-    return quaternion * np.array([-1.0, -1.0, -1.0, 1.0])
+    return np.asarray(quaternion * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
 def _so3_compose(g: Array, d: Array) -> Array:

@@ -96,7 +96,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
     def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
         """Change of the action and of the bounded outputs, to first order."""
         expansion = self.action.expansion
-        changes = self.ld.point_steps(model.gather(step), self.action.coordinates)
+        changes = self.ld.point_steps(model.gather(step), self.action.coordinates, expansion)
         rows = []
         self._linear = []
         for dx, (_tau, J) in zip(changes, expansion.torque, strict=True):

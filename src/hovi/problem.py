@@ -20,7 +20,7 @@ from hovi.lagrangian import EffortLagrangian
 from hovi.limits import Limits
 from hovi.robot import Robot
 from hovi.robot_model import check_mass_matrix
-from hovi.scene import Scene, require_vector_joints
+from hovi.scene import Scene, require_known_joints
 from hovi.schemes import require_regular
 from hovi.state import State
 
@@ -158,7 +158,7 @@ class TrajectoryProblem:
 def require_plannable(scene: Scene) -> None:
     """Raise ModelError for a robot on which motions cannot be planned."""
     robot = scene.robot
-    require_vector_joints(robot)
+    require_known_joints(robot)
     if robot.nv == 0:
         raise ModelError(f"robot {robot.name!r} has no joint that moves; nothing can be planned.")
     check_mass_matrix(scene.model)

@@ -19,6 +19,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi import configuration, robot_model
+from hovi.chart import Chart
+from hovi.configuration_space import ConfigurationSpace, configuration_space
 from hovi.errors import InputError, ModelError, nearest
 from hovi.example_robots import BUILT_IN_CODE, build_in_code
 from hovi.robot_geometry import Shapes, load_shapes
@@ -69,6 +71,28 @@ class Robot:
     def coordinate_names(self) -> tuple[str, ...]:
         """One name per velocity, (nv,): the joint's name, with [i] where it has several."""
         return configuration.entry_names(self.model, "nv")
+
+    @cached_property
+    def space(self) -> ConfigurationSpace:
+        """The configuration space as a product of vector spaces and groups.
+
+        It does not fit where a joint is of a kind that has no place in it: see `unplanned_joints`.
+        """
+        return self._space[0]
+
+    @cached_property
+    def chart(self) -> Chart:
+        """The charts q0 (+) x of its configuration space."""
+        return Chart(self.space)
+
+    @property
+    def unplanned_joints(self) -> tuple[str, ...]:
+        """Joints whose configurations are neither vectors nor of one of the known groups."""
+        return self._space[1]
+
+    @cached_property
+    def _space(self) -> tuple[ConfigurationSpace, tuple[str, ...]]:
+        return configuration_space(self.model)
 
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:
@@ -195,13 +219,17 @@ class Robot:
         """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq)."""
         if self.vector_joints:
             return np.asarray(q, dtype=float) + dq
-        return configuration.integrate(self.model, q, dq)
+        if self.unplanned_joints:
+            return configuration.integrate(self.model, q, dq)
+        return self.space.integrate(q, dq)
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq)."""
         if self.vector_joints:
             return np.asarray(q1, dtype=float) - q0
-        return configuration.difference(self.model, q0, q1)
+        if self.unplanned_joints:
+            return configuration.difference(self.model, q0, q1)
+        return self.space.difference(q0, q1)
 
     def frame_position(self, frame: str, q: Array) -> Array:
         """Where a frame's origin is in the world, in [m]: q (M, nq) -> (M, 3)."""

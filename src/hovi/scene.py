@@ -13,15 +13,17 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.configuration_space import ConfigurationSpace
 from hovi.effects import REGISTRY, Effect, SceneSymbols, Touch
 from hovi.effort_term import EffortTerm
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
 from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics
-from hovi.rigid_body import InverseDynamicsKernel, joints_without_kernel
+from hovi.rigid_body import InverseDynamicsKernel
 from hovi.robot import Robot
 from hovi.scene_account import SceneAccount, account
 from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
+from hovi.twin_kernel import TwinKernel, joints_without_twin
 
 Array = npt.NDArray[np.float64]
 
@@ -71,19 +73,20 @@ class Scene:
         """
         symbols = self.symbols
         added = self.added_torque(symbols)
-        if not self.analytic:
+        vector, space = self.robot.vector_joints, self._space
+        if not self.analytic or not (vector or symbols.base is None):
             tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
-            return CasadiTorque(
-                symbols.columns(), tau if added is None else tau + added, self.compile
-            )
+            total = tau if added is None else tau + added
+            return CasadiTorque(symbols.columns(), total, self.compile, space)
         main: TorqueModel
         if symbols.base is None:
-            main = AnalyticTorque(InverseDynamicsKernel(self.model))
+            kernel = InverseDynamicsKernel if vector else TwinKernel
+            main = AnalyticTorque(kernel(self.model))
         else:
             main = MovingBaseTorque(self.model, symbols.base, symbols.t, self.compile)
         if added is None:
             return main
-        return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile))
+        return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile, space))
 
     @cached_property
     def symbols(self) -> SceneSymbols:
@@ -107,7 +110,7 @@ class Scene:
     @property
     def analytic(self) -> bool:
         """Whether RNEA's derivatives are Pinocchio's analytic ones."""
-        return not joints_without_kernel(self.model)
+        return not joints_without_twin(self.model)
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
@@ -117,7 +120,7 @@ class Scene:
             [ColomboFerraroMartin2016, section 5]
         Raises ModelError for joints whose configurations are not vectors.
         """
-        require_vector_joints(self.robot)
+        require_known_joints(self.robot)
         R = self._effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
         passive = self._is_passive
         if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
@@ -198,6 +201,10 @@ class Scene:
         robot = Robot.from_dict(data["robot"])
         return cls(robot, effects, passive=tuple(data.get("passive", ())))
 
+    @property
+    def _space(self) -> ConfigurationSpace | None:
+        return None if self.robot.vector_joints else self.robot.space
+
     @cached_property
     def _is_passive(self) -> npt.NDArray[np.bool_]:
         return np.isin(np.arange(self.robot.nv), self.passive_coordinates)
@@ -213,7 +220,7 @@ class Scene:
         total = self.added_cost(self.symbols)
         if total is None:
             return None
-        return PotentialTerm(self.symbols.columns(), total, self.compile)
+        return PotentialTerm(self.symbols.columns(), total, self.compile, self._space)
 
     def added_cost(self, symbols: SceneSymbols) -> ca.SX | None:
         """V of the effects, a number; or None."""
@@ -245,7 +252,7 @@ class Scene:
     def _derivatives(self) -> str:
         if self.analytic:
             return "derivatives: Pinocchio's analytic ones (C++), since every joint has them"
-        joints = ", ".join(repr(joint) for joint in joints_without_kernel(self.model))
+        joints = ", ".join(repr(joint) for joint in joints_without_twin(self.model))
         return f"derivatives: CasADi's, since there are no analytic second ones for {joints}"
 
     def _left_out(self) -> list[str]:
@@ -278,13 +285,20 @@ def _sum(terms: Iterable[ca.SX]) -> ca.SX | None:
     return sum(named[1:], named[0]) if named else None
 
 
-def require_vector_joints(robot: Robot) -> None:
-    """Raise ModelError for a robot with joints on which nothing can be planned yet."""
-    if not robot.vector_joints:
-        joints = ", ".join(repr(joint) for joint in robot.manifold_joints)
+def require_known_joints(robot: Robot) -> None:
+    """Raise ModelError for a robot with joints on which nothing can be planned."""
+    if robot.unplanned_joints:
+        joints = ", ".join(repr(joint) for joint in robot.unplanned_joints)
         raise ModelError(
-            f"robot {robot.name!r} cannot be planned on yet: configurations of {joints} are not "
-            "vectors (nq differs from nv); lock these joints with load_robot(..., locked=[...])."
+            f"robot {robot.name!r} cannot be planned on: {joints} move neither by numbers that add "
+            "nor on SO(2), SE(2), SO(3) or SE(3); lock these joints with "
+            "load_robot(..., locked=[...])."
+        )
+    if len(robot.model.mimicking_joints):
+        joints = ", ".join(repr(str(robot.model.names[i])) for i in robot.model.mimicking_joints)
+        raise ModelError(
+            f"robot {robot.name!r} cannot be planned on: {joints} mimic other joints; lock them "
+            "with load_robot(..., locked=[...])."
         )
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Protocol
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi import tangent
+from hovi.configuration_space import ConfigurationSpace
 from hovi.point_function import PointFunction, default_threads
-from hovi.rigid_body import InverseDynamicsKernel
+from hovi.tangent import Symbols
 
 Array = npt.NDArray[np.float64]
 
@@ -45,21 +48,34 @@ class CasadiTorque:
     """A torque model from CasADi expressions: the definition, and the fallback of faster ones.
 
     compile: whether its functions become machine code: see PointFunction.
+    space: the configuration space; None where configurations are vectors.
     """
 
     def __init__(
-        self, symbols: tuple[ca.SX, ca.SX, ca.SX, ca.SX], tau: ca.SX, compile: bool = False
+        self,
+        symbols: Symbols,
+        tau: ca.SX,
+        compile: bool = False,
+        space: ConfigurationSpace | None = None,
     ) -> None:
-        q, v, a, t = symbols
-        x = ca.vertcat(q, v, a)
-        weight = ca.SX.sym("weight", tau.shape[0])
-        J = ca.jacobian(tau, x)
-        curvature = ca.hessian(ca.dot(weight, tau), x)[0]
         self.nv = int(tau.shape[0])
-        self._torque = PointFunction(ca.Function("tau", [q, v, a, t], [tau]), compile)
-        self._linearize = PointFunction(ca.Function("tau_J", [q, v, a, t], [tau, J]), compile)
-        ddtau = ca.Function("ddtau", [q, v, a, t, weight], [curvature])
-        self._curvature = PointFunction(ddtau, compile)
+        self._symbols, self._tau = symbols, tau
+        self._space, self._compile = space, compile
+        self._torque = PointFunction(ca.Function("tau", list(symbols), [tau]), compile)
+
+    @cached_property
+    def _linearize(self) -> PointFunction:
+        J = tangent.jacobian(self._tau, self._symbols, self._space)
+        function = ca.Function("tau_J", list(self._symbols), [self._tau, J])
+        return PointFunction(function, self._compile)
+
+    @cached_property
+    def _curvature(self) -> PointFunction:
+        weight = ca.SX.sym("weight", self.nv)
+        weighted = ca.dot(weight, self._tau)
+        curvature = tangent.hessian(weighted, self._symbols, self._space)[0]
+        function = ca.Function("ddtau", [*self._symbols, weight], [curvature])
+        return PointFunction(function, self._compile)
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
@@ -93,13 +109,34 @@ class CasadiTorque:
         return tau, J, hessian
 
 
+class Kernel(Protocol):
+    """RNEA over batches of points: InverseDynamicsKernel, or TwinKernel."""
+
+    def torque(self, q: Array, v: Array, a: Array, threads: int = 1) -> Array:
+        """tau at P points, (P, nv)."""
+
+    def linearize(self, q: Array, v: Array, a: Array, threads: int = 1) -> tuple[Array, Array]:
+        """tau and d tau / d(q, v, a), (P, nv, 3 nv)."""
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        weight: Array,
+        curvature: Array | None = None,
+        threads: int = 1,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and J^T diag(weight) J + sum_i curvature_i d2 tau_i."""
+
+
 class AnalyticTorque:
-    """RNEA with Pinocchio's analytic derivatives.
+    """RNEA with analytic derivatives in C++.
 
     kernel: RNEA of the scene's model.
     """
 
-    def __init__(self, kernel: InverseDynamicsKernel) -> None:
+    def __init__(self, kernel: Kernel) -> None:
         self.kernel = kernel
         self._threads = default_threads()
 

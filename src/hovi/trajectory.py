@@ -9,12 +9,15 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.chart import Chart
+from hovi.configuration_space import ConfigurationSpace
 from hovi.continuity import require_continuous
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.grid import DiscretePath, Grid
@@ -97,6 +100,15 @@ class Trajectory:
         """Velocities at the nodes, shape (N + 1, nv), per [s]."""
         return self.path.v
 
+    @cached_property
+    def space(self) -> ConfigurationSpace | None:
+        """The configuration space; None where configurations are vectors."""
+        if self.scene is not None:
+            robot = self.scene.robot
+            return None if robot.vector_joints else robot.space
+        parts = self.metadata.get("space")
+        return None if parts is None else ConfigurationSpace(tuple(parts))
+
     @property
     def coordinate_names(self) -> tuple[str, ...]:
         """A name per velocity coordinate: the joint's, with an index where a joint has several."""
@@ -128,7 +140,6 @@ class Trajectory:
         k: numbers of intervals, shape (M,). s: places in [0, 1] of the interval, shape (M,).
         """
         k, s = np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64)
-        _check_flat_joints(self.robot)
         q, v, a = self._interpolate(k, s)
         if self.torque is not None:
             return Sample(q, v, a, self.torque(k, s))
@@ -165,11 +176,10 @@ class Trajectory:
             modes = path.inner[i, : scheme.inner_modes] * hi[:, None] ** 2
             data = np.concatenate([ends, modes], axis=1)  # (m, 3 + r, nv)
             scaled[here] = scheme.rows(s[here]) @ data
-        if self.robot is None:
-            q = path.q[k] + scaled[:, 0]
-        else:
-            q = self.robot.integrate(path.q[k], scaled[:, 0])
-        return q, scaled[:, 1] / h, scaled[:, 2] / h**2
+        x, dx, ddx = scaled[:, 0], scaled[:, 1] / h, scaled[:, 2] / h**2
+        if self.space is None:
+            return path.q[k] + x, dx, ddx
+        return Chart(self.space).jet(path.q[k], x, dx, ddx)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to one npz file, whole or not at all, the same bytes every time.
@@ -194,6 +204,8 @@ class Trajectory:
             scene = self.scene.to_dict()
         else:
             metadata["coordinates"] = list(self.coordinate_names)
+            if self.space is not None:
+                metadata["space"] = list(self.space.parts)
             arrays[_TORQUE] = self._torque_values()
         header = {
             "schemes": [[name, len(list(run))] for name, run in itertools.groupby(self._names())],
@@ -226,8 +238,7 @@ class Trajectory:
                 metadata=metadata,
                 torque=StoredTorque(arrays[_TORQUE]) if scene is None else None,
             )
-            if loaded.robot is None or loaded.robot.vector_joints:
-                require_continuous(loaded.path, loaded.grid)
+            require_continuous(loaded.path, loaded.grid, loaded.space)
             return loaded
         except KeyError as error:
             raise TrajectoryFileError(
@@ -244,11 +255,6 @@ class Trajectory:
     def _torque_values(self) -> Array:
         if self.torque is not None:
             return self.torque.values
-        if self.path.q.shape[1] != self.path.v.shape[1]:
-            raise TrajectoryFileError(
-                "a motion of a Pinocchio model with nq != nv cannot be saved; load the robot "
-                "from a URDF instead."
-            )
         return StoredTorque.fit(
             lambda k, s: self.sample_intervals(k, s).tau, self.grid.intervals
         ).values
@@ -275,20 +281,9 @@ def _check_shapes(trajectory: Trajectory) -> None:
         raise InputError(
             f"inner has shape {inner}; the schemes need ({N}, {grid.inner_modes}, {nv})."
         )
-    if trajectory.scene is None and nq != nv:
-        raise InputError(f"without a scene nq must equal nv, and nq is {nq}, nv is {nv}.")
-
-
-def _check_flat_joints(robot: Robot | None) -> None:
-    """Refuse joints on whose charts the rates of the coordinates are not velocities."""
-    if robot is None:
-        return
-    for joint in list(robot.model.joints)[1:]:
-        if joint.nq != joint.nv and joint.nv > 1:
-            raise InputError(
-                f"joint {robot.model.names[joint.id]!r} has nq={joint.nq}, nv={joint.nv}: "
-                "velocities between the nodes are not available for it; use configurations(t)."
-            )
+    sizes = (nv, nv) if trajectory.space is None else (trajectory.space.nq, trajectory.space.nv)
+    if (nq, nv) != sizes:
+        raise InputError(f"nq is {nq} and nv is {nv}; the configuration space has {sizes}.")
 
 
 def _check_name(scheme: Scheme) -> None:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian, Expansion, Jet
 from hovi.grid import DiscretePath
+from hovi.guess import with_ends_of_nodes
 from hovi.lagrangian import EffortLagrangian, PointTerms
 from hovi.multipliers import Multipliers, Residuals, node_residuals
 from hovi.optimize.band import BandModel
@@ -52,7 +53,8 @@ class ActionObjective(Objective[DiscretePath]):
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= BAND_INTERVALS
-        self.algebra: LinearAlgebra = algebra or ("band" if small or not problem.plain else "tree")
+        tree = problem.plain and problem.ld.chart is None and not small
+        self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
 
@@ -163,7 +165,7 @@ class ActionObjective(Objective[DiscretePath]):
 
     def negative_eigenvalues(self, x: DiscretePath) -> int:
         """n_neg of the exact Hessian at x."""
-        if not self.problem.plain:
+        if not self.problem.plain or self.ld.chart is not None:
             model = self.model(x, None, None)
             assert isinstance(model, BandModel)
             return model.negative_eigenvalues()
@@ -210,7 +212,10 @@ class ActionObjective(Objective[DiscretePath]):
             dZ = np.stack([dZ[:, 0] - local[:, 0] - local[:, 1], dZ[:, 1] - local[:, 1]], axis=1)
         q = self.problem.robot.integrate(x.q, dq)
         hh = h[:, None] ** 2
-        return DiscretePath(q, x.v + dv, x.z + dZ / hh, x.inner + local[:, 4:] / hh)
+        path = DiscretePath(q, x.v + dv, x.z + dZ / hh, x.inner + local[:, 4:] / hh)
+        if self.ld.chart is None:
+            return path
+        return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
 
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
         """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
