@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -76,6 +76,11 @@ class CasadiTorque:
         curvature = tangent.hessian(weighted, self._symbols, self._space)[0]
         function = ca.Function("ddtau", [*self._symbols, weight], [curvature])
         return PointFunction(function, self._compile)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The functions alone: symbols cannot be pickled."""
+        functions = ("_torque", "_linearize", "_curvature")
+        return {"nv": self.nv, **{name: getattr(self, name) for name in functions}}
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
