@@ -150,7 +150,7 @@ class EffortLagrangian(Lagrangian):
 
     def value_of(self, tau: Array, jet: tuple[Array, ...], t: Array | None = None) -> Array:
         """The value where the torque is known already, shape (P,)."""
-        value = 0.5 * np.einsum("pi,pi,i->p", tau, tau, self.weight)
+        value = 0.5 * np.vecdot(tau, self.weight * tau)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
         if self.effort_term is not None:
@@ -206,7 +206,7 @@ class EffortLagrangian(Lagrangian):
             multiplier = given + self.effort_term.slope(tau, v)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
         effort = self.weight * tau
-        value = 0.5 * np.einsum("pi,pi->p", tau, effort)
+        value = 0.5 * np.vecdot(tau, effort)
         if terms is not None:
             effort = effort + terms.effort_gradient
         gradient = np.matmul(effort[:, None], J)[:, 0]

@@ -35,7 +35,7 @@ class ActionObjective(Objective[DiscretePath]):
 
     problem: what to minimise.
     structure: what depends on the grid alone, from an earlier objective on the same grid.
-    algebra: "band" (LAPACK's banded Cholesky in nodal coordinates, the faster one) or "tree"
+    algebra: "band" (a banded Cholesky in nodal coordinates, the faster one) or "tree"
         (merging intervals in regularised coordinates, right at every step length; for fixed ends
         without conditions).
     multipliers: of the equations, where there are some.

@@ -133,7 +133,7 @@ class InverseDynamicsKernel:
         """
         q, v, a = self._points(q, v, a)
         if np.shape(weight) == (self._n,):
-            weight = np.broadcast_to(weight, q.shape)
+            weight = np.full(q.shape, weight)
         weight = self._array("weight", weight, q.shape)
         if curvature is not None:
             curvature = self._array("curvature", curvature, q.shape)
