@@ -79,6 +79,15 @@ class _Batch:
         powers = self.h[:, None] ** -np.arange(3.0)
         return np.asarray(powers[:, None, :, None])
 
+    @cached_property
+    def jet_table(self) -> Array:
+        """(x, x', x'') at the points over (v0, z, c / h^2), (3, B or 1, Q, 3 + r)."""
+        h = self.h[:1] if np.ptp(self.h) == 0 else self.h
+        table = self.scheme.table.transpose(1, 0, 2)  # (3, Q, 3 + r)
+        columns = h[:, None] ** np.where(np.arange(table.shape[2]) == 0, 1, 2)  # (B or 1, 3 + r)
+        rows = h ** -np.arange(3.0)[:, None]  # (3, B or 1)
+        return np.asarray(table[:, None] * columns[:, None] * rows[..., None, None])
+
 
 @dataclass(frozen=True, eq=False)
 class DiscreteLagrangian:
@@ -150,12 +159,20 @@ class DiscreteLagrangian:
             parts.append(Expansion(value, gradient, hessian, torque))
         return parts[0] if len(parts) == 1 else self._joined(parts)
 
-    def gradient(self, path: DiscretePath, coordinates: Coordinates = "nodal") -> Array:
-        """The gradient of every L_d in the columns of the coordinates, shape (N, m, n)."""
+    def gradient(
+        self,
+        path: DiscretePath,
+        coordinates: Coordinates = "nodal",
+        jets: list[Jet] | None = None,
+    ) -> Array:
+        """The gradient of every L_d in the columns of the coordinates, shape (N, m, n).
+
+        jets: as for `values`.
+        """
         m = 4 + self.grid.inner_modes
         gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
-        for batch in self._batches:
-            point_gradient = self.lagrangian.gradient(*self._jet(batch, path), t=batch.t)
+        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
+            point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
             if self.chart is None:
                 part = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
             else:
@@ -346,13 +363,13 @@ def _jet(batch: _Batch, path: DiscretePath) -> Jet:
 
     The chart of an interval is the identity: q = q0 + x.
     """
-    h = batch.h[:, None]
     n = path.v.shape[1]
-    points = _points(batch, path)
-    q = path.q[:-1][batch.index][:, None] + points[:, :, 0]
-    v = points[:, :, 1] / h[:, None]
-    a = points[:, :, 2] / h[:, None] ** 2
-    return q.reshape(-1, n), v.reshape(-1, n), a.reshape(-1, n)
+    v0, inner = path.v[:-1][batch.index], path.inner[batch.index, : batch.scheme.inner_modes]
+    local = np.concatenate([v0[:, None], path.z[batch.index], inner], axis=1)
+    jet = np.matmul(batch.jet_table, local)  # (3, B, Q, n)
+    jet[0] += path.q[:-1][batch.index][:, None]
+    q, v, a = jet.reshape(3, -1, n)
+    return q, v, a
 
 
 def _points(batch: _Batch, path: DiscretePath) -> Array:

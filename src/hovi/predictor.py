@@ -57,7 +57,8 @@ class _Action(Smooth[DiscretePath]):
 
     def gradient(self, x: DiscretePath) -> Array:
         objective = self.objective
-        return self.model.scatter(objective.ld.gradient(x, objective.coordinates))
+        jets = objective.jets(x)
+        return self.model.scatter(objective.ld.gradient(x, objective.coordinates, jets))
 
     def retract(self, x: DiscretePath, step: Array) -> DiscretePath:
         return self.objective.retract(x, step, self.model)
