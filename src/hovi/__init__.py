@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hovi import effects as effects
     from hovi import schemes as schemes
+    from hovi.certificate import Certificate as Certificate
+    from hovi.certificate import certify as certify
     from hovi.chain_urdf import chain as chain
     from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
     from hovi.error_estimate import estimate_error as estimate_error
@@ -58,6 +60,8 @@ if TYPE_CHECKING:
     from hovi.symmetry import base_translation as base_translation
     from hovi.task_file import Task as Task
     from hovi.task_file import load_task as load_task
+    from hovi.tolerance import Accuracy as Accuracy
+    from hovi.tolerance import Tolerance as Tolerance
     from hovi.tracking import Tracking as Tracking
     from hovi.tracking import play as play
     from hovi.trajectory import Trajectory as Trajectory
@@ -69,7 +73,9 @@ except PackageNotFoundError:  # a source tree that was never installed
     __version__ = "0+unknown"
 
 _PLACES = {
+    "Accuracy": "hovi.tolerance",
     "CasadiLagrangian": "hovi.lagrangian",
+    "Certificate": "hovi.certificate",
     "DiscreteLagrangian": "hovi.discrete_lagrangian",
     "DiscretePath": "hovi.grid",
     "ExactDiscreteLagrangian": "hovi.exact_discrete_lagrangian",
@@ -88,12 +94,14 @@ _PLACES = {
     "Status": "hovi.solver",
     "Symmetry": "hovi.symmetry",
     "Task": "hovi.task_file",
+    "Tolerance": "hovi.tolerance",
     "Tracking": "hovi.tracking",
     "Trajectory": "hovi.trajectory",
     "TrajectoryProblem": "hovi.problem",
     "Via": "hovi.goals",
     "base_rotation": "hovi.symmetry",
     "base_translation": "hovi.symmetry",
+    "certify": "hovi.certificate",
     "chain": "hovi.chain_urdf",
     "conjugate_time": "hovi.exact_discrete_lagrangian",
     "discrete_hamiltonian_flow": "hovi.euler_lagrange",

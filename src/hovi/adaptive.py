@@ -12,10 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.error_estimate import estimate_against, finer_than
-from hovi.finer_solution import FinerSolution
-from hovi.grid import DiscretePath
+from hovi.errors import InputError
+from hovi.finer_solution import FinerSolution, finer_grid
+from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
 from hovi.motion_error import relative_difference
+from hovi.nodal_hamiltonian import nodal_hamiltonian
 from hovi.problem import TrajectoryProblem
 from hovi.refinement import Demand, decay, refined
 from hovi.solver import Solution, solve
@@ -35,6 +37,8 @@ ACCEPTED = 0.8
 CANCELLED = 20.0
 """How many times the tolerance the contributions of the intervals may sum up to where they
 cancel in the cost."""
+UNSTEADY = 0.1
+"""Error of the cost that a spread of the nodal Hamiltonian speaks of, as a share of the spread."""
 ROUNDING = 1e-14
 """Relative error of the cost that rounding may leave: no smaller one is claimed."""
 STALLED = 2
@@ -87,7 +91,7 @@ class _Candidate:
     finer: FinerSolution | None
     error: float
     whole: float
-    """As the error, but for contributions to the cost that do not cancel."""
+    """As the error, with contributions to the cost that do not cancel, and by the Hamiltonian."""
 
 
 @dataclass(eq=False)
@@ -139,7 +143,7 @@ class _Search:
             return np.nan, np.nan
         if self.tolerance.quantity is Quantity.COST:
             error = _error_of_cost(finer)
-            return error, max(error, float(_contributions(finer).sum()))
+            return error, max(error, float(_contributions(finer).sum()), _unsteady(solution))
         estimate = estimate_against(solution, finer, self._frame)
         error = self.tolerance.measure(estimate)
         return error, error
@@ -174,6 +178,8 @@ class _Search:
             return self._solved(problem.on(grid), candidate.solution.trajectory)
         rho = decay(finer.problem.grid, finer.path)
         grid = refined(problem.grid, rho, self._demands(candidate, finer))
+        if _same(grid, problem.grid):
+            grid = finer_grid(grid)
         fine = problem.on(grid)
         return self._solved(fine, moved_to(finer, fine))
 
@@ -252,6 +258,23 @@ def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
         return DiscretePath(path.q, path.v, path.z, inner)
     curve = stretched(finer.trajectory, grid.duration)
     return problem.path(curve)
+
+
+def _unsteady(solution: Solution) -> float:
+    """What the nodal Hamiltonian says of the error, relative; 0 where it is not constant."""
+    assert solution.problem is not None
+    try:
+        spread = nodal_hamiltonian(solution.problem, solution.trajectory).spread
+    except InputError:
+        return 0.0
+    return UNSTEADY * spread
+
+
+def _same(one: Grid, other: Grid) -> bool:
+    same_steps = np.array_equal(one.steps, other.steps)
+    return same_steps and all(
+        a.name == b.name for a, b in zip(one.schemes, other.schemes, strict=True)
+    )
 
 
 def _error_of_cost(finer: FinerSolution) -> float:

@@ -134,6 +134,10 @@ class Trajectory:
         """q, v and a as `sample` gives them, without torques."""
         return self._interpolate(*self._locate(t))
 
+    def jet_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Array, Array, Array]:
+        """q, v and a as `sample_intervals` gives them, without torques."""
+        return self._interpolate(np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64))
+
     def sample_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> Sample:
         """q, v, a and tau in given intervals, both limits at a node within reach.
 

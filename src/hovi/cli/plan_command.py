@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from hovi.certificate import Certificate
+    from hovi.solver import Solution
     from hovi.task_file import Task
     from hovi.trajectory import Trajectory
 
 GUESSES = ("cubic", "minimum-jerk")
 LIMITS = ("urdf", "none")
+MOST_CERTIFIED = 2000
+"""Intervals of the longest motion that is certified unasked."""
 
 
 def plan(
@@ -37,6 +41,9 @@ def plan(
         Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    certificate: Annotated[
+        bool, typer.Option(help="Say what is known of the plan: errors, energy, a replay.")
+    ] = True,
     tolerance: Annotated[
         str | None,
         typer.Option(
@@ -73,7 +80,7 @@ def plan(
     if scheme is not None or intervals is not None:
         overrides["tolerance"] = None
     task = _task(scene, overrides)
-    raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json))
+    raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json, certificate))
 
 
 def _task(scene: str, overrides: dict[str, Any]) -> Task:
@@ -99,7 +106,12 @@ def _guess(guess: str) -> str | Trajectory:
 
 
 def _plan(
-    task: Task, guess: str | Trajectory, time_limit: float | None, out: Path | None, json: bool
+    task: Task,
+    guess: str | Trajectory,
+    time_limit: float | None,
+    out: Path | None,
+    json: bool,
+    certified: bool,
 ) -> int:
     """Plan, write, print; returns the exit code."""
     from hovi.cli.progress import progress
@@ -127,8 +139,19 @@ def _plan(
     written = out if solution.trajectory is not None else None
     if written is not None:
         solution.trajectory.save(written)
+    certificate = _certificate(solution) if certified else None
     if json:
-        print(as_json(solution, task, written))
+        print(as_json(solution, task, written, certificate))
     else:
-        print_report(solution, task, written)
+        print_report(solution, task, written, certificate)
     return 0 if solution.success else 1
+
+
+def _certificate(solution: Solution) -> Certificate | None:
+    """What can be said for a minimum in little time; None for what is none or too long."""
+    from hovi.certificate import certify
+
+    problem = solution.problem
+    if problem is None or not solution.success or problem.grid.intervals > MOST_CERTIFIED:
+        return None
+    return certify(solution, estimate=not (problem.limited or problem.constrained))

@@ -12,12 +12,9 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from hovi.cli.accuracy_report import (
-    accuracy_json,
-    errors_in_words,
-    scheme_in_words,
-    steps_in_words,
-)
+from hovi.certificate import Certificate
+from hovi.cli.accuracy_report import accuracy_json, scheme_in_words, steps_in_words
+from hovi.cli.certificate_report import certificate_json, certificate_lines
 from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.peaks import Peaks, peaks
 from hovi.json_numbers import finite
@@ -25,7 +22,9 @@ from hovi.solver import Solution
 from hovi.task_file import Task
 
 
-def as_json(solution: Solution, task: Task, out: Path | None) -> str:
+def as_json(
+    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
     trajectory = solution.trajectory
     room = closeness(trajectory)
@@ -34,7 +33,7 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "status": str(solution.status),
         "message": solution.message,
         "cost": solution.cost,
-        "error_estimate": solution.error_estimate,
+        "error_estimate": _estimate(solution, certificate),
         "scheme": scheme_in_words(task, trajectory.grid),
         "intervals": trajectory.grid.intervals,
         "nit": solution.nit,
@@ -49,11 +48,14 @@ def as_json(solution: Solution, task: Task, out: Path | None) -> str:
         "excess": None if room is None else room.excess,
         "out": None if out is None else str(out),
         **accuracy_json(solution, task),
+        "certificate": None if certificate is None else certificate_json(certificate),
     }
     return json.dumps(finite(fields), allow_nan=False)
 
 
-def print_report(solution: Solution, task: Task, out: Path | None) -> None:
+def print_report(
+    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+) -> None:
     """A summary, the peaks of the motion, and where it was written, on stdout."""
     for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
@@ -66,8 +68,18 @@ def print_report(solution: Solution, task: Task, out: Path | None) -> None:
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
+    if certificate is not None:
+        for label, text in certificate_lines(certificate):
+            print(f"{label:9s}{text}")
     if out is not None:
         print(f"wrote {out}")
+
+
+def _estimate(solution: Solution, certificate: Certificate | None) -> float | None:
+    """Of the cost: the solution's own, or the certificate's."""
+    if solution.error_estimate is not None or certificate is None:
+        return solution.error_estimate
+    return None if certificate.errors is None else certificate.errors.cost
 
 
 def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
@@ -81,8 +93,6 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
-    if solution.accuracy is not None and solution.accuracy.estimate is not None:
-        rows.insert(3, ("errors", errors_in_words(solution.accuracy.estimate)))
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""

@@ -1,0 +1,88 @@
+"""The certificate of a plan, for programs and for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hovi.certificate import Certificate, Peak
+from hovi.cli.accuracy_report import errors_in_words, errors_json
+from hovi.dynamics_replay import DynamicsReplay
+
+NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """Every statement, null where it could not be made, and why it could not."""
+    errors, energy = certificate.errors, certificate.hamiltonian
+    return {
+        "action": certificate.action,
+        "integral": certificate.integral,
+        "errors": None if errors is None else errors_json(errors),
+        "hamiltonian": None if energy is None else energy.mean,
+        "hamiltonian_spread": None if energy is None else energy.spread,
+        "residual": certificate.residual,
+        "torque": _peak_json(certificate.torque),
+        "velocity": _peak_json(certificate.velocity),
+        "replay": None if certificate.replay is None else _replay_json(certificate.replay),
+        "missing": certificate.missing,
+    }
+
+
+def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
+    """Labels and sentences."""
+    energy, missing = certificate.hamiltonian, certificate.missing
+    lines = [
+        ("errors", _or(certificate.errors, errors_in_words, missing, "errors")),
+        (
+            "action",
+            f"discrete {certificate.action:.10g}, integral along the curve "
+            f"{certificate.integral:.10g}",
+        ),
+    ]
+    if energy is not None:
+        lines.append(("energy", f"Pontryagin's H = {energy.mean:.6g}, spread {energy.spread:.1e}"))
+    if certificate.residual is not None:
+        lines.append(("residual", f"{certificate.residual:.1e} of the momenta"))
+    lines.append(
+        ("largest", f"torque {_peak(certificate.torque)}; velocity {_peak(certificate.velocity)}")
+    )
+    lines.append(("replay", _or(certificate.replay, _replay, missing, "replay")))
+    return lines
+
+
+def _or(statement: Any, words: Any, missing: dict[str, str], name: str) -> str:
+    return f"none: {missing[name]}" if statement is None else str(words(statement))
+
+
+def _replay(replay: DynamicsReplay) -> str:
+    misses = []
+    if not replay.sliding.all():
+        misses.append(f"{replay.angle:.1e} rad")
+    if replay.sliding.any():
+        misses.append(f"{1e3 * replay.slide:.1e} mm")
+    misses.append(f"{replay.frame} by {1e3 * replay.largest_tip:.1e} mm")
+    return (
+        "DOP853 on ABA under the planned torques, started at every node, misses the next by "
+        f"{', '.join(misses)}: {NOT_OPTIMALITY}"
+    )
+
+
+def _replay_json(replay: DynamicsReplay) -> dict[str, Any]:
+    return {
+        "q_rad": replay.angle,
+        "q_m": replay.slide if replay.sliding.any() else None,
+        "v": float(np.max(replay.v)),
+        "tip_mm": 1e3 * replay.largest_tip,
+        "frame": replay.frame,
+        "certifies": NOT_OPTIMALITY.removeprefix("this certifies "),
+    }
+
+
+def _peak(peak: Peak) -> str:
+    return f"{peak.value:.4g} at {peak.joint}, {peak.t:.3g} s"
+
+
+def _peak_json(peak: Peak) -> dict[str, Any]:
+    return {"value": peak.value, "joint": peak.joint, "t": peak.t}
