@@ -127,7 +127,8 @@ def test_a_time_limit_is_named_with_what_was_reached(arm_scene: Scene) -> None:
 
 def test_no_error_is_claimed_for_what_is_no_minimum(arm_scene: Scene) -> None:
     goal = State(REACH_Q, REACH_V)
-    found = plan(arm_scene, HANG, goal, 1.0, limits="none", tolerance=1e-6, max_iterations=2)
+    options = {"limits": "none", "max_iterations": 2, "continuation": False}
+    found = plan(arm_scene, HANG, goal, 1.0, tolerance=1e-6, **options)  # type: ignore[arg-type]
     assert found.status is Status.ITERATION_LIMIT
     assert found.error_estimate is None
     assert not accuracy_of(found).reached

@@ -96,7 +96,7 @@ def test_a_replay_sees_torques_of_another_scene(fine: Solution, two_link: Robot)
 
 
 def test_a_motion_that_is_not_optimal_is_replayed_just_as_well(arm_scene: Scene) -> None:
-    stopped = reach(arm_scene, max_iterations=1)
+    stopped = reach(arm_scene, max_iterations=1, continuation=False)
     assert not stopped.success
     assert replay_dynamics(stopped.trajectory).angle < 1e-8
 
@@ -148,7 +148,7 @@ def test_the_equations_hold_at_a_solution_and_not_elsewhere(
 ) -> None:
     assert fine.problem is not None
     assert momentum_jump(fine.problem, fine.trajectory) < 1e-10
-    stopped = reach(arm_scene, max_iterations=1, intervals=32)
+    stopped = reach(arm_scene, max_iterations=1, intervals=32, continuation=False)
     assert stopped.problem is not None
     assert momentum_jump(stopped.problem, stopped.trajectory) > 1e-3
 

@@ -86,7 +86,7 @@ def test_json_is_one_object_with_the_promised_keys(run: Run) -> None:
     assert fields["success"] is True
     assert fields["status"] == "minimum"
     assert fields["message"]
-    assert fields["error_estimate"] is None
+    assert 0 < fields["error_estimate"] < 1e-7
     assert (fields["scheme"], fields["intervals"], fields["n_neg"]) == ("galerkin-2", 16, 0)
     assert math.isclose(fields["cost"], 20.2088008, rel_tol=1e-6)
     assert all(isinstance(fields[key], (int, float)) for key in NUMBERS)
@@ -116,7 +116,7 @@ def test_without_limits_people_see_which_of_the_urdf_are_exceeded(run: Run) -> N
 
 
 def test_with_limits_people_see_the_room_that_is_left(run: Run) -> None:
-    code, out, _ = run("plan", "ur5_reach_limited")
+    code, out, _ = run("plan", "ur5_reach_limited", "--no-certificate")
     assert code == 0
     assert "beyond" not in out
     assert "* at a limit" in out
