@@ -99,7 +99,7 @@ FLOORS = [
     {"adaptive", "certificate", "ladder"},
     {"planner"},
     {"playback", "plotting", "export", "accuracy"},
-    {"work_precision_plot"},
+    {"work_precision_plot", "peers"},
     {"cli"},
     {"__main__"},
 ]

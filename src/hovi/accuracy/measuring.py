@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
-from hovi.accuracy.method import Answer, Method, Prepared
+from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.motion_error import MotionError, Yardstick
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
@@ -22,26 +22,17 @@ ENOUGH = MotionError(cost=1e-12, joints=1e-8, tip=1e-5)
 """Errors below which finer grids would measure rounding."""
 REPEATS = 7
 """Solves by which a time is judged, after the first."""
-CLIMBING = 0.6
+CLIMBING = 0.7
 """Share of the budget in which first solves may start."""
 SLOWEST = 0.1
-"""Share of the budget that one solve may take."""
+"""Share of the budget that one solve may take, and about what its repeats may take."""
 HOPELESS = 30.0
-"""A method stops where another one was more accurate in so many times less time."""
+"""A method stops where one of its family was more accurate in so many times less time."""
 _GROWTH = 2.0  # of time from one number of intervals to the next, at most
 
 
-@dataclass(eq=False)
-class _Climber:
-    """A method on its way up the ladder."""
-
-    method: Method
-    rungs: list[tuple[Prepared, Run]] = field(default_factory=list)
-    climbing: bool = True
-
-    def expected(self) -> float:
-        """Time of the next first solve, by that of the last, in [s]."""
-        return _GROWTH * self.rungs[-1][1].cold_seconds if self.rungs else 0.0
+Rungs = list[tuple[Prepared, Run]]
+"""What a method has solved, by number of intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,48 +56,61 @@ def measure(
     share: float = 1.0,
     repeats: int = REPEATS,
 ) -> Measured:
-    """Every method on every grid of the ladder, until it is exact or the time is up.
+    """Every method on finer and finer grids, until it is exact or its time is up.
 
-    First solves come first, all methods on one number of intervals and then on the next. The
+    First solves come first; each method may take an equal part of what is left for them. The
     repeats follow in rounds over all runs, so that a busy moment of the machine meets all alike.
 
     budget: of which `share` may be spent. repeats: of every run that counts.
     """
-    climbers = [_Climber(method) for method in methods]
+    all_rungs: list[Rungs] = []
     notes, complete = [], True
-    for intervals in LADDER:
-        for climber in [each for each in climbers if each.climbing]:
-            if not budget.allows(climber.expected(), CLIMBING * share):
-                climber.climbing = complete = False
-                continue
-            progress(f"{climber.method.name} on {intervals} intervals", budget.fraction)
-            try:
-                run = _climb(climber, intervals, yardstick)
-                slow = run.first_seconds > SLOWEST * budget.seconds or _beaten(run, climbers)
-                climber.climbing = not slow and not _exact(run.error)
-            except UnmeasurableError as refused:
-                climber.climbing = False
-                notes.append(f"{climber.method.name}: {refused}")
-    _repeat(climbers, budget, progress, share, repeats)
-    runs = tuple(run for climber in climbers for _, run in climber.rungs)
+    for number, method in enumerate(methods):
+        part = (CLIMBING * share - budget.fraction) / (len(methods) - number)
+        rungs: Rungs = []
+        all_rungs.append(rungs)
+        progress(method.name, budget.fraction)
+        try:
+            ended = _climb(method, all_rungs, yardstick, budget, budget.fraction + part)
+            complete = complete and ended
+        except UnmeasurableError as refused:
+            notes.append(f"{method.name}: {refused}")
+    _repeat(all_rungs, budget, progress, share, repeats)
+    runs = tuple(run for rungs in all_rungs for _, run in rungs)
     return Measured(runs, complete, tuple(notes))
 
 
-def _climb(climber: _Climber, intervals: int, yardstick: Yardstick) -> Run:
-    """One more grid."""
-    prepared = climber.method.prepare(intervals)
-    run = _first(climber.method, intervals, prepared, yardstick)
-    climber.rungs.append((prepared, run))
-    return run
+def _climb(
+    method: Method, all_rungs: list[Rungs], yardstick: Yardstick, budget: Budget, share: float
+) -> bool:
+    """One grid of the ladder after the other, as long as the next is worth while.
+
+    all_rungs: of all methods so far, of which the last is this one's. Returns whether it ended
+    for another reason than time.
+    """
+    expected = 0.0
+    for intervals in LADDER:
+        if not budget.allows(expected, share):
+            return False
+        watch = Stopwatch()
+        prepared = method.prepare(intervals)
+        run = _first(method, intervals, prepared, yardstick)
+        all_rungs[-1].append((prepared, run))
+        slow = run.first_seconds > SLOWEST * budget.seconds
+        if slow or _exact(run.error) or _beaten(run, all_rungs):
+            break
+        expected = _GROWTH * watch.seconds
+    return True
 
 
 def _exact(error: MotionError) -> bool:
     return all(getattr(error, m) <= getattr(ENOUGH, m) for m in ("cost", "joints", "tip"))
 
 
-def _beaten(run: Run, climbers: list[_Climber]) -> bool:
+def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:
     """Whether finer grids of a method have no hope of being worth their time."""
-    others = [other for climber in climbers for _, other in climber.rungs if other.counts]
+    runs = (other for rungs in all_rungs for _, other in rungs)
+    others = [other for other in runs if other.family == run.family and other.counts]
     return any(
         other.error.cost <= run.error.cost and HOPELESS * other.first_seconds <= run.first_seconds
         for other in others
@@ -137,14 +141,15 @@ def _error(answer: Answer, yardstick: Yardstick) -> MotionError:
 
 
 def _repeat(
-    climbers: list[_Climber], budget: Budget, progress: Progress, share: float, repeats: int
+    all_rungs: list[Rungs], budget: Budget, progress: Progress, share: float, repeats: int
 ) -> None:
     """Rounds over all runs that count, as many as the budget allows."""
     for number in range(repeats):
-        for climber in climbers:
-            for i, (prepared, run) in enumerate(climber.rungs):
-                if not (run.counts and budget.allows(run.first_seconds, share)):
+        for rungs in all_rungs:
+            for i, (prepared, run) in enumerate(rungs):
+                often = sum(run.repeats) > SLOWEST * budget.seconds / 2
+                if not run.counts or often or not budget.allows(run.first_seconds, share):
                     continue
                 progress(f"repeat {number + 1} of {repeats}, {run.method}", budget.fraction)
                 seconds = (*run.repeats, prepared.solve().seconds)
-                climber.rungs[i] = prepared, dataclasses.replace(run, repeats=seconds)
+                rungs[i] = prepared, dataclasses.replace(run, repeats=seconds)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import guess_curve
-from hovi.accuracy.measuring import REPEATS, Progress, measure
+from hovi.accuracy.measuring import REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import Method
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
@@ -28,10 +28,12 @@ class Setting:
     """What all methods have in common.
 
     problem: on the grid of the resolved motion. guess: where every solve starts.
+    longest: what one solve may take, in [s].
     """
 
     problem: TrajectoryProblem
     guess: Curve
+    longest: float = 60.0
 
 
 Peer = Callable[[Setting], Method]
@@ -80,7 +82,8 @@ def work_precision(
     report("resolving the motion", time.fraction)
     resolved = resolve(found.problem, found, lambda: time.fraction > SEARCHING)
     problem = found.problem.on(resolved.trajectory.grid)
-    setting = Setting(problem, guess_curve(guess, problem, resolved.trajectory))
+    curve = guess_curve(guess, problem, resolved.trajectory)
+    setting = Setting(problem, curve, SLOWEST * budget)
     methods: list[Method] = [VariationalMethod(problem, setting.guess, name) for name in schemes]
     notes = list(_left_out(task))
     for peer in peers:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from hovi.accuracy import Diagram
+    from hovi.accuracy import Diagram, Peer
 
 
 def accuracy(
@@ -26,6 +26,15 @@ def accuracy(
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Where the picture, the CSV and the JSON go."),
+    ] = None,
+    collocation: Annotated[
+        bool, typer.Option("--collocation", help="Collocation by CasADi and Ipopt as well.")
+    ] = False,
+    crocoddyl: Annotated[
+        Path | None, typer.Option(metavar="PYTHON", help="A Python that has Crocoddyl, as well.")
+    ] = None,
+    drake: Annotated[
+        Path | None, typer.Option(metavar="PYTHON", help="A Python that has Drake, as well.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -44,9 +53,10 @@ def accuracy(
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {str(out)!r} is a file; name a folder.")
     task = load_task(find_scene(scene))
+    peers = _peers(collocation, crocoddyl, drake)
     try:
         with progress(quiet=json) as report:
-            diagram = work_precision(task, guess=guess, budget=budget, progress=report)
+            diagram = work_precision(task, guess=guess, budget=budget, peers=peers, progress=report)
     except UnmeasurableError as nothing:
         print(f"nothing was measured: {nothing}", file=sys.stderr)
         raise typer.Exit(1) from None
@@ -57,6 +67,21 @@ def accuracy(
     _print(diagram)
     for path in written:
         print(f"wrote {path}")
+
+
+def _peers(collocation: bool, crocoddyl: Path | None, drake: Path | None) -> list[Peer]:
+    """Other people's methods that were asked for."""
+    from hovi.peers.ipopt_method import ipopt_peers
+    from hovi.peers.outside_method import crocoddyl_peers, drake_peers
+
+    peers: list[Peer] = []
+    if collocation:
+        peers += [*ipopt_peers(compiled=True), *ipopt_peers(compiled=False)]
+    if crocoddyl is not None:
+        peers += crocoddyl_peers(crocoddyl)
+    if drake is not None:
+        peers += drake_peers(drake)
+    return peers
 
 
 def _write(diagram: Diagram, folder: Path) -> list[Path]:

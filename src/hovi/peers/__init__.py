@@ -1,0 +1,1 @@
+"""Other people's methods, for the same picture as hovi's: see hovi.accuracy."""
