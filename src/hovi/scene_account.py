@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ POINTS = 64
 """Points of one evaluation: about as many as a motion of 16 intervals has."""
 SECONDS = 0.02
 """For how long each scene is evaluated again and again."""
+LEAST_TURNS = 3
 
 
 class AccountedScene(Protocol):
@@ -91,26 +93,39 @@ class SceneAccount:
 
 def account(scene: AccountedScene) -> SceneAccount:
     """Count and measure a scene, and the same scene without each of its effects."""
-    points = _points(scene.robot)
-    instructions, seconds = scene.graph().n_instructions(), _time(scene, points)
-    costs = []
-    for effect in scene.effects:
-        bare = scene.without(effect.key)
-        costs.append(
-            EffectCost(
-                effect.key,
-                ", ".join(effect.touches),
-                instructions - bare.graph().n_instructions(),
-                seconds,
-                _time(bare, points),
-            )
+    bare = [scene.without(effect.key) for effect in scene.effects]
+    instructions = scene.graph().n_instructions()
+    seconds, *without = seconds_per_point([scene, *bare])
+    costs = tuple(
+        EffectCost(
+            effect.key,
+            ", ".join(effect.touches),
+            instructions - other.graph().n_instructions(),
+            seconds,
+            its_seconds,
         )
-    return SceneAccount(instructions, seconds, tuple(costs))
+        for effect, other, its_seconds in zip(scene.effects, bare, without, strict=True)
+    )
+    return SceneAccount(instructions, seconds, costs)
 
 
-def seconds_per_point(scene: AccountedScene) -> float:
-    """The shortest time of an evaluation with derivatives, per point, in [s]."""
-    return _time(scene, _points(scene.robot))
+def seconds_per_point(scenes: Sequence[AccountedScene]) -> list[float]:
+    """The shortest time of an evaluation with derivatives, per point, in [s], of each scene.
+
+    They take turns, so that what else the machine does falls on all of them alike.
+    """
+    evaluations = [scene.evaluation() for scene in scenes]
+    batches = [_points(scene.robot) for scene in scenes]
+    shortest = [np.inf] * len(scenes)
+    ends = time.perf_counter() + SECONDS * len(scenes)
+    for turn in itertools.count():
+        for i, (evaluate, points) in enumerate(zip(evaluations, batches, strict=True)):
+            began = time.perf_counter()
+            evaluate(*points)
+            shortest[i] = min(shortest[i], time.perf_counter() - began)
+        if turn >= LEAST_TURNS and time.perf_counter() > ends:
+            break
+    return [float(each) / POINTS for each in shortest]
 
 
 def _points(robot: Robot) -> tuple[Array, Array, Array, Array]:
@@ -118,14 +133,3 @@ def _points(robot: Robot) -> tuple[Array, Array, Array, Array]:
     dq, v, a = random.uniform(-1.0, 1.0, (3, POINTS, robot.nv))
     q = np.stack([pin.integrate(robot.model, pin.neutral(robot.model), x) for x in dq])
     return q, v, a, np.linspace(0.0, 1.0, POINTS)
-
-
-def _time(scene: AccountedScene, points: tuple[Array, Array, Array, Array]) -> float:
-    evaluate = scene.evaluation()
-    evaluate(*points)
-    shortest, ends = np.inf, time.perf_counter() + SECONDS
-    while time.perf_counter() < ends:
-        began = time.perf_counter()
-        evaluate(*points)
-        shortest = min(shortest, time.perf_counter() - began)
-    return float(shortest) / POINTS

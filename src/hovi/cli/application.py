@@ -9,6 +9,7 @@ import typer
 from hovi import __version__
 from hovi.cli import (
     accuracy_command,
+    effects_command,
     export_command,
     info_command,
     plan_command,
@@ -46,6 +47,7 @@ def _hovi(
 app.command("plan")(plan_command.plan)
 app.command("accuracy")(accuracy_command.accuracy)
 app.command("simulate")(simulate_command.simulate)
+app.command("effects")(effects_command.effects)
 app.command("replay")(replay_command.replay)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)

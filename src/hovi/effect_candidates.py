@@ -1,0 +1,90 @@
+"""Effects worth trying on a robot that a scene leaves out, at a plausible strength.
+
+What the robot's model states is taken from there. The rest are stand-ins: one percent of the effort
+limit for friction, a tenth of the inertia for rotors, a twentieth of the mass for a payload and of
+the weight for a push. Whoever knows better names them in a scene file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.effects import (
+    Armature,
+    Drag,
+    DryFriction,
+    Effect,
+    Gravity,
+    MovingBase,
+    Payload,
+    ViscousFriction,
+    Wrench,
+)
+from hovi.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+FRICTION = 0.01
+ROTORS = 0.1
+BURDEN = 0.05
+_EARTH = 9.81
+
+
+def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
+    """One of each effect that most robots feel, in the order of the effects page."""
+    tip, level = robot.tip_frame, _efforts(robot)
+    mass = sum(inertia.mass for inertia in robot.model.inertias[1:])
+    stated = {
+        "damping": robot.damping.any(),
+        "friction": robot.friction.any(),
+        "armature": robot.armature.any(),
+    }
+    rub = _rounded(FRICTION * level)
+    rotors = _rounded(ROTORS * _inertia(robot))
+    candidates: list[Effect] = [
+        Gravity(),
+        ViscousFriction(from_urdf=True) if stated["damping"] else ViscousFriction(rub),
+        DryFriction(from_urdf=True) if stated["friction"] else DryFriction(rub, width=0.1),
+        Armature(from_urdf=True) if stated["armature"] else Armature(rotors),
+        MovingBase((0.0, 0.0, "0.01*sin(4*pi*t)")),
+    ]
+    if robot.model.frames[robot.model.getFrameId(tip)].parentJoint > 0:
+        (load,), (push,) = _rounded(BURDEN * mass), _rounded(BURDEN * mass * _EARTH)
+        candidates += [
+            Payload(tip, load),
+            Wrench(tip, (0.0, push, 0.0)),
+            Drag(tip, 0.05, wind=(0.0, 5.0, 0.0)),
+        ]
+    floats = any(j.shortname() == "JointModelFreeFlyer" for j in robot.model.joints)
+    return tuple(e for e in candidates if not (floats and isinstance(e, MovingBase)))
+
+
+def _efforts(robot: Robot) -> Array:
+    """The effort limit of every coordinate, or where none is known, the largest weight found."""
+    limit = robot.effort_limit
+    known = (limit > 0) & (limit < 1e15)
+    model = robot.model.copy()
+    model.gravity.linear = np.array([0.0, 0.0, -_EARTH])
+    data = model.createData()
+    random = np.random.default_rng(0)
+    weights = [
+        np.abs(pin.computeGeneralizedGravity(model, data, q)).max()
+        for q in (
+            pin.integrate(model, pin.neutral(model), dq)
+            for dq in random.uniform(-2, 2, (20, model.nv))
+        )
+    ]
+    return np.where(known, limit, max(weights, default=0.0) or 1.0)
+
+
+def _inertia(robot: Robot) -> Array:
+    model = robot.model.copy()
+    model.armature = np.zeros(model.nv)
+    return np.diag(pin.crba(model, model.createData(), pin.neutral(model))).copy()
+
+
+def _rounded(values: npt.ArrayLike) -> tuple[float, ...]:
+    """Two digits are enough for a stand-in."""
+    return tuple(float(f"{value:.2g}") for value in np.atleast_1d(values))

@@ -1,0 +1,189 @@
+"""Which effect matters: each added alone to a scene, what it changes against what it costs."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.effect_candidates import effect_candidates
+from hovi.effects import Effect, Touch
+from hovi.errors import InputError, SceneError
+from hovi.planner import plan
+from hovi.scene import Scene
+from hovi.scene_account import seconds_per_point
+from hovi.solver import Solution
+from hovi.task_file import Task
+from hovi.tracking import play
+from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+BANDWIDTH = 10.0
+"""Of the feedback that holds a motion to its plan, in [rad/s]."""
+_SAMPLES = 20
+
+
+@dataclass(frozen=True)
+class EffectTrial:
+    """A scene with one effect more or less, beside the scene itself.
+
+    effect: which. added: whether it was added, or taken away since the scene names it.
+    torque: largest change of a torque that the scene's own motion needs, in [N m].
+    cost: of the motion planned with it, from the scene's own as the guess. success: whether that
+        is a minimum. nit, plan_seconds: what planning took.
+    tip: largest distance of its tip from the scene's own motion, in [m]; None where the two do
+        not last equally long.
+    open_loop, held: how far the tip ends off when the scene's own torques are played with it,
+        alone and held by a feedback of 10 rad/s, in [m]; None where the motion is lost.
+    instructions: what it adds to the expression graph.
+    seconds: of an evaluation with derivatives, per point.
+    """
+
+    effect: Effect
+    added: bool
+    torque: float
+    cost: float
+    success: bool
+    nit: int
+    plan_seconds: float
+    tip: float | None
+    open_loop: float | None
+    held: float | None
+    instructions: int
+    seconds: float
+
+    @property
+    def name(self) -> str:
+        """The effect's key with a sign."""
+        return f"{'+' if self.added else '-'} {self.effect.key}"
+
+
+@dataclass(frozen=True, eq=False)
+class EffectStudy:
+    """A scene's own motion and one trial for each candidate.
+
+    task: what was planned. solution: its motion. seconds: of an evaluation, per point.
+    plan_seconds: of planning it again from its own motion.
+    """
+
+    task: Task
+    solution: Solution
+    seconds: float
+    plan_seconds: float
+    trials: tuple[EffectTrial, ...]
+
+    def change(self, trial: EffectTrial) -> float:
+        """Relative change of the cost."""
+        return trial.cost / self.solution.cost - 1.0 if self.solution.cost else np.inf
+
+
+def study_effects(
+    task: Task, candidates: Iterable[Effect] | None = None, progress: Progress | None = None
+) -> EffectStudy:
+    """Plan a task, then each candidate effect alone.
+
+    candidates: effects to add; one that the scene names is taken away instead. When not given,
+        those of `effect_candidates`.
+    Raises SceneError when the task itself has no motion to compare with.
+    """
+    tell = progress or (lambda text, share: None)
+    tell("planning the scene as it is", 0.0)
+    solution = _plan(task, task.scene, "cubic", task.starts)
+    if not solution.success:
+        raise SceneError(
+            f"the effects of {task.name!r} cannot be compared, as no motion was found to compare "
+            f"with: {solution.message}"
+        )
+    began = time.perf_counter()
+    _plan(task, task.scene, solution.trajectory, 1)
+    again = time.perf_counter() - began
+    tried = tuple(effect_candidates(task.scene.robot) if candidates is None else candidates)
+    scenes = [_changed(task.scene, effect) for effect in tried]
+    own_seconds, *times = seconds_per_point([task.scene, *scenes])
+    trials = []
+    for i, (effect, scene, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
+        tell(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
+        trials.append(_trial(task, solution.trajectory, effect, scene, seconds))
+    return EffectStudy(task, solution, own_seconds, again, tuple(trials))
+
+
+def _changed(scene: Scene, effect: Effect) -> Scene:
+    """The scene with the effect, or without it where it has one of its kind."""
+    without = scene.without(effect.key)
+    if len(without.effects) < len(scene.effects):
+        return without
+    return dataclasses.replace(scene, effects=[*scene.effects, effect])
+
+
+def _trial(
+    task: Task, own: Trajectory, effect: Effect, scene: Scene, seconds: float
+) -> EffectTrial:
+    named = {each.key: each for each in task.scene.effects}
+    began = time.perf_counter()
+    found = _plan(task, scene, own, 1)
+    took = time.perf_counter() - began
+    moves = set(effect.touches) != {Touch.COST}
+    return EffectTrial(
+        named.get(effect.key, effect),
+        effect.key not in named,
+        _torque_change(scene, own),
+        found.cost,
+        found.success,
+        found.nit,
+        took,
+        _tip_distance(own, found.trajectory),
+        _off(scene, own, "none") if moves else 0.0,
+        _off(scene, own, "pd") if moves else 0.0,
+        scene.graph().n_instructions() - task.scene.graph().n_instructions(),
+        seconds,
+    )
+
+
+def _plan(task: Task, scene: Scene, guess: str | Trajectory, starts: int) -> Solution:
+    return plan(
+        scene,
+        task.start,
+        task.goal,
+        task.duration,
+        time_weight=task.time_weight,
+        via=task.via,
+        scheme=task.scheme,
+        intervals=task.intervals,
+        tolerance=task.tolerance,
+        limits=task.limits,
+        starts=starts,
+        seed=task.seed,
+        guess=guess,
+    )
+
+
+def _torque_change(scene: Scene, own: Trajectory) -> float:
+    N = own.grid.intervals
+    k, s = np.repeat(np.arange(N), _SAMPLES), np.tile(np.linspace(0, 1, _SAMPLES), N)
+    motion = own.sample_intervals(k, s)
+    t = own.t[k] + s * own.grid.steps[k]
+    tau = scene.inverse_dynamics(motion.q, motion.v, motion.a, t)
+    return float(np.abs(tau - motion.tau).max())
+
+
+def _tip_distance(own: Trajectory, other: Trajectory) -> float | None:
+    robot = own.robot
+    if robot is None or abs(own.duration - other.duration) > 1e-9 * own.duration:
+        return None
+    t = np.linspace(0.0, own.duration, 1 + _SAMPLES * own.grid.intervals)
+    t = np.minimum(t, other.duration)
+    places = (robot.frame_position(robot.tip_frame, m.configurations(t)) for m in (own, other))
+    return float(np.linalg.norm(np.subtract(*places), axis=1).max())
+
+
+def _off(scene: Scene, own: Trajectory, feedback: str) -> float | None:
+    try:
+        return float(play(scene, own, feedback, bandwidth=BANDWIDTH).tip_deviation[-1])
+    except InputError:  # a motion that runs away leaves no step that could be solved
+        return None
