@@ -28,8 +28,8 @@ CANDIDATES = (ViscousFriction(0.3), Armature(0.0), VelocityCost(2.0), Gravity())
 @pytest.fixture(scope="module")
 def task(two_link: Robot) -> Task:
     scene = Scene(two_link, [Gravity(9.8)])
-    ends = State([-0.5, 0.2]), State([0.6, 0.9])
-    return Task(scene, *ends, 1.0, intervals=8, limits="none", name="a reach")
+    ends = State([-0.5, 0.2]), State([-0.2, 0.4])
+    return Task(scene, *ends, 0.4, intervals=8, limits="none", name="a reach")
 
 
 @pytest.fixture(scope="module")
@@ -42,14 +42,14 @@ def test_a_trial_is_the_scene_planned_and_played_with_one_effect_more(
 ) -> None:
     trial = study.trials[0]
     scene = Scene(two_link, [Gravity(9.8), ViscousFriction(0.3)])
-    alone = plan(scene, task.start, task.goal, 1.0, intervals=8, limits="none")
+    alone = plan(scene, task.start, task.goal, 0.4, intervals=8, limits="none")
     assert (trial.name, trial.added, trial.success) == ("+ viscous_friction", True, True)
     assert trial.cost == pytest.approx(alone.cost, rel=1e-8)
     own = study.solution.trajectory
     assert trial.open_loop == play(scene, own).tip_deviation[-1]
     assert trial.held is not None
     assert trial.open_loop > trial.held > 0
-    speed = np.abs(own.sample(np.linspace(0, 1, 2001)).v).max()
+    speed = np.abs(own.sample(np.linspace(0, 0.4, 2001)).v).max()
     assert trial.torque == pytest.approx(0.3 * speed, rel=1e-2)
     grown = scene.graph().n_instructions() - task.scene.graph().n_instructions()
     assert trial.instructions == grown > 0
@@ -57,7 +57,7 @@ def test_a_trial_is_the_scene_planned_and_played_with_one_effect_more(
 
 def test_an_effect_that_the_scene_names_is_taken_away(study: EffectStudy, task: Task) -> None:
     trial = study.trials[3]
-    bare = plan(task.scene.without("gravity"), task.start, task.goal, 1.0, intervals=8)
+    bare = plan(task.scene.without("gravity"), task.start, task.goal, 0.4, intervals=8)
     assert (trial.name, trial.added, trial.effect) == ("- gravity", False, Gravity(9.8))
     assert trial.cost == pytest.approx(bare.cost, rel=1e-6)
     assert study.change(trial) < 0
@@ -110,7 +110,7 @@ def test_a_motion_that_runs_away_is_called_lost(task: Task) -> None:
 def test_a_task_without_a_motion_has_no_study(task: Task, two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity(9.8)])
     limits = {"base": "none", "v": 0.1}
-    stuck = Task(scene, task.start, task.goal, 1.0, limits=limits, name="stuck")
+    stuck = Task(scene, task.start, task.goal, 0.4, limits=limits, name="stuck")
     with pytest.raises(SceneError, match="the effects of 'stuck' cannot be compared"):
         study_effects(stuck, CANDIDATES)
 
@@ -140,12 +140,12 @@ def test_a_robot_that_floats_is_not_put_on_a_moving_base() -> None:
 # The command
 
 SCENE = """robot = "two_link.urdf"
-duration = 1.0
+duration = 0.2
 limits = "none"
 [start]
 q = [-0.5, 0.2]
 [goal]
-q = [0.6, 0.9]
+q = [-0.4, 0.2]
 [scheme]
 intervals = 8
 [effects.gravity]
