@@ -25,6 +25,7 @@ SCRIPTS = (
     "peers",
     "limits",
     "random_reaches",
+    "underactuated",
     "growth",
 )
 

@@ -1,0 +1,109 @@
+"""Swing-ups with a passive joint: hovi's orders, and the same motions by collocation with Ipopt.
+
+The peer is given the same discrete problem, which is collocation at the Gauss points: the
+accelerations there are its controls, RNEA's passive row is an equality at every point, and the
+exact Hessian is CasADi's, expanded to scalars. Both start from the cubic guess.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+from measuring import alone, best_time, exponent, print_machine, print_table
+from transcription import IPOPT, Transcription
+
+import hovi
+from hovi.rigid_body import casadi_functions
+from hovi.trajectory_objective import ActionObjective
+
+SCENES = ("acrobot_swing_up", "pendubot_swing_up", "cart_pole_swing_up")
+INTERVALS, MODES = 40, 2
+GRIDS = (40, 80, 160)
+FINE = 320
+
+
+def problem_on(scene: str, intervals: int, modes: int) -> hovi.TrajectoryProblem:
+    """The swing-up without limits."""
+    task = hovi.load_task(hovi.example(scene))
+    grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.galerkin(modes))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    return hovi.TrajectoryProblem(ld, task.start, task.goal)
+
+
+def collocation(problem: hovi.TrajectoryProblem) -> ca.Function:
+    """Ipopt on the same discrete problem."""
+    it = Transcription(problem)
+    n, passive = it.n, [int(i) for i in problem.passive]
+    active = [i for i in range(n) if i not in passive]
+    rnea = casadi_functions(problem.scene.model).inverse_dynamics
+    w = ca.SX.sym("w", it.points.shape[1])
+    p = ca.reshape(ca.mtimes(it.points, w), 3 * n, len(it.weights))
+    tau = [rnea(*ca.vertsplit(p[:, k], n)) for k in range(len(it.weights))]
+    cost = sum(c * ca.sumsqr(t[active]) / 2 for c, t in zip(it.weights, tau, strict=True))
+    g = ca.vertcat(ca.mtimes(it.ties, w), *(t[passive] for t in tau))
+    options = {"print_time": 0, "ipopt": IPOPT | {"jac_c_constant": "no"}}
+    return ca.nlpsol("S", "ipopt", {"x": w, "f": cost, "g": g}, options)
+
+
+def compare(scene: str) -> list[list[object]]:
+    """One row for hovi and one for the peer."""
+    problem = problem_on(scene, INTERVALS, MODES)
+    ours = hovi.solve(problem)
+    residuals = ActionObjective(problem).residuals(ours.trajectory.path)
+    seconds = best_time(lambda: hovi.solve(problem))
+    rows = [_row(scene, "hovi", ours.nit, seconds, seconds, ours.cost, ours.status)]
+    rows[0].append(f"{residuals.torque_share:.0e}")
+    guess = Transcription(problem).arguments("cubic")
+    solver = collocation(problem)
+    found = solver(**guess)
+    stats = solver.stats()
+    taken = best_time(lambda: solver(**guess), least=1)
+    word = "minimum" if stats["success"] else stats["return_status"]
+    cost, steps = float(found["f"]), stats["iter_count"]
+    row = _row(scene, "Ipopt", steps, taken, seconds, cost, word)
+    rows.append([*row, f"{IPOPT['tol']:.0e}"])
+    return rows
+
+
+def _row(
+    scene: str, solver: str, steps: int, seconds: float, ours: float, cost: float, status: str
+) -> list[object]:
+    times = f"{1e3 * seconds:.0f}", f"{seconds / ours:.1f}"
+    return [f"`{scene}`, {solver}", steps, *times, f"{cost:.7g}", status]
+
+
+def convergence(scene: str) -> list[list[object]]:
+    """Observed orders of the cost and of q at the nodes, for every number of inner modes."""
+    near = hovi.solve(problem_on(scene, 80, 2)).trajectory
+    fine = hovi.solve(problem_on(scene, FINE, 3), near)
+    rows = []
+    for modes in (0, 1, 2):
+        costs, nodes = [], []
+        for N in GRIDS:
+            coarse = hovi.solve(problem_on(scene, N, modes), fine.trajectory)
+            costs.append(abs(coarse.cost / fine.cost - 1))
+            gap = coarse.trajectory.q - fine.trajectory.q[:: FINE // N]
+            nodes.append(float(np.max(np.abs(gap))))
+        orders = [f"{exponent(1 / np.array(GRIDS), each):.1f}" for each in (costs, nodes)]
+        errors = [f"{each[-1]:.0e}" for each in (costs, nodes)]
+        rows.append([f"`{scene}`, `galerkin-{modes}`", 2 * (modes + 2), *orders, *errors])
+    return rows
+
+
+def main() -> None:
+    print(f"`galerkin-{MODES}` on {INTERVALS} intervals, from the cubic guess, warm.\n")
+    rows = [row for scene in SCENES for row in alone(compare, scene)]
+    columns = ["scene, solver", "steps", "ms", "of hovi's", "cost", "status", "passive torque"]
+    print_table(columns, rows)
+    print("Passive torque at the quadrature points, as a share of the largest torque; for Ipopt")
+    print("its tolerance.\n")
+    rows = [row for scene in SCENES[::2] for row in alone(convergence, scene)]
+    print(f"Least-squares orders over {', '.join(map(str, GRIDS))} intervals, and errors on the")
+    print(f"last, against `galerkin-3` on {FINE}:\n")
+    names = ["scene, scheme", "order", "cost, observed", "q, observed", "cost error", "q [rad, m]"]
+    print_table(names, rows)
+    print_machine(threads=1)
+
+
+if __name__ == "__main__":
+    main()
