@@ -36,12 +36,13 @@ def collocation(problem: hovi.TrajectoryProblem) -> ca.Function:
     n, passive = it.n, [int(i) for i in problem.passive]
     active = [i for i in range(n) if i not in passive]
     rnea = casadi_functions(problem.scene.model).inverse_dynamics
-    w = ca.SX.sym("w", it.points.shape[1])
-    p = ca.reshape(ca.mtimes(it.points, w), 3 * n, len(it.weights))
-    tau = [rnea(*ca.vertsplit(p[:, k], n)) for k in range(len(it.weights))]
-    cost = sum(c * ca.sumsqr(t[active]) / 2 for c, t in zip(it.weights, tau, strict=True))
-    g = ca.vertcat(ca.mtimes(it.ties, w), *(t[passive] for t in tau))
-    options = {"print_time": 0, "ipopt": IPOPT | {"jac_c_constant": "no"}}
+    w = ca.MX.sym("w", it.points.shape[1])
+    P = len(it.weights)
+    p = ca.reshape(ca.mtimes(it.points, w), 3 * n, P)
+    tau = rnea.map(P)(*ca.vertsplit(p, n))  # (n, P)
+    cost = ca.dot(ca.sum1(tau[active, :] ** 2).T, ca.DM(it.weights)) / 2
+    g = ca.vertcat(ca.mtimes(it.ties, w), ca.vec(tau[passive, :]))
+    options = {"print_time": 0, "expand": True, "ipopt": IPOPT | {"jac_c_constant": "no"}}
     return ca.nlpsol("S", "ipopt", {"x": w, "f": cost, "g": g}, options)
 
 
