@@ -8,9 +8,11 @@ import pytest
 
 import hovi
 from finite_differences import derivative
+from hovi.conditions import Condition
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.inverse_kinematics import inverse_kinematics
+from hovi.joint_condition import JointCondition
 from hovi.robot import Robot
 
 
@@ -70,6 +72,34 @@ def test_inverse_kinematics_meets_every_kind_of_goal(panda: Robot, ur5: Robot, k
             assert np.linalg.norm(pin.log3(pose.rotation.T @ wanted.rotation)) < 1e-9
         if goal.axis is not None:
             np.testing.assert_allclose(pose.rotation[:, 2], wanted.rotation[:, 2], atol=1e-9)
+
+
+def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
+    """Kinova has joints whose configurations are (cos, sin); a frame goal and a joint goal."""
+    robot = hovi.load_robot("kinova")
+    random = np.random.default_rng(3)
+    q = robot.integrate(robot.neutral(), random.uniform(-1, 1, robot.nv))
+    target = robot.integrate(q, random.uniform(-0.5, 0.5, robot.nv))
+    v, held = np.zeros(robot.nv), np.ones((2, robot.nv), dtype=bool)
+    for condition in (
+        goals(robot, robot.tip_frame, target)["pose"].condition(robot),
+        JointCondition(robot, target, v, held),
+    ):
+        weights = random.standard_normal(condition.size)
+        J = condition.evaluate(q, v)[1][:, 0]
+
+        def moved(d: np.ndarray, condition: Condition = condition) -> np.ndarray:
+            return condition.evaluate(robot.integrate(q, d), v)[0]
+
+        np.testing.assert_allclose(J, derivative(moved, np.zeros(robot.nv)), atol=1e-9)
+        slope = derivative(
+            lambda d, moved=moved, weights=weights: (
+                weights @ derivative(lambda e: moved(d + e), np.zeros(robot.nv))
+            ),
+            np.zeros(robot.nv),
+        )
+        curvature = condition.curvature(q, v, weights)[0, :, 0]
+        np.testing.assert_allclose(curvature, slope, atol=1e-6)
 
 
 def test_a_goal_out_of_reach_is_told_with_what_is_missing(ur5: Robot) -> None:

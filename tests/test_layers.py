@@ -63,7 +63,7 @@ FLOORS = [
     {"robot_geometry", "robot_reading", "chart_expansion", "moving_base_torque", "continuity"},
     {"robot"},
     {"state", "lagrangian", "effects", "limits"},
-    {"frame_goal"},
+    {"frame_goal", "joint_condition"},
     {"inverse_kinematics"},
     {"goals", "scene_account"},
     {"scene"},

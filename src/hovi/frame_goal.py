@@ -13,9 +13,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.conditions import Condition
+from hovi.configuration_space import ConfigurationSpace
 from hovi.errors import InputError, nearest
 from hovi.rigid_body import casadi_functions
 from hovi.robot import Robot
+from hovi.tangent import Symbols, hessian, jacobian
 
 Array = npt.NDArray[np.float64]
 
@@ -134,9 +136,17 @@ class FrameCondition(Condition):
         return casadi_functions(self.robot.model).frame_placement(self.goal.frame)
 
     @cached_property
-    def _symbols(self) -> tuple[ca.SX, ca.SX]:
-        """q and c."""
-        q = ca.SX.sym("q", self.robot.nq)
+    def _symbols(self) -> tuple[Symbols, ca.SX]:
+        """(q, v, a, t) and c."""
+        sizes = {"q": self.robot.nq, "v": self.robot.nv, "a": self.robot.nv, "t": 1}
+        q, v, a, t = (ca.SX.sym(name, size) for name, size in sizes.items())
+        return (q, v, a, t), self._equations(q)
+
+    @property
+    def _space(self) -> ConfigurationSpace | None:
+        return None if self.robot.vector_joints else self.robot.space
+
+    def _equations(self, q: ca.SX) -> ca.SX:
         R, p = self._placement(q)
         rows = []
         if self.goal.position is not None:
@@ -149,18 +159,20 @@ class FrameCondition(Condition):
             inner, world = (np.asarray(each) for each in self.goal.axis)
             across = np.linalg.svd(world[None])[2][1:]  # two directions across the target
             rows.append(ca.DM(across) @ (R @ ca.DM(inner)))
-        return q, ca.vertcat(*rows)
+        return ca.vertcat(*rows)
 
     @cached_property
     def _linear(self) -> ca.Function:
-        q, c = self._symbols
-        return ca.Function("c", [q], [c, ca.jacobian(c, q)])
+        symbols, c = self._symbols
+        J = jacobian(c, symbols, self._space)[:, : self.robot.nv]
+        return ca.Function("c", [symbols[0]], [c, J])
 
     @cached_property
     def _curvature(self) -> ca.Function:
-        q, c = self._symbols
-        weights = ca.SX.sym("weights", c.shape[0])
-        return ca.Function("ddc", [q, weights], [ca.hessian(ca.dot(weights, c), q)[0]])
+        symbols, c = self._symbols
+        n, weights = self.robot.nv, ca.SX.sym("weights", c.shape[0])
+        H = hessian(ca.dot(weights, c), symbols, self._space)[0][:n, :n]
+        return ca.Function("ddc", [symbols[0], weights], [H])
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Array:

@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
-from hovi.conditions import Condition, JointCondition
+from hovi.conditions import Condition
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.inverse_kinematics import Reached, inverse_kinematics
+from hovi.joint_condition import JointCondition
 from hovi.limits import Limits
 from hovi.robot import Robot
 from hovi.state import ALL, State
@@ -70,7 +71,7 @@ def via_conditions(via: Via, met: Met, robot: Robot) -> tuple[Condition, ...]:
     q, v = met.state.on(robot, "via")
     held = ~met.state.free_on(robot, "via")
     held[1] &= met.state.v is not None
-    return (JointCondition(q, v, held, robot.coordinate_names),)
+    return (JointCondition(robot, q, v, held),)
 
 
 @lru_cache(maxsize=256)
