@@ -19,6 +19,7 @@ FLOORS = [
         "newton",
         "conditions",
         "budget",
+        "carried_momenta",
         "whole_file",
         "skeleton",
         "meshcat_page",

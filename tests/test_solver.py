@@ -192,15 +192,6 @@ def test_nodes_and_momenta_do_not_depend_on_the_algebra(arm_scene: Scene) -> Non
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-8 * np.abs(one).max())
 
 
-@pytest.mark.long
-def test_ten_thousand_intervals_lose_no_digits(arm_scene: Scene) -> None:
-    problem = problem_on(arm_scene, intervals=10_000, scheme="galerkin-1")
-    fine = solve(problem)
-    assert fine.status is Status.MINIMUM
-    assert fine.cost == pytest.approx(REACH_COST, rel=1e-11)
-    assert_stationary(problem, fine, 1e-8)
-
-
 # Grids
 
 
@@ -493,7 +484,9 @@ def test_the_motion_carries_what_belongs_to_it(arm_scene: Scene, reach: Solution
     assert motion.scene is arm_scene
     expected = {"cost": reach.cost, "status": "minimum", "n_neg": 0}
     assert expected.items() <= dict(motion.metadata).items()
-    np.testing.assert_array_equal(motion.momenta, problem_on(arm_scene).ld.momenta(motion.path))
+    evaluated = problem_on(arm_scene).ld.momenta(motion.path)
+    atol = 1e-12 * np.abs(evaluated).max()
+    np.testing.assert_allclose(motion.momenta, evaluated, rtol=0, atol=atol)
     assert len(reach.history) == reach.nit
     assert reach.error_estimate is None
     assert reach.setup_seconds >= 0

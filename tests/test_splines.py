@@ -229,29 +229,6 @@ def test_ten_steps_of_the_printed_recursion_are_the_flow(name, recursion) -> Non
 # The long flow, in momentum form
 
 
-def cubic(t: float, x0: Array, p0: Array) -> tuple[Array, Array]:
-    """a = p~, p~' = -p: (q, v) and (p, p~) at t, exactly."""
-    (q, v), (p, pt) = x0, p0
-    end = [q + v * t + pt * t**2 / 2 - p * t**3 / 6, v + pt * t - p * t**2 / 2]
-    return np.array(end), np.array([p, pt - p * t])
-
-
-def spline_error(steps: int, h: float) -> float:
-    x0, p0 = np.array([[0.3, -0.2], [0.7, 0.4]]), np.array([[1.1, -0.6], [0.5, 0.9]])
-    motion = flow(SchemeLagrangian(spline(2), galerkin(0), h), x0, p0, steps, force=True)
-    x, p = cubic(steps * h, x0, p0)
-    return float(max(np.abs(motion.x[-1] - x).max(), np.abs(motion.p[-1] - p).max()))
-
-
-def test_the_spline_flow_keeps_its_digits_over_many_short_steps() -> None:
-    assert spline_error(10_000, 1e-4) < 1e-13
-
-
-@pytest.mark.long
-def test_the_spline_flow_keeps_its_digits_over_a_million_steps() -> None:
-    assert spline_error(1_000_000, 1e-6) < 1e-11
-
-
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_the_flow_of_every_spline_is_its_polynomial(k: int) -> None:
     # p_{k-1} = q^(k) and p_j' = -p_{j-1}: Taylor's series is finite

@@ -14,7 +14,7 @@ from hovi.euler_lagrange import regularity
 from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
 from hovi.grid import Grid
 from hovi.lagrangian import CasadiLagrangian, EffortLagrangian, Lagrangian
-from hovi.lagrangians import mechanics, spline
+from hovi.lagrangians import spline
 from hovi.legendre_transforms import legendre
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
@@ -23,13 +23,12 @@ from hovi.schemes import by_name, galerkin
 from hovi.segment_lagrangian import SchemeLagrangian
 from hovi.solver import solve
 from hovi.state import State
-from hovi.stepper import Flow, compensated, flow
-from hovi.symmetry import base_rotation
+from hovi.stepper import compensated, flow
+from long_flows import JET, arm_energy, costless, noether_errors, quartic, quartic_energy
 
 Array = npt.NDArray[np.float64]
 
 REGULAR = ["taylor-midpoint", "taylor-trapezoid", "hermite-simpson", "galerkin-0", "galerkin-2"]
-JET = np.array([[0.4, -0.3], [0.6, -0.8], [0.5, 0.2], [-0.4, 0.6]])  # q, v, a, jerk
 
 
 @pytest.fixture(scope="module")
@@ -41,14 +40,6 @@ def arm(arm_scene: Scene) -> EffortLagrangian:
 def floating(two_link: Robot) -> Scene:
     """The arm without gravity."""
     return Scene(two_link)
-
-
-def quartic() -> CasadiLagrangian:
-    """(d^2 + 1)(d^2 + 4) q + q^3 = 0: two oscillators in a quartic potential, bounded near rest."""
-    q, v, a = (ca.SX.sym(c, 1) for c in "qva")
-    return CasadiLagrangian(
-        [q, v, a], (ca.sumsqr(a) - 5 * ca.sumsqr(v) + 4 * ca.sumsqr(q)) / 2 + q**4 / 4
-    )
 
 
 # Symplecticity and reversibility
@@ -113,28 +104,9 @@ def test_symmetric_schemes_are_reversible(arm: EffortLagrangian, name: str) -> N
 # Energy over long times
 
 
-def quarters(error: Array) -> tuple[float, float]:
-    """The largest error of the first and of the last quarter."""
-    parts = np.array_split(np.abs(error), 4)
-    return float(parts[0].max()), float(parts[-1].max())
-
-
-def quartic_energy(name: str, steps: int) -> tuple[float, float]:
-    x, p = legendre(quartic(), [0.3], [0.1], [0.0], [0.05])
-    motion = flow(SchemeLagrangian(quartic(), by_name(name), 0.05), x, p, steps, force=True)
-    return quarters(motion.energy - motion.energy[0])
-
-
 @pytest.mark.parametrize("name", ["taylor-midpoint", "galerkin-0"])
 def test_the_energy_of_the_quartic_oscillator_does_not_drift(name: str) -> None:
     first, last = quartic_energy(name, 4000)
-    assert last <= 1.2 * first
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", ["taylor-midpoint", "galerkin-0"])
-def test_the_energy_of_the_quartic_oscillator_does_not_drift_over_long_times(name: str) -> None:
-    first, last = quartic_energy(name, 100_000)
     assert last <= 1.2 * first
 
 
@@ -148,45 +120,12 @@ def test_its_energy_error_has_the_order_of_the_scheme(name: str, order: int) -> 
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
-def arm_energy(scene: Scene, r: int, steps: int) -> tuple[float, float]:
-    """Mechanics of the arm, released from horizontal, h = 0.02."""
-    L = mechanics(scene)
-    x, p = legendre(L, np.zeros(2), np.zeros(2))
-    motion = flow(SchemeLagrangian(L, galerkin(r, 1), 0.02), x, p, steps, force=True)
-    return quarters(motion.energy - motion.energy[0])
-
-
 def test_the_energy_of_the_falling_arm_does_not_drift(arm_scene: Scene) -> None:
     first, last = arm_energy(arm_scene, 1, 10_000)
     assert last <= 1.2 * first
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("r", [0, 1, 2])
-def test_the_energy_of_the_falling_arm_does_not_drift_over_1e5_steps(
-    arm_scene: Scene, r: int
-) -> None:
-    first, last = arm_energy(arm_scene, r, 100_000)
-    assert last <= 1.2 * first
-
-
 # Discrete Noether
-
-
-def noether_errors(scene: Scene, N: int) -> tuple[float, float, float]:
-    """Spread of the carried J, and how far D_1, D_2 and D_3, D_4 are from the carried momenta."""
-    L = scene.effort_lagrangian()
-    x, p = legendre(L, *JET)
-    ld = SchemeLagrangian(L, galerkin(2), 1.0 / N)
-    motion = flow(ld, x, p, N, symmetries={"turn": base_rotation(scene, [0, 1, 0])}, force=True)
-    J = motion.momentum_maps["turn"]
-    minus, plus = motion.reevaluated_momenta
-    size = np.abs(motion.p).max()
-    return (
-        float(np.ptp(J) / np.abs(J).max()),
-        float(np.abs(minus - motion.p[:-1]).max() / size),
-        float(np.abs(plus - motion.p[1:]).max() / size),
-    )
 
 
 @pytest.mark.parametrize("N", [100, 1000])
@@ -194,13 +133,6 @@ def test_noether_the_momentum_of_the_shoulder_without_gravity(floating: Scene, N
     carried, minus, plus = noether_errors(floating, N)
     assert carried < 1e-12
     assert max(minus, plus) < 1e-13 * N
-
-
-@pytest.mark.long
-def test_noether_over_ten_thousand_steps(floating: Scene) -> None:
-    carried, minus, plus = noether_errors(floating, 10_000)
-    assert carried < 1e-12
-    assert max(minus, plus) < 1e-13 * 10_000
 
 
 # The Newton matrix of a step
@@ -296,24 +228,9 @@ def test_a_short_reach_is_replayed_from_its_momenta(arm_scene: Scene) -> None:
 # Motions without cost
 
 
-def costless(scene: Scene, steps: int, v0: list[float]) -> Flow:
-    """A motion without torques, carried by the flow of the effort, h = 0.02."""
-    L = scene.effort_lagrangian()
-    n = L.nv
-    x = np.array([np.full(n, 0.4), v0])
-    return flow(SchemeLagrangian(L, galerkin(0), 0.02), x, np.zeros((2, n)), steps, force=True)
-
-
 def test_the_pendulum_without_torque_stays_without_torque(pendulum: Robot) -> None:
     motion = costless(Scene(pendulum, [Gravity()]), 3000, [0.2])
     assert np.abs(motion.p).max() < 1e-5
-
-
-@pytest.mark.long
-def test_motions_without_torque_stay_so_over_many_steps(pendulum: Robot, floating: Scene) -> None:
-    for scene, v0 in ((Scene(pendulum, [Gravity()]), [0.2]), (floating, [0.2, -0.1])):
-        motion = costless(scene, 50_000, v0)
-        assert np.abs(motion.p).max() < 1e-5
 
 
 # Details

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.budget import TimeLeft
+from hovi.carried_momenta import carried_momenta
 from hovi.equality_rounds import satisfy
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
@@ -207,7 +208,7 @@ class _Answer:
         }
         if problem.limits is not None and problem.limited:
             metadata["limits"] = problem.limits.to_dict()
-        momenta = problem.ld.momenta(self.path, self.forces)
+        momenta = carried_momenta(problem.ld.derivatives(self.path, self.forces))
         return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
 
 

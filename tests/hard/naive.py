@@ -1,0 +1,136 @@
+"""The paper, word for word: its Taylor scheme on the two-link arm, full Newton, the cubic guess.
+
+What such an implementation does on the hard cases. Its Lagrangian comes from paper_arm.py, its
+derivatives from CasADi, its linear algebra from SciPy's sparse LU: no part of hovi is in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.linalg import spsolve
+
+from paper_arm import symbols
+
+Array = npt.NDArray[np.float64]
+
+NODE = 4
+"""Numbers at a node: q and v of two joints."""
+
+
+@cache
+def discrete_lagrangian(gravity: bool = True) -> ca.Function:
+    """(x0, x1, h) -> L_d and its gradient and Hessian, x = (q, v).
+
+    L_d = h/2 (L(qm, vm, a0) + L(qm, vm, a1)), a0 = 2/h^2 (q1 - q0 - h v0) and
+    a1 = 2/h^2 (q0 - q1 + h v1). [ColomboFerraroMartin2016, section 5]
+    """
+    s = symbols()
+    at_rest = ca.substitute(s.u, ca.vertcat(s.v, s.a), ca.SX.zeros(4))
+    u = s.u if gravity else s.u - at_rest
+    L = ca.Function("L", [s.q, s.v, s.a], [ca.sumsqr(u) / 2])
+    x, h = ca.SX.sym("x", 2 * NODE), ca.SX.sym("h")
+    q0, v0, q1, v1 = ca.vertsplit(x, 2)
+    a0, a1 = 2 / h**2 * (q1 - q0 - h * v0), 2 / h**2 * (q0 - q1 + h * v1)
+    q, v = (q0 + q1) / 2, (v0 + v1) / 2
+    L_d = h / 2 * (L(q, v, a0) + L(q, v, a1))
+    H, g = ca.hessian(L_d, x)
+    return ca.Function("L_d", [x, h], [L_d, g, H])
+
+
+@dataclass
+class Problem:
+    """Nodes x, shape (N + 1, 4), with both ends fixed."""
+
+    x: Array
+    h: float
+    gravity: bool = True
+
+    @classmethod
+    def cubic(
+        cls, start: Array, goal: Array, duration: float, intervals: int, gravity: bool = True
+    ) -> Problem:
+        """The cubic through (q, v) at both ends."""
+        s, T = np.linspace(0, 1, intervals + 1)[:, None], duration
+        (q0, v0), (q1, v1) = np.split(start, 2), np.split(goal, 2)
+        b, c = 3 * (q1 - q0) - T * (2 * v0 + v1), 2 * (q0 - q1) + T * (v0 + v1)
+        q = q0 + T * v0 * s + b * s**2 + c * s**3
+        v = v0 + (2 * b * s + 3 * c * s**2) / T
+        return cls(np.hstack([q, v]), duration / intervals, gravity)
+
+    @property
+    def expansion(self) -> tuple[float, Array, Array]:
+        """The action, the residual of the inner nodes (N - 1, 4), and all L_d's Hessians."""
+        N = len(self.x) - 1
+        pairs = np.hstack([self.x[:-1], self.x[1:]]).T
+        values, g, H = discrete_lagrangian(self.gravity).map(N)(pairs, self.h)
+        gradient = np.array(g).T
+        residual = gradient[1:, :NODE] + gradient[:-1, NODE:]
+        blocks = np.array(H).reshape(2 * NODE, N, 2 * NODE).transpose(1, 0, 2)
+        return float(ca.sum2(values)), residual, blocks
+
+    @staticmethod
+    def assembled(blocks: Array) -> sp.csc_matrix:
+        """The Hessian of the action, over the inner nodes."""
+        N = len(blocks)
+        place = NODE * np.arange(N)[:, None] + np.arange(2 * NODE)
+        rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
+        full = sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel()))).tocsc()
+        return full[NODE:-NODE, NODE:-NODE]
+
+    @property
+    def n_neg(self) -> int:
+        """Negative eigenvalues of the Hessian."""
+        return int(np.sum(np.linalg.eigvalsh(self.assembled(self.expansion[2]).toarray()) < 0))
+
+    @property
+    def momenta(self) -> Array:
+        """-D1 L_d at the first node of every interval, (N, 2)."""
+        N = len(self.x) - 1
+        pairs = np.hstack([self.x[:-1], self.x[1:]]).T
+        gradient = np.array(discrete_lagrangian(self.gravity).map(N)(pairs, self.h)[1]).T
+        return -gradient[:, :2]
+
+    def newton(self, residual: Array, blocks: Array) -> Array:
+        """One full Newton step; returns it."""
+        step = spsolve(self.assembled(blocks), -residual.ravel()).reshape(-1, NODE)
+        self.x[1:-1] += step
+        return np.asarray(step)
+
+
+@dataclass
+class Run:
+    """What Newton's method came to."""
+
+    problem: Problem
+    steps: int
+    stopped: str
+    cost: float
+    residual: float
+
+    @property
+    def said(self) -> str:
+        """In a few words."""
+        if self.stopped == "not finite":
+            return f"NaN after {self.steps} steps"
+        return f"{self.stopped} after {self.steps} steps, J = {self.cost:.6g}"
+
+
+def solve(problem: Problem, tolerance: float = 1e-10, most: int = 50) -> Run:
+    """Newton steps until the largest residual is below an absolute tolerance."""
+    with np.errstate(all="ignore"):
+        for steps in range(most + 1):
+            cost, residual, blocks = problem.expansion
+            size = float(np.abs(residual).max(initial=0.0))
+            if not np.isfinite(size):
+                return Run(problem, steps, "not finite", cost, size)
+            if size <= tolerance:
+                return Run(problem, steps, "converged", cost, size)
+            if steps < most:
+                problem.newton(residual, blocks)
+    return Run(problem, most, "still running", cost, size)

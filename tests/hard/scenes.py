@@ -1,0 +1,80 @@
+"""The scenes and problems that the hard cases share."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.chain_urdf import write_chain
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.effects import Gravity
+from hovi.grid import Grid
+from hovi.model_files import example
+from hovi.problem import TrajectoryProblem
+from hovi.robot import load_robot
+from hovi.scene import Scene
+from hovi.schemes import by_name
+from hovi.solver import Solution
+from hovi.state import State
+from paper_arm import HANG, REACH_Q, REACH_V
+from uneven_chain import uneven_chain
+
+Array = npt.NDArray[np.float64]
+
+START, REACH, UP = State(HANG), State(REACH_Q, REACH_V), State(-HANG)
+REACH_JET = np.concatenate([REACH_Q, REACH_V])
+HANG_JET, UP_JET = np.array([*HANG, 0.0, 0.0]), np.array([*-HANG, 0.0, 0.0])
+
+
+@cache
+def arm(gravity: bool = True) -> Scene:
+    """The paper's two-link arm."""
+    robot = load_robot(example("two_link.urdf"))
+    return Scene(robot, [Gravity(9.8)] if gravity else [])
+
+
+@cache
+def links(count: int) -> Scene:
+    """A uniform chain."""
+    with tempfile.TemporaryDirectory() as folder:
+        robot = load_robot(write_chain(Path(folder) / "chain.urdf", count))
+    return Scene(robot, [Gravity(9.8)])
+
+
+@cache
+def uneven(masses: tuple[float, ...]) -> Scene:
+    """Rods of one metre with given masses."""
+    with tempfile.TemporaryDirectory() as folder:
+        robot = uneven_chain(masses, Path(folder) / "chain.urdf")
+    return Scene(robot, [Gravity(9.8)])
+
+
+def hanging(scene: Scene) -> Array:
+    """Straight down."""
+    q = np.zeros(scene.robot.nv)
+    q[0] = -np.pi / 2
+    return q
+
+
+def problem(
+    scene: Scene,
+    start: State,
+    goal: State,
+    duration: float,
+    intervals: int,
+    scheme: str = "galerkin-2",
+) -> TrajectoryProblem:
+    """A problem without limits."""
+    grid = Grid.uniform(duration, intervals, by_name(scheme))
+    return TrajectoryProblem(DiscreteLagrangian(scene.effort_lagrangian(), grid), start, goal)
+
+
+def said(solutions: Sequence[Solution]) -> str:
+    """Costs, inertias and steps in a few words."""
+    parts = [f"{s.status}, J = {s.cost:.6g}, n_neg = {s.n_neg}, {s.nit} steps" for s in solutions]
+    return "; ".join(parts)
