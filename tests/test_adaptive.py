@@ -211,6 +211,35 @@ def test_joints_without_torque(two_link: Robot) -> None:
     assert accuracy_of(found).error / 10 <= true <= 1e-4
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+def test_motions_under_limits(arm_scene: Scene, tolerance: float) -> None:
+    limits = {"base": "none", "v": 5.0}
+    options = {"limits": limits, "intervals": 8, "tolerance": tolerance}
+    found = plan(arm_scene, HANG, State(REACH_Q, REACH_V), 1.0, **options)  # type: ignore[arg-type]
+    accuracy = accuracy_of(found)
+    assert found.problem is not None
+    assert accuracy.reached
+    every = np.ones(found.trajectory.grid.intervals, dtype=bool)
+    grid = found.trajectory.grid.halved(every)
+    grid = grid.halved(np.ones(grid.intervals, dtype=bool))
+    reference = solve(found.problem.on(grid), found.trajectory)
+    assert reference.success
+    true = abs(found.cost / reference.cost - 1)
+    assert accuracy.error / 10 <= true <= tolerance
+    t = np.linspace(0.0, 1.0, 1001)
+    assert np.abs(found.trajectory.sample(t).v).max() <= 5.0 * (1 + 1e-5)
+
+
+def test_the_tolerance_of_limits_is_not_passed_over(arm_scene: Scene) -> None:
+    limits = {"base": "none", "v": 5.0, "tolerance": 1e-4}
+    goal = State(REACH_Q, REACH_V)
+    found = plan(arm_scene, HANG, goal, 1.0, limits=limits, intervals=8, tolerance=1e-5)
+    accuracy = accuracy_of(found)
+    assert (found.success, accuracy.reached) == (True, False)
+    assert accuracy.error >= 1e-4
+    assert "stopped early" in found.message
+
+
 def test_a_duration_that_is_free_has_no_tolerance(arm_scene: Scene) -> None:
     with pytest.raises(InputError, match="find the best duration first"):
         plan(arm_scene, HANG, REACH_Q, (0.5, 2.0), limits="none", tolerance=1e-6)

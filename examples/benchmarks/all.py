@@ -27,6 +27,7 @@ SCRIPTS = (
     "random_reaches",
     "underactuated",
     "growth",
+    "tolerance",
 )
 
 

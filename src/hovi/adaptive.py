@@ -41,6 +41,11 @@ UNSTEADY = 0.1
 """Error of the cost that a spread of the nodal Hamiltonian speaks of, as a share of the spread."""
 ROUNDING = 1e-14
 """Relative error of the cost that rounding may leave: no smaller one is claimed."""
+CAUTION = 1.5
+"""Factor on the difference from a finer solution under limits, which is not better by orders."""
+BLUR = 10.0
+"""Relative error of the cost that limits leave, in units of their tolerance: bounds are drawn in
+by some tolerances, and may be exceeded by one."""
 STALLED = 2
 """Rounds without a smaller error after which rounding, or the motion, sets the limit."""
 MOST_POINTS = 400_000
@@ -142,10 +147,11 @@ class _Search:
         if finer is None:
             return np.nan, np.nan
         if self.tolerance.quantity is Quantity.COST:
-            error = _error_of_cost(finer)
+            error = _error_of_cost(solution, finer)
             return error, max(error, float(_contributions(finer).sum()), _unsteady(solution))
         estimate = estimate_against(solution, finer, self._frame)
         error = self.tolerance.measure(estimate)
+        error *= CAUTION if finer.problem.limited else 1.0
         return error, error
 
     def _enough(self, candidate: _Candidate) -> bool:
@@ -160,8 +166,15 @@ class _Search:
         if self.deadline is not None and time.monotonic() > self.deadline:
             return "the time limit was reached"
         cost = self.tolerance.quantity is Quantity.COST
-        if stalled >= STALLED or (cost and candidate.whole <= ROUNDING):
-            return "rounding leaves no smaller error"
+        limits = None if solution.problem is None else solution.problem.limits
+        least = ROUNDING
+        if limits is not None and limits.bounded.any():
+            least = BLUR * limits.tolerance
+        if cost and candidate.error <= least:
+            what = "rounding leaves" if least == ROUNDING else "the limits' tolerance leaves"
+            return f"{what} no smaller error"
+        if stalled >= STALLED:
+            return f"the last {STALLED} grids brought no smaller error"
         if len(self.rounds) >= ROUNDS:
             return f"{ROUNDS} grids were tried"
         if self.rounds[-1].points > MOST_POINTS:
@@ -176,7 +189,7 @@ class _Search:
         if finer is None:
             grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
             return self._solved(problem.on(grid), candidate.solution.trajectory)
-        rho = decay(finer.problem.grid, finer.path)
+        rho = _decay(candidate.solution, finer)
         grid = refined(problem.grid, rho, self._demands(candidate, finer))
         if _same(grid, problem.grid):
             grid = finer_grid(grid)
@@ -225,7 +238,7 @@ class _Search:
             tuple(self.rounds),
             None if finer is None else partial(estimate_against, solution, finer, self._frame),
         )
-        known = None if finer is None else _error_of_cost(finer)
+        known = None if finer is None else _error_of_cost(solution, finer)
         steps = sum(done.nit for done in self.rounds)
         message = solution.message
         if solution.success:
@@ -260,6 +273,14 @@ def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
     return problem.path(curve)
 
 
+def _decay(solution: Solution, finer: FinerSolution) -> Array:
+    """Of the finer solution, where it has the same intervals; else of the solution itself."""
+    grid = solution.trajectory.grid
+    if np.array_equal(grid.steps, finer.problem.grid.steps):
+        return decay(finer.problem.grid, finer.path)
+    return decay(grid, solution.trajectory.path)
+
+
 def _unsteady(solution: Solution) -> float:
     """What the nodal Hamiltonian says of the error, relative; 0 where it is not constant."""
     assert solution.problem is not None
@@ -277,10 +298,16 @@ def _same(one: Grid, other: Grid) -> bool:
     )
 
 
-def _error_of_cost(finer: FinerSolution) -> float:
-    """Relative; 0 where there is no cost, and else not below rounding."""
+def _error_of_cost(solution: Solution, finer: FinerSolution) -> float:
+    """Relative; 0 where there is no cost, and else not below what rounding or limits leave."""
     error = relative_difference(finer.known, finer.cost)
-    return max(error, ROUNDING) if finer.known != 0 else error
+    if finer.known == 0:
+        return error
+    problem = solution.problem
+    assert problem is not None
+    if problem.limits is not None and problem.limited:
+        return max(CAUTION * error, BLUR * problem.limits.tolerance)
+    return max(error, ROUNDING)
 
 
 def _contributions(finer: FinerSolution) -> Array:

@@ -1,5 +1,8 @@
 """A finer solution next to a known one: the same grid with two more inner modes per interval.
 
+Under limits it is the grid with every interval halved: where a limit begins to bind the motion has
+a kink, and more inner modes alone would show little of the error that it makes.
+
 Prolonged to the finer grid a solution is already near: one or two Newton steps lead to the finer
 one. On the way the Hessian of the first step tells what each interval would gain alone.
 """
@@ -15,6 +18,7 @@ import numpy.typing as npt
 from hovi.discrete_lagrangian import Expansion
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
+from hovi.guess import stretched
 from hovi.motion_error import places
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.problem import TrajectoryProblem
@@ -66,9 +70,13 @@ class FinerSolution:
 
 def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
     """The finer solution next to a solution of a problem; None where none was found nearby."""
+    if problem.limited:
+        halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
+        curve = stretched(motion(problem, path), problem.grid.duration)
+        return _solved(halves, halves.path(curve), problem, path)
     fine = problem.on(finer_grid(problem.grid))
     start = prolonged(path, fine.grid)
-    if problem.limited or problem.constrained:
+    if problem.constrained:
         return _solved(fine, start, problem, path)
     objective = ActionObjective(fine)
     first = objective.model(start, None, None)

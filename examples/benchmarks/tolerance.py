@@ -1,0 +1,133 @@
+"""Plans to a tolerance: estimated and true errors, and what the choice costs.
+
+The true error is the distance from a solution with half the steps and six inner modes more; that
+one's cost is held against SciPy's solve_bvp on Pontryagin's equations. The cheapest fixed run is
+the quickest of Galerkin schemes with 0 to 8 inner modes on 4 to 64 intervals, from the same guess,
+of those that end in the same minimum within the tolerance; no error is estimated for them.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+from measuring import alone, print_machine, print_table
+from pontryagin import extremal_cost
+
+import hovi
+from hovi.motion_error import deviation
+from hovi.schemes import galerkin
+
+SCENES = ("two_link_reach", "ur5_reach", "panda_reach", "z1", "chain of 4")
+TOLERANCES = [10.0**-k for k in range(2, 10)]
+DEGREES, INTERVALS = (0, 1, 2, 3, 4, 6, 8), (4, 6, 8, 12, 16, 24, 32, 64)
+REPEATS = 3
+SAME = 0.05
+"""Relative difference in cost from the resolved motion beyond which a run is of another minimum
+or of none."""
+
+
+def task(name: str) -> tuple[hovi.Scene, hovi.State, hovi.State, float]:
+    """Scene, start, goal and duration."""
+    if name == "z1":
+        robot = hovi.load_robot("z1", locked=["jointGripper"])
+        start, goal = [0.0, 0.5, -0.5, 0.0, 0.0, 0.0], [0.8, 1.2, -1.0, 0.3, 0.4, -0.5]
+        scene, duration = hovi.Scene(robot, [hovi.effects.Gravity()]), 1.0
+        return scene, hovi.State(start), hovi.State(goal), duration
+    if name == "chain of 4":
+        robot = hovi.load_robot(pin.buildModelFromXML(hovi.chain(4)))
+        scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+        hang, bend = np.array([-np.pi / 2, 0.0, 0.0, 0.0]), np.array([1.0, 0.4, -0.3, 0.5])
+        return scene, hovi.State(hang), hovi.State(hang + bend), 1.0
+    read = hovi.load_task(hovi.example(name))
+    return read.scene, read.start, read.goal, read.duration
+
+
+def measure(name: str) -> tuple[list[list[str]], str]:
+    """Rows of the table, and what SciPy says of the reference."""
+    scene, start, goal, duration = task(name)
+
+    def plan(**options: object) -> hovi.Solution:
+        return hovi.plan(scene, start, goal, duration, limits="none", **options)
+
+    plan(tolerance=1e-6)  # what is imported and cached here is not timed below
+    fixed = [_fixed(plan, r, N) for r in DEGREES for N in INTERVALS]
+    rows = []
+    for tolerance in TOLERANCES:
+        seconds, solution = _timed(lambda tolerance=tolerance: plan(tolerance=tolerance))
+        reference = _reference(solution)
+        costs = solution.cost, reference.cost
+        true = deviation(solution.trajectory, reference.trajectory, costs)
+        accuracy, grid = solution.accuracy, solution.trajectory.grid
+        modes = sorted({scheme.inner_modes for scheme in grid.schemes})
+        near = [
+            (took, error)
+            for took, cost in fixed
+            if (error := abs(cost / reference.cost - 1)) < SAME and error <= tolerance
+        ]
+        best = min(near)[0] if near else None
+        rows.append(
+            [
+                f"{name}",
+                f"{tolerance:.0e}",
+                "yes" if accuracy.reached else accuracy.reason,
+                f"{grid.intervals}",
+                f"{modes[0]}" if len(modes) == 1 else f"{modes[0]} to {modes[-1]}",
+                f"{accuracy.error:.1e}",
+                f"{true.cost:.1e}",
+                f"{1e3 * true.largest_tip:.1e}",
+                f"{1e3 * seconds:.0f}",
+                "-" if best is None else f"{1e3 * best:.0f}",
+                "-" if best is None else f"{seconds / best:.1f}",
+            ]
+        )
+    exact = extremal_cost(reference.trajectory)
+    said = "SciPy found no solution"
+    if exact is not None:
+        said = f"{abs(exact / reference.cost - 1):.0e}"
+    return rows, said
+
+
+def _fixed(plan: Callable[..., hovi.Solution], r: int, N: int) -> tuple[float, float]:
+    """Seconds and cost of a fixed run."""
+    seconds, solution = _timed(lambda: plan(scheme=galerkin(r), intervals=N))
+    return seconds, solution.cost if solution.success else np.inf
+
+
+def _timed(work: Callable[[], hovi.Solution]) -> tuple[float, hovi.Solution]:
+    """The median of several runs, and the last solution."""
+    times = []
+    for _ in range(REPEATS):
+        began = time.perf_counter()
+        solution = work()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times), solution
+
+
+def _reference(solution: hovi.Solution) -> hovi.Solution:
+    grid, problem = solution.trajectory.grid, solution.problem
+    assert problem is not None
+    tables = tuple(galerkin(scheme.inner_modes + 6) for scheme in grid.schemes)
+    fine = hovi.Grid(grid.steps, tables).halved(np.ones(grid.intervals, dtype=bool))
+    return hovi.solve(problem.on(fine), solution.trajectory)
+
+
+def main() -> None:
+    columns = ["scene", "tolerance", "reached", "N", "inner modes", "estimate", "true error"]
+    columns += ["tip [mm]", "time [ms]", "fixed [ms]", "ratio"]
+    rows, oracle = [], []
+    for name in SCENES:
+        more, said = alone(measure, name)
+        rows += more
+        oracle.append(f"{name}: {said}")
+    print_table(columns, rows)
+    print("Cost of the finest reference against SciPy's solve_bvp, relative: " + ", ".join(oracle))
+    print()
+    print_machine(1)
+
+
+if __name__ == "__main__":
+    main()
