@@ -23,9 +23,12 @@ from hovi.accuracy.motion_error import Yardstick
 from hovi.accuracy.tables import as_csv
 from hovi.cli import main
 from hovi.errors import InputError, UnmeasurableError
+from hovi.frame_goal import FrameGoal
 from hovi.model_files import example
 from hovi.robot import Robot
-from hovi.task_file import load_task
+from hovi.scene import Scene
+from hovi.state import State
+from hovi.task_file import Task, load_task
 from hovi.work_precision_plot import work_precision_figure
 
 Array = npt.NDArray[np.float64]
@@ -99,6 +102,23 @@ def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) 
         assert each.cold_seconds == each.setup_seconds + each.first_seconds
     finest = reach.of("galerkin-1")[-1]
     assert finest.cost == pytest.approx(reach.resolved.cost, rel=1e-11)
+
+
+def test_what_a_tolerance_chooses_is_within_it(reach: Diagram) -> None:
+    assert [choice.tolerance for choice in reach.choices] == [1e-3, 1e-5, 1e-7, 1e-9]
+    for choice in reach.choices:
+        assert choice.success
+        assert choice.error.cost <= choice.tolerance
+        assert choice.estimate is not None
+        assert choice.estimate <= choice.tolerance
+        assert choice.intervals >= 1
+
+
+def test_a_goal_of_a_frame_has_a_diagram_too(arm_scene: Scene) -> None:
+    goal = FrameGoal(arm_scene.robot.tip_frame, position=(1.5, 0.0, 1.0))
+    task = Task(arm_scene, State(paper_arm.HANG), goal, 1.0, limits="none")
+    diagram = work_precision(task, schemes=["galerkin-3"], repeats=1, budget=10.0)
+    assert min(run.error.cost for run in diagram.runs) < 1e-9
 
 
 def test_an_error_that_is_small_by_luck_promises_nothing(reach: Diagram) -> None:

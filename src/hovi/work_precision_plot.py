@@ -20,6 +20,7 @@ _LABELS = {
 }
 _PEERS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a")
 _MILLISECONDS = 1e3
+_LEAST = 1e-16  # what stands for an error of zero
 _MARKS = "osD^vP*X<>"
 
 Time = Callable[[Run], float]
@@ -48,7 +49,7 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
     for ax, measure in zip(panels.flat, MEASURES, strict=False):
         _panel(ax, diagram, measure, warm)
         _front(ax, diagram, measure, warm)
-        _choices(ax, diagram, measure)
+        _choices(ax, diagram, measure, fastest)
         ax.set_xlabel("one solve, warm [ms]")
     _panel(panels[1, 1], diagram, "cost", _cold)
     panels[1, 1].set_xlabel("building and the first solve [ms]")
@@ -114,13 +115,27 @@ def _front(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     ax.plot(x, y, color="black", linewidth=3.5, alpha=0.25, label="cheapest", zorder=1)
 
 
-def _choices(ax: Axes, diagram: Diagram, measure: str) -> None:
-    x = [_MILLISECONDS * choice.seconds for choice in diagram.choices]
-    y = [getattr(choice.error, measure) for choice in diagram.choices]
-    if x:
-        ax.plot(x, y, "*", color="#d00000", markersize=11, label="plan(tolerance=)", zorder=9)
+def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
+    """A star per tolerance, with the tolerance beside it where it is of the cost."""
+    chosen = diagram.choices
+    x = [_MILLISECONDS * (c.best_seconds if fastest else c.seconds) for c in chosen]
+    y = [max(getattr(choice.error, measure), _LEAST) for choice in chosen]
+    look = {"linestyle": "none", "marker": "*", "markersize": 12.0, "zorder": 9.0}
+    if chosen:
+        (stars,) = ax.plot(x, y, color="#d00000", label="chosen by a tolerance")
+        stars.set(**look)
+    for choice, left, below in zip(chosen, x, y, strict=True):
+        if measure == "cost":
+            ax.annotate(
+                f"{choice.tolerance:.0e}",
+                (left, below),
+                xytext=(7, -3),
+                textcoords="offset points",
+                color="#d00000",
+                fontsize="small",
+            )
 
 
 def _points(runs: Sequence[Run], measure: str, time: Time) -> tuple[list[float], list[float]]:
     x = [_MILLISECONDS * time(run) for run in runs]
-    return x, [max(getattr(run.error, measure), 1e-16) for run in runs]
+    return x, [max(getattr(run.error, measure), _LEAST) for run in runs]

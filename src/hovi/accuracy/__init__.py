@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from hovi.accuracy.diagram import MEASURES, Choice, Diagram
+from hovi.accuracy.choice import Choice
+from hovi.accuracy.diagram import MEASURES, Diagram
 from hovi.accuracy.motion_error import MotionError
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run

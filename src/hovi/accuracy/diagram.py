@@ -6,29 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.choice import Choice
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
 
 MEASURES = ("cost", "joints", "tip")
 """Fields of MotionError."""
 UNITS = {"cost": "relative", "joints": "rad", "tip": "mm"}
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What `plan(tolerance=)` chose, with the time that it took and the error that it has.
-
-    tolerance: relative, in the cost. estimate: what it says that its error is.
-    """
-
-    tolerance: float
-    scheme: str
-    intervals: int
-    seconds: float
-    estimate: float | None
-    error: MotionError
-    success: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,5 +112,5 @@ class Diagram:
                 run.to_dict() | {"front": [m for m in MEASURES if id(run) in front[m]]}
                 for run in self.runs
             ],
-            "choices": [{**vars(choice), "error": vars(choice.error)} for choice in self.choices],
+            "choices": [choice.to_dict() for choice in self.choices],
         }

@@ -10,7 +10,7 @@ import numpy as np
 from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import Grid
-from hovi.guess import Curve, path_on_grid
+from hovi.guess import Curve
 from hovi.lagrangian import EffortLagrangian
 from hovi.problem import TrajectoryProblem
 from hovi.schemes import by_name
@@ -45,7 +45,7 @@ class VariationalMethod(Method):
         watch, old = Stopwatch(), self._problem
         grid = Grid.uniform(old.grid.duration, intervals, self._scheme)
         problem = on_grid(old, grid, anew=True)
-        path = path_on_grid(self._guess, grid, problem.boundary, problem.robot)
+        path = problem.path(self._guess)
         problem.structure  # noqa: B018 - built here, and not in the first solve
 
         def run() -> Answer:

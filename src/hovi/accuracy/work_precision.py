@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
+from hovi.accuracy.choice import choices
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import guess_curve
 from hovi.accuracy.measuring import REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import Method
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
-from hovi.errors import UnmeasurableError
+from hovi.errors import InputError, UnmeasurableError
 from hovi.guess import Curve
 from hovi.limits import as_limits
 from hovi.planner import plan
@@ -21,6 +22,8 @@ from hovi.task_file import Task
 
 SEARCHING = 0.3
 """Share of the budget in which the motion may be found and resolved."""
+MEASURING = 0.9
+"""Share of the budget in which methods are measured; tolerances may choose in what is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,11 @@ def work_precision(
     Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
     resolved.
     """
+    if task.via:
+        raise InputError(
+            f"{task.name} has via points, and a diagram is of a motion between two ends: leave "
+            "them out."
+        )
     time, report = Budget(budget), progress or _silent
     report(f"planning {task.name}", 0.0)
     found = plan(
@@ -70,6 +78,7 @@ def work_precision(
         task.start,
         task.goal,
         task.duration,
+        time_weight=task.time_weight,
         scheme=task.scheme,
         intervals=task.intervals,
         limits="none",
@@ -92,7 +101,9 @@ def work_precision(
         except UnmeasurableError as refused:
             notes.append(str(refused))
     try:
-        measured = measure(methods, resolved.yardstick, time, report, repeats=repeats)
+        measured = measure(methods, resolved.yardstick, time, report, MEASURING, repeats)
+        report("what a tolerance chooses", time.fraction)
+        chosen = choices(problem, curve, resolved.yardstick, time, task.intervals, repeats)
     finally:
         for method in methods:
             method.close()
@@ -101,6 +112,7 @@ def work_precision(
         guess=guess,
         resolved=resolved,
         runs=measured.runs,
+        choices=chosen,
         notes=(*notes, *measured.notes),
         complete=measured.complete,
         seconds=time.spent,

@@ -16,6 +16,10 @@ SAME = 1e-9
 def require_plain(setting: Setting) -> None:
     """Raise UnmeasurableError for a scene whose cost is not 1/2 |RNEA|^2."""
     problem = setting.problem
+    if not problem.plain:
+        raise UnmeasurableError(
+            "other methods are measured between two states, with a torque at every joint."
+        )
     if not problem.robot.vector_joints:
         raise UnmeasurableError("other methods are measured on revolute and sliding joints only.")
     model, n = problem.scene.model, problem.robot.nv
