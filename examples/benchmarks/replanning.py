@@ -5,21 +5,29 @@ from __future__ import annotations
 import time
 
 import numpy as np
+import numpy.typing as npt
 from measuring import alone, print_machine, print_table
 
 import hovi
+
+Array = npt.NDArray[np.float64]
 
 MOVES = (0.005, 0.05, 0.2)
 LAPS = 40
 
 
-def measure(scene: str, move: float) -> list[float]:
-    """Steps (most and mean), milliseconds (median) and Hz, over a walk of the goal."""
+def solved(scene: str) -> tuple[hovi.Solution, Array]:
+    """The scene's own motion and its goal's configuration."""
     task = hovi.load_task(hovi.example(scene))
     grid = hovi.Grid.uniform(task.duration, task.intervals, hovi.schemes.by_name(task.scheme))
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
     solution = hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal))
-    home = np.asarray(task.goal.q, dtype=float)
+    return solution, np.asarray(task.goal.q, dtype=float)
+
+
+def measure(scene: str, move: float) -> list[float]:
+    """Steps (most and mean), milliseconds (median) and Hz, over a walk of the goal."""
+    solution, home = solved(scene)
     random = np.random.default_rng(0)
     goal, steps, times = home, [], []
     for _ in range(LAPS):
@@ -35,6 +43,22 @@ def measure(scene: str, move: float) -> list[float]:
     return [max(steps), float(np.mean(steps)), 1e3 * median, 1 / median]
 
 
+def measure_joints(scene: str, move: float) -> list[list[float]]:
+    """Joint, steps and how far the motion goes [rad], for each joint forwards and backwards."""
+    solution, home = solved(scene)
+    rows = []
+    for joint in range(len(home)):
+        row: list[float] = [joint + 1]
+        for change in (move, -move):
+            goal = home.copy()
+            goal[joint] += change
+            again = solution.replan(goal=hovi.State(goal))
+            assert again.success, again.message
+            row += [again.nit, float(np.abs(again.trajectory.q - solution.trajectory.q).max())]
+        rows.append(row)
+    return rows
+
+
 def main() -> None:
     rows = []
     for scene in ("ur5_reach", "panda_reach"):
@@ -44,6 +68,13 @@ def main() -> None:
             rows.append([f"`{scene}`, goal moved by {move:g} rad", *cells])
     print(f"`Solution.replan`, {LAPS} goals in a row, one thread.\n")
     print_table(["scene", "most steps", "mean steps", "ms", "Hz"], rows)
+    print("One joint of the UR5's own goal moved by 0.05 rad, forwards and backwards.\n")
+    rows = [
+        [f"{joint:.0f}", f"{ahead:.0f}", f"{far:.2f}", f"{back:.0f}", f"{away:.2f}"]
+        for joint, ahead, far, back, away in alone(measure_joints, "ur5_reach", 0.05)
+    ]
+    columns = ["joint", "+0.05: steps", "motion moves [rad]", "-0.05: steps", "motion moves [rad]"]
+    print_table(columns, rows)
     print(
         "The prediction, with its factorisation, counts as a step; its corrections, which cost a "
         "gradient each, do not, nor does the last step with the exact Hessian, as in every "
