@@ -24,6 +24,7 @@ SCRIPTS = (
     "dimensions",
     "peers",
     "limits",
+    "effects",
     "random_reaches",
     "underactuated",
     "growth",

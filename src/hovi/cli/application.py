@@ -15,6 +15,7 @@ from hovi.cli import (
     plan_command,
     plot_command,
     replay_command,
+    schema_command,
     simulate_command,
 )
 
@@ -51,4 +52,5 @@ app.command("effects")(effects_command.effects)
 app.command("replay")(replay_command.replay)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)
+app.command("schema")(schema_command.schema)
 app.command("info")(info_command.info)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import operator
 import types
@@ -46,7 +47,7 @@ def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlTe
     keys = ("effects", name)
     if name not in REGISTRY:
         raise toml.error(keys, f"there is no effect {name!r}; {nearest(name, REGISTRY)}")
-    schema = _schema(REGISTRY[name])
+    schema = effect_schema(REGISTRY[name])
     try:
         checked = schema.model_validate(dict(table))
     except ValidationError as invalid:
@@ -61,7 +62,8 @@ def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlTe
 
 
 @functools.cache
-def _schema(effect: type[Effect]) -> type[BaseModel]:
+def effect_schema(effect: type[Effect]) -> type[BaseModel]:
+    """The table of an effect: its fields, each with what it must be."""
     hints = get_type_hints(effect)
     keys: dict[str, Any] = {}
     for field in fields(effect):
@@ -69,9 +71,14 @@ def _schema(effect: type[Effect]) -> type[BaseModel]:
         description = _in_words(hints[field.name])
         keys[field.name] = (
             _strict(hints[field.name]),
-            Field(... if needed else None, description=description),
+            Field(... if needed else _default(field), description=description),
         )
     return create_model(effect.__name__, __base__=Table, **keys)
+
+
+def _default(field: dataclasses.Field[Any]) -> Any:
+    """What an effect takes where a file says nothing."""
+    return field.default if field.default_factory is MISSING else field.default_factory()
 
 
 def _strict(hint: Any) -> Any:
