@@ -18,8 +18,9 @@ import tomlkit
 from mutated_bytes import mutated_bytes
 from verdict import Mutant, Verdict, judge
 
-import hovi
+
 from hovi.model_files import example, example_scenes
+from hovi.planner import plan
 from hovi.task_file import Task, load_task
 
 MOST_INTERVALS = 64  # of a plan that is tried
@@ -103,7 +104,7 @@ def objection(task: Task) -> str:
     task.scene.describe()
     if task.intervals > MOST_INTERVALS:
         return ""
-    solution = hovi.plan(
+    solution = plan(
         task.scene,
         task.start,
         task.goal,

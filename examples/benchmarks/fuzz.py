@@ -1,0 +1,151 @@
+"""Strange URDFs, scene files and trajectory files by the thousand: none may crash, hang or slip in.
+
+Inputs are made by the mutators of tests/hard, each from the seed and its own number, and loaded in
+processes of their own: one that dies is a crash, one that is silent for 10 s a hang. What loads is
+held against what the file says. Every fault is printed with its number, from which
+`fuzz.py --show KIND NUMBER` makes the input again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path
+from random import Random
+
+from measuring import print_machine, print_table
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "hard"))
+from verdict import Mutant, Verdict
+
+KINDS = {
+    "urdf": ("mutated_urdf", 10_000),
+    "scene": ("mutated_scene", 6_000),
+    "trajectory": ("mutated_motion", 6_000),
+}
+HANG, STARTUP = 10.0, 120.0  # [s]
+FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)
+
+Result = tuple[int, Verdict, str, float]
+"""Number of the input, what became of it, why, and how long it took in [s]."""
+
+
+def mutant(kind: str, seed: int, number: int) -> Mutant:
+    """The input of that number."""
+    module, _ = KINDS[kind]
+    made: Mutant = import_module(module).mutate(Random(f"{seed}:{number}"))
+    return made
+
+
+def work(kind: str, seed: int, numbers: range) -> None:
+    """Load inputs one after the other; a line of JSON on stdout for each."""
+    verdict = import_module(KINDS[kind][0]).verdict
+    mutant(kind, seed, 0)
+    print("ready", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for number in numbers:
+            made = mutant(kind, seed, number)
+            began = time.perf_counter()
+            found, why = verdict(made, Path(folder))
+            print(json.dumps([number, found, why[:300], time.perf_counter() - began]), flush=True)
+
+
+def watch(kind: str, seed: int, numbers: range) -> Iterator[Result]:
+    """The results of a share of the inputs, whatever becomes of the processes that load them."""
+    while numbers:
+        share = [kind, str(seed), str(numbers.start), str(numbers.stop), str(numbers.step)]
+        command = [sys.executable, "-W", "error", __file__, "--work", *share]
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0
+        ) as process:
+            assert process.stdout is not None
+            _line(process, STARTUP)
+            while numbers:
+                line, silent = _line(process, HANG)
+                if not line:
+                    process.kill()
+                    died = f"the process ended with exit code {process.wait()}"
+                    fault = (Verdict.HANG, "") if silent else (Verdict.CRASH, died)
+                    yield numbers[0], *fault, HANG
+                else:
+                    number, found, why, seconds = json.loads(line)
+                    yield number, Verdict(found), why, seconds
+                numbers = numbers[1:]
+                if not line:
+                    break
+
+
+def _line(process: subprocess.Popen[bytes], seconds: float) -> tuple[bytes, bool]:
+    """The next line of a process, or b"" and whether it was silent for too long."""
+    assert process.stdout is not None
+    if not select.select([process.stdout], [], [], seconds)[0]:
+        return b"", True
+    return process.stdout.readline(), False
+
+
+def fuzz(kind: str, seed: int, count: int) -> list[Result]:
+    """Every input of one kind, shared by as many processes as there are processors."""
+    cores = len(os.sched_getaffinity(0))
+    shares = [range(first, count, cores) for first in range(cores)]
+    with ThreadPoolExecutor(cores) as pool:
+        parts = pool.map(lambda numbers: list(watch(kind, seed, numbers)), shares)
+    return [result for part in parts for result in part]
+
+
+def report(results: dict[str, list[Result]], seed: int) -> int:
+    """Print the table and every fault; returns how many faults there are."""
+    total = sum(map(len, results.values()))
+    print(
+        f"{total:,} inputs, seed {seed}, at most {HANG:.0f} s each, warnings counted as crashes.\n"
+    )
+    table = []
+    for kind, found in results.items():
+        counts = Counter(verdict for _, verdict, _, _ in found)
+        seconds = sorted(each for *_, each in found)
+        times = [f"{1e3 * seconds[len(seconds) // 2]:.1f}", f"{1e3 * seconds[-1]:.0f}"]
+        verdicts = [f"{counts[verdict]:,}" for verdict in Verdict]
+        table.append([kind, f"{len(found):,}", *verdicts, *times])
+    columns = ["file", "inputs", *Verdict, "median ms", "slowest ms"]
+    print_table(columns, table)
+    faults = [(kind, *each) for kind, found in results.items() for each in found]
+    faults = [fault for fault in faults if fault[2] in FAULTS]
+    for kind, number, verdict, why, _ in faults:
+        print(f"- {kind} {number}: {verdict}: {why}")
+    return len(faults)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--share", type=float, default=1.0, help="of the usual number of inputs")
+    parser.add_argument("--show", nargs=2, metavar=("KIND", "NUMBER"), help="print one input")
+    parser.add_argument("--work", nargs=5, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.work:
+        kind, seed, *numbers = given.work
+        work(kind, int(seed), range(*map(int, numbers)))
+        return 0
+    if given.show:
+        sys.stdout.buffer.write(mutant(given.show[0], given.seed, int(given.show[1])).content)
+        return 0
+    results = {}
+    for kind, (_, count) in KINDS.items():
+        print(f"{kind} ...", file=sys.stderr, flush=True)
+        results[kind] = fuzz(kind, given.seed, max(1, int(given.share * count)))
+    faults = report(results, given.seed)
+    print_machine()
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
