@@ -14,6 +14,7 @@ SOURCE = Path(hovi.__file__).parent
 # From the ground up. A package stands here as one module, and may import within itself.
 FLOORS = [
     {
+        "blas_threads",
         "bounded_file",
         "errors",
         "newton",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -67,10 +66,7 @@ if TYPE_CHECKING:
     from hovi.trajectory import Trajectory as Trajectory
     from hovi.variational_error import variational_order as variational_order
 
-try:
-    __version__ = version("hovi")
-except PackageNotFoundError:  # a source tree that was never installed
-    __version__ = "0+unknown"
+    __version__: str
 
 _PLACES = {
     "Accuracy": "hovi.tolerance",
@@ -140,11 +136,23 @@ def __getattr__(name: str) -> Any:
     """Load a public name when it is first used, so that `hovi --version` answers at once."""
     if name in _SUBPACKAGES:
         return importlib.import_module(f"hovi.{name}")
+    if name == "__version__":
+        globals()[name] = _version()
+        return globals()[name]
     if name in _PLACES:
         value = getattr(importlib.import_module(_PLACES[name]), name)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'hovi' has no attribute {name!r}")
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("hovi")
+    except PackageNotFoundError:  # a source tree that was never installed
+        return "0+unknown"
 
 
 def __dir__() -> list[str]:

@@ -1,8 +1,41 @@
-"""`python -m hovi` is the command `hovi`."""
+"""`python -m hovi` is the command `hovi`; Ctrl-C ends it without noise from the first import on."""
 
+from __future__ import annotations
+
+import os
+import signal
 import sys
 
-from hovi.cli import main
+INTERRUPTED = 130
+
+
+def run() -> None:
+    """Run the command that the command line asks for and leave with its exit code."""
+    try:
+        from hovi.cli import main
+
+        code = main()
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to leave
+    # Python remembers an interrupt inside `exec`, which dataclasses use, until the next `exec`,
+    # and would end by that signal although it was handled.
+    exec("")
+    sys.exit(_flushed(code))
+
+
+def _flushed(code: int) -> int:
+    """Write out what was printed; what cannot be written is dropped with one sentence."""
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        # Python would flush again at its end, and complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            print(f"error: cannot write the output: {error.strerror}.", file=sys.stderr)
+        return code or 1
+    return code
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hovi.errors import InputError
 from hovi.urdf_check import MAXIMUM_FREEDOM
+from hovi.whole_file import whole_file
 
 _COLORS = ("0.16 0.44 0.74 1", "0.95 0.55 0.15 1")
 
@@ -63,7 +64,8 @@ def chain(n: int, *, length: float = 1.0, mass: float = 1.0) -> str:
 def write_chain(path: str | os.PathLike[str], n: int, **options: float) -> Path:
     """Write `chain(n, **options)` to a file and return its path."""
     target = Path(path)
-    target.write_text(chain(n, **options), encoding="utf-8")
+    with whole_file(target) as stream:
+        stream.write(chain(n, **options).encode())
     return target
 
 

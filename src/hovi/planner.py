@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.adaptive import refine_to_tolerance
+from hovi.blas_threads import one_blas_thread
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
@@ -37,6 +38,7 @@ EXPLORING = 0.7
 """Share of a time limit that the search may take when its minima are refined afterwards."""
 
 
+@one_blas_thread
 def plan(
     scene: Scene,
     start: State | npt.ArrayLike | str,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.blas_threads import one_blas_thread
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.lagrangian import CasadiLagrangian
@@ -110,6 +111,7 @@ class Simulation:
         )
 
 
+@one_blas_thread
 def simulate(
     scene: Scene,
     start: State | npt.ArrayLike,

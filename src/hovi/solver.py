@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.blas_threads import one_blas_thread
 from hovi.budget import TimeLeft
 from hovi.carried_momenta import carried_momenta
 from hovi.equality_rounds import satisfy
@@ -134,6 +135,7 @@ def _as_goal(goal: State | FrameGoal | npt.ArrayLike, robot: Robot) -> State | F
     return goal if isinstance(goal, FrameGoal) else as_state(goal, robot)
 
 
+@one_blas_thread
 def solve(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath = "cubic",

@@ -1,4 +1,4 @@
-"""Files written whole or not at all: a temporary neighbour, then one atomic rename."""
+"""Files written whole or not at all: bytes without a name first, then one atomic rename."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+_DESCRIPTORS = Path("/proc/self/fd")
+
 
 @contextlib.contextmanager
 def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A binary file that takes the name `path` only if the block ends without an exception.
 
-    The bytes go to a hidden neighbour in the same folder (a rename is atomic only within one
-    file system), which is removed if anything fails, Ctrl-C included. What was at `path` before
-    stays as it was until then.
+    The bytes go to a file in the same folder that has no name until they are all on the disk, so
+    that a process killed at any moment leaves nothing behind; where the file system cannot do
+    that, to a hidden neighbour, which is removed if anything fails, Ctrl-C included. What was at
+    `path` before stays as it was until then.
 
     path: the file to write; an existing regular file is replaced.
     Raises OSError as the operating system does, and when `path` is a folder or a device.
@@ -25,15 +28,35 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     if target.exists() and not target.is_file():
         # A rename onto /dev/null by root would replace the device itself.
         raise OSError("it exists and is not a regular file")
-    temporary = target.with_name(f".{target.name}.{secrets.token_hex(6)}.tmp")
+    neighbour = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
     try:
-        with temporary.open("xb") as stream:
+        with _open(neighbour) as stream:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-        temporary.replace(target)
+            if not neighbour.exists():
+                _give_name(stream, neighbour)
+        neighbour.replace(target)  # a link could not take the place of a file
     finally:
-        temporary.unlink(missing_ok=True)
+        neighbour.unlink(missing_ok=True)
+
+
+def _open(neighbour: Path) -> BinaryIO:
+    """A new file without a name in the folder of `neighbour`, or else `neighbour` itself."""
+    if hasattr(os, "O_TMPFILE") and _DESCRIPTORS.is_dir():
+        with contextlib.suppress(OSError):
+            unnamed = os.open(neighbour.parent, os.O_TMPFILE | os.O_WRONLY, 0o666)
+            return os.fdopen(unnamed, "wb")
+    return neighbour.open("xb")
+
+
+def _give_name(stream: BinaryIO, name: Path) -> None:
+    folder = os.open(_DESCRIPTORS, os.O_RDONLY)
+    try:
+        # Python follows the symbolic link to the file only when a folder is given.
+        os.link(str(stream.fileno()), name, src_dir_fd=folder)
+    finally:
+        os.close(folder)
 
 
 def reason(error: OSError) -> str:

@@ -18,7 +18,6 @@ import tomlkit
 from mutated_bytes import mutated_bytes
 from verdict import Mutant, Verdict, judge
 
-
 from hovi.model_files import example, example_scenes
 from hovi.planner import plan
 from hovi.task_file import Task, load_task

@@ -10,6 +10,7 @@ from typer.exceptions import TyperException
 
 from hovi.cli.application import app
 from hovi.errors import HoviError
+from hovi.whole_file import reason
 
 __all__ = ["app", "main"]
 
@@ -27,8 +28,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(str(refused))
     except TyperException as misuse:
         return _refuse(misuse.format_message())
-    except typer.Abort:
+    except (typer.Abort, KeyboardInterrupt):
         return 130
+    except MemoryError:
+        return _refuse("this takes more memory than there is: fewer intervals or starts take less.")
+    except OSError as refused:
+        return _refuse(f"the operating system refuses: {reason(refused)}.")
     return code if isinstance(code, int) else 0
 
 

@@ -116,6 +116,7 @@ def _plan(
     """Plan, write, print; returns the exit code."""
     from hovi.cli.progress import progress
     from hovi.cli.report import as_json, print_report
+    from hovi.errors import TrajectoryFileError
     from hovi.planner import plan as plan_motion
 
     with progress(quiet=json) as report:
@@ -136,14 +137,19 @@ def _plan(
             time_limit=time_limit,
             progress=report,
         )
-    written = out if solution.trajectory is not None else None
+    written, refused = out if solution.trajectory is not None else None, None
     if written is not None:
-        solution.trajectory.save(written)
+        try:
+            solution.trajectory.save(written)
+        except TrajectoryFileError as error:
+            written, refused = None, error  # what was found is printed all the same
     certificate = _certificate(solution) if certified else None
     if json:
         print(as_json(solution, task, written, certificate))
     else:
         print_report(solution, task, written, certificate)
+    if refused is not None:
+        raise refused
     return 0 if solution.success else 1
 
 

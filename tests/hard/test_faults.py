@@ -1,0 +1,234 @@
+"""What goes wrong around a program: kills, full disks, closed pipes, Ctrl-C, no home, no browser.
+
+Real processes throughout: a sentence on stderr, an exit code, and no half of a file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from hovi.cli import main
+from hovi.errors import TrajectoryFileError
+from hovi.trajectory import Trajectory
+from hovi.whole_file import whole_file
+
+KILLER = """
+import os, random, signal, sys, time
+from pathlib import Path
+from hovi.whole_file import whole_file
+
+folder, random = Path(sys.argv[1]), random.Random(3)
+target, old, new = folder / "file", b"old" * 10**6, b"new" * 10**6
+for trial in range(int(sys.argv[2])):
+    target.write_bytes(old)
+    child = os.fork()
+    if child == 0:
+        while True:
+            with whole_file(target) as stream:
+                for begin in range(0, len(new), 30_000):
+                    stream.write(new[begin : begin + 30_000])
+    time.sleep(random.uniform(0.0, 0.02))
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    assert target.read_bytes() in (old, new), "a half-written file has the name"
+    rest = [path for path in folder.iterdir() if path != target]
+    # Between the two last calls a whole copy may still bear its other name.
+    assert all(path.read_bytes() == new for path in rest), "half a file is left"
+    for path in rest:
+        path.unlink()
+print("kills", trial + 1)
+"""
+
+
+@pytest.fixture(scope="module")
+def motion(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("motion") / "reach.npz"
+    assert main(["plan", "two_link_reach", "--out", str(path)]) == 0
+    return path
+
+
+def start(
+    *arguments: str | Path, file_size: int | None = None, **environment: str
+) -> subprocess.Popen[str]:
+    """One command as a person starts it; files may grow to `file_size` bytes."""
+
+    def limit() -> None:
+        if file_size is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file_size, file_size))
+
+    return subprocess.Popen(
+        [sys.executable, "-m", "hovi", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        env={**os.environ, **environment},
+        preexec_fn=limit,
+        start_new_session=True,
+    )
+
+
+def one_sentence(stderr: str) -> str:
+    """What a person reads."""
+    assert "Traceback" not in stderr
+    assert stderr.startswith("error: ")
+    assert stderr.count("\n") == 1
+    return stderr
+
+
+def test_a_process_killed_at_any_moment_leaves_no_half_file(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", KILLER, tmp_path, "100"], capture_output=True, text=True, timeout=120
+    )
+    assert done.stdout == "kills 100\n", done.stderr
+
+
+def test_a_file_has_no_name_until_it_is_whole(tmp_path: Path) -> None:
+    with whole_file(tmp_path / "file") as stream:
+        stream.write(b"half")
+        stream.flush()
+        assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_file_system_without_nameless_files_is_written_to_as_well(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hovi.whole_file._DESCRIPTORS", tmp_path / "no proc")
+    with whole_file(tmp_path / "file") as stream:
+        stream.write(b"whole")
+        assert [path.suffix for path in tmp_path.iterdir()] == [".tmp"]
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    with contextlib.suppress(ZeroDivisionError), whole_file(tmp_path / "file") as stream:
+        stream.write(b"half")
+        raise ZeroDivisionError
+    assert (tmp_path / "file").read_bytes() == b"whole"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+FULL: dict[str, Sequence[str]] = {
+    "plan": ("plan", "two_link_reach", "--out", "{folder}/motion.npz"),
+    "simulate": ("simulate", "two_link_reach", "--out", "{folder}/motion.npz"),
+    "plot": ("plot", "{motion}", "--out", "{folder}/picture.png"),
+    "export": ("export", "{motion}", "--csv", "{folder}/table.csv"),
+    "replay": ("replay", "{motion}", "--html", "{folder}/page.html"),
+}
+
+
+@pytest.mark.parametrize("command", FULL)
+def test_a_full_disk_is_one_sentence_and_no_file(
+    command: str, motion: Path, tmp_path: Path
+) -> None:
+    words = [word.format(motion=motion, folder=tmp_path) for word in FULL[command]]
+    process = start(*words, file_size=3_000)
+    out, err = process.communicate(timeout=120)
+    assert "File too large" in one_sentence(err)
+    assert process.returncode == 2
+    assert list(tmp_path.iterdir()) == []
+    assert ("cost" in out) == (command == "plan")  # what was found is not lost
+
+
+def test_a_disk_that_is_really_full_leaves_the_old_motion(motion: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+        pytest.skip("only root may mount a small disk")
+    try:
+        trajectory, target = Trajectory.load(motion), disk / "motion.npz"
+        trajectory.save(target)
+        before = target.read_bytes()
+        (disk / "rest").write_bytes(b"x" * (shutil.disk_usage(disk).free - 4096))
+        with pytest.raises(TrajectoryFileError, match="No space left on device"):
+            trajectory.save(target)
+        assert target.read_bytes() == before
+        assert sorted(path.name for path in disk.iterdir()) == ["motion.npz", "rest"]
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+
+
+@pytest.mark.parametrize("arguments", [("info", "two_link_reach"), ("plan", "two_link_reach")])
+def test_an_output_that_is_full_is_one_sentence(arguments: Sequence[str]) -> None:
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "hovi", *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+        )
+    assert "No space left on device" in one_sentence(done.stderr)
+    assert done.returncode in (1, 2)
+
+
+def test_a_reader_that_stops_reading_is_no_error() -> None:
+    with start("info", "two_link_reach") as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode == 1
+
+
+WORKING: dict[str, Sequence[str]] = {
+    "plan": ("plan", "two_link_swing_up", "--starts", "400"),
+    "plan --json": ("plan", "two_link_swing_up", "--starts", "400", "--json"),
+    "simulate": ("simulate", "two_link_reach", "--duration", "3000", "--out", "{folder}/m.npz"),
+    "export": ("export", "{motion}", "--csv", "{folder}/table.csv", "--rate", "5e6"),
+    "replay": ("replay", "{motion}", "--no-browser"),
+    "info": ("info", "talos"),
+    "plot": ("plot", "{motion}", "--out", "{folder}/picture.png"),
+}
+
+
+@pytest.mark.parametrize("command", WORKING)
+@pytest.mark.parametrize(
+    "seconds", [1.0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.3, 0.6, 2.0, 4.0))]
+)
+def test_ctrl_c_ends_every_command_without_noise(
+    command: str, seconds: float, motion: Path, tmp_path: Path
+) -> None:
+    words = [word.format(motion=motion, folder=tmp_path) for word in WORKING[command]]
+    process = start(*words)
+    time.sleep(seconds)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does, worker processes included
+    _, err = process.communicate(timeout=60)
+    assert "Traceback" not in err
+    assert "Exception" not in err
+    assert process.returncode in (0, 1, 130)
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_a_home_that_cannot_be_written_to_does_no_harm(motion: Path, tmp_path: Path) -> None:
+    process = start(
+        *("plot", motion, "--out", tmp_path / "picture.png"),
+        HOME="/proc/nowhere",
+        XDG_CACHE_HOME="/proc/nowhere",
+        XDG_CONFIG_HOME="/proc/nowhere",
+        MPLCONFIGDIR="",
+    )
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0
+    assert out.startswith(f"wrote {tmp_path / 'picture.png'}\n")
+    assert "Traceback" not in err
+
+
+def test_without_a_browser_the_address_is_printed(motion: Path) -> None:
+    process = start("replay", motion, PATH="/nowhere", DISPLAY="", BROWSER="")
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("playing at http://127.0.0.1:")
+    os.killpg(process.pid, signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
