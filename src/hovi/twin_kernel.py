@@ -151,10 +151,14 @@ class TwinKernel:
 
     def torque(self, q: Array, v: Array, a: Array, threads: int = 1) -> Array:
         """tau at P points, shape (P, nv): q (P, nq), v and a (P, nv)."""
+        if self.base is None:
+            return self.kernel.torque(self._angles(q), v, a, threads)
         return self.kernel.torque(*self._twin(q, v, a), threads)[:, self._v]
 
     def linearize(self, q: Array, v: Array, a: Array, threads: int = 1) -> tuple[Array, Array]:
         """tau and d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+        if self.base is None:
+            return self.kernel.linearize(self._angles(q), v, a, threads)
         y, dy, ddy = self._twin(q, v, a)
         tau, J = self.kernel.linearize(y, dy, ddy, threads)
         return tau[:, self._v], self._pulled(J, q, dy)[:, self._v]
@@ -169,12 +173,14 @@ class TwinKernel:
         threads: int = 1,
     ) -> tuple[Array, Array, Array]:
         """tau, J and J^T diag(weight) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        if self.base is None:
+            return self.kernel.expand(self._angles(q), v, a, weight, curvature, threads)
         y, dy, ddy = self._twin(q, v, a)
         bending = None if curvature is None else self._full(curvature, len(q))
         tau, J, H = self.kernel.expand(y, dy, ddy, self._full(weight, len(q)), bending, threads)
         half = self._pulled(H, q, dy).transpose(0, 2, 1)
         H = np.ascontiguousarray(self._pulled(half, q, dy))
-        if self.base is not None and bending is not None:
+        if bending is not None:
             by_ddy = J[:, :, 2 * y.shape[1] :][:, :, :6]
             force = np.matmul(bending[:, None], by_ddy)[:, 0]
             self._add_bend(H, force, self.base.lift(q[:, : self._base_width]))
@@ -190,35 +196,39 @@ class TwinKernel:
         full[:, self._v] = x
         return full
 
+    def _angles(self, q: Array) -> Array:
+        """Configurations with an angle for every (cos, sin), and nothing for a base, (P, nv)."""
+        iq, iv = self.space.plain
+        y = np.zeros((len(q), self.space.nv))
+        y[:, iv] = q[:, iq]
+        for factor in self.space.angles:
+            i = factor.q.start
+            y[:, factor.v.start] = np.arctan2(q[:, i + 1], q[:, i])
+        return y
+
     def _twin(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         """(y, y', y'') of the twin, shape (P, n) each."""
-        P = len(q)
-        y, dy, ddy = (np.zeros((P, self.kernel.n)) for _ in range(3))
-        iq, iv = self.space.plain
-        y[:, self._v[iv]] = q[:, iq]
-        for factor in self.space.angles:
-            cosine, sine = q[:, factor.q].T
-            y[:, self._v[factor.v.start]] = np.arctan2(sine, cosine)
+        assert self.base is not None
+        y, dy, ddy = (np.zeros((len(q), self.kernel.n)) for _ in range(3))
+        y[:, self._v] = self._angles(q)
         dy[:, self._v], ddy[:, self._v] = v, a
-        if self.base is not None:
-            u, w = dy[:, :3], dy[:, 3:6]
-            ddy[:, :3] += np.cross(w, u) + self.base.lift(q[:, : self._base_width])
-            ddy[:, 3:6] -= np.stack([w[:, 1] * w[:, 2], -w[:, 0] * w[:, 2], w[:, 0] * w[:, 1]], 1)
+        u, w = dy[:, :3], dy[:, 3:6]
+        ddy[:, :3] += np.cross(w, u) + self.base.lift(q[:, : self._base_width])
+        ddy[:, 3:6] -= np.stack([w[:, 1] * w[:, 2], -w[:, 0] * w[:, 2], w[:, 0] * w[:, 1]], 1)
         return y, dy, ddy
 
     def _pulled(self, covector: Array, q: Array, dy: Array) -> Array:
         """Derivatives by (y, y', y''), (P, r, 3 n), as those by (q, v, a), (P, r, 3 nv)."""
+        assert self.base is not None
         parts = np.moveaxis(covector.reshape(*covector.shape[:2], 3, -1), 2, 0)
-        by_y, by_dy, by_ddy = (part for part in parts)
-        if self.base is not None:
-            by_y, by_dy = by_y.copy(), by_dy.copy()
-            u, w = dy[:, :3], dy[:, 3:6]
-            force = by_ddy[..., :6]
-            by_y[..., :6] = 0.0
-            by_y[..., 3:6] = force[..., :3] @ _skew(self.base.lift(q[:, : self._base_width]))
-            by_dy[..., :3] += force[..., :3] @ _skew(w)
-            by_dy[..., 3:6] -= force[..., :3] @ _skew(u)
-            by_dy[..., 3:6] += np.matmul(force[..., 3:], _gyration(w))
+        by_y, by_dy, by_ddy = parts[0].copy(), parts[1].copy(), parts[2]
+        u, w = dy[:, :3], dy[:, 3:6]
+        force = by_ddy[..., :6]
+        by_y[..., :6] = 0.0
+        by_y[..., 3:6] = force[..., :3] @ _skew(self.base.lift(q[:, : self._base_width]))
+        by_dy[..., :3] += force[..., :3] @ _skew(w)
+        by_dy[..., 3:6] -= force[..., :3] @ _skew(u)
+        by_dy[..., 3:6] += np.matmul(force[..., 3:], _gyration(w))
         return np.concatenate([part[..., self._v] for part in (by_y, by_dy, by_ddy)], axis=-1)
 
     def _add_bend(self, H: Array, force: Array, lift: Array) -> None:
