@@ -60,6 +60,7 @@ FLOORS = [
         "tangent",
         "twin_kernel",
         "chart_functions",
+        "unwrapped",
     },
     {"chain_urdf", "robot_model", "robot_report", "torque_model", "chart"},
     {"robot_geometry", "robot_reading", "chart_expansion", "moving_base_torque", "continuity"},

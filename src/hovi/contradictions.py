@@ -19,7 +19,8 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     The ends themselves, and the mean velocity that the distance needs.
     """
     q0, v0, q1, v1 = problem.boundary
-    names = problem.robot.coordinate_names
+    names, space = problem.robot.coordinate_names, problem.robot.space
+    q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
     for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):

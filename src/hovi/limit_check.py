@@ -63,7 +63,9 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 
 def _outputs(trajectory: Trajectory, k: npt.NDArray[np.intp], s: Array) -> Array:
     """(q, v, a, tau) at places of intervals, shape (M, 4, nv)."""
-    return np.stack(trajectory.sample_intervals(k, s), axis=1)
+    q, v, a, tau = trajectory.sample_intervals(k, s)
+    q = q if trajectory.space is None else trajectory.space.coordinates(q)
+    return np.stack([q, v, a, tau], axis=1)
 
 
 def _refined(

@@ -55,7 +55,11 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         """The discrete action, and the bounded outputs in units of their ranges."""
         torques = self.action.torques(x)
         pairs = zip(self.action.jets(x), torques, strict=True)
-        rows = [np.concatenate([*jet, tau], axis=1) for jet, tau in pairs]
+        space = self.lagrangian.space
+        rows = [
+            np.concatenate([q if space is None else space.coordinates(q), v, a, tau], axis=1)
+            for (q, v, a), tau in pairs
+        ]
         return Outputs(self.action.value_of(x, torques), self._scaled(np.concatenate(rows)))
 
     def model(

@@ -19,6 +19,7 @@ KINDS = ("q", "v", "a", "tau")
 """What can be limited, in the order in which outputs are stacked."""
 NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
 _SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
+_TRANSLATIONS = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2, "JointModelTranslation": 3}
 UNLIMITED = 1e15
 """Bounds beyond this mean that there is none."""
 TOLERANCE = 1e-6
@@ -105,8 +106,9 @@ def no_limits(robot: Robot) -> Limits:
 def urdf_limits(robot: Robot) -> Limits:
     """Position, velocity and effort limits of the URDF; 0 or nothing there means no limit."""
     lower, upper = np.full((4, robot.nv), -np.inf), np.full((4, robot.nv), np.inf)
-    if robot.nq == robot.nv:
-        lower[0], upper[0] = robot.lower, robot.upper
+    if not robot.unplanned_joints:
+        iq, iv = robot.space.plain
+        lower[0, iv], upper[0, iv] = robot.lower[iq], robot.upper[iq]
     for row, size in ((1, robot.velocity_limit), (3, robot.effort_limit)):
         bound = np.where(size > 0, size, np.inf)
         lower[row], upper[row] = -bound, bound
@@ -156,6 +158,19 @@ def _by_word(robot: Robot, word: Any) -> Limits:
 
 def _entries(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
     """Bounds by place in v, from any of the ways to give them."""
+    found = _pairs(robot, kind, given)
+    if kind == "q" and not robot.vector_joints:
+        for i in found:
+            if i not in robot.space.plain[1] and isinstance(given, Mapping):
+                raise InputError(
+                    f"limits.q: {robot.coordinate_names[i]!r} turns or moves freely and has no "
+                    "position limits; leave it out."
+                )
+        found = {i: pair for i, pair in found.items() if i in robot.space.plain[1]}
+    return found
+
+
+def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
     names = robot.coordinate_names
     if isinstance(given, Mapping):
         for name in given:
@@ -194,6 +209,8 @@ def unit_of(robot: Robot, kind: str, i: int) -> str:
     kind: one of KINDS. i: place in v.
     """
     joint = next(j for j in list(robot.model.joints)[1:] if j.idx_v <= i < j.idx_v + j.nv)
-    sliding = joint.shortname().startswith(_SLIDING)
+    sliding = joint.shortname().startswith(_SLIDING) or i - joint.idx_v < _TRANSLATIONS.get(
+        joint.shortname(), 0
+    )
     angle, effort = ("m", "N") if sliding else ("rad", "N m")
     return {"q": angle, "v": f"{angle}/s", "a": f"{angle}/s^2", "tau": effort}[kind]

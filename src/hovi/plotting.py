@@ -31,6 +31,7 @@ from hovi.robot import Robot
 from hovi.robot_model import frame_id
 from hovi.saturation import at_limit, imposed_limits
 from hovi.trajectory import Sample, Trajectory
+from hovi.unwrapped import unwrapped
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -100,7 +101,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     curve = _sampled(trajectory)
     figure = Figure(figsize=(8.0, 7.5), layout="constrained")
     axes = figure.subplots(3, sharex=True)
-    q = _coordinates(trajectory.robot, curve.motion.q)
+    q = _coordinates(trajectory, curve.motion.q)
     values = (q, curve.motion.v, curve.motion.tau)
     for ax, panel, y in zip(axes, (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
         _draw(ax, trajectory, panel, curve, y)
@@ -114,7 +115,7 @@ def angles_figure(trajectory: Trajectory) -> Figure:
     curve = _sampled(trajectory)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     ax = figure.subplots()
-    _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory.robot, curve.motion.q))
+    _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory, curve.motion.q))
     ax.set_xlabel("time [s]")
     _legend(figure, ax)
     return figure
@@ -193,11 +194,11 @@ def _is_angular(robot: Robot) -> Mask:
     return angular
 
 
-def _coordinates(robot: Robot | None, q: Array) -> Array:
-    """A configuration as nv numbers: q itself, or where nq != nv its distance from neutral."""
-    if robot is None or robot.vector_joints:
+def _coordinates(trajectory: Trajectory, q: Array) -> Array:
+    """Configurations (N, S, nq) as nv numbers each: angles unwrapped, rotation vectors."""
+    if trajectory.space is None:
         return q
-    return robot.difference(np.broadcast_to(robot.neutral(), q.shape), q)
+    return unwrapped(trajectory.space, q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1)
 
 
 def _chain(robot: Robot, q: Array) -> Array:

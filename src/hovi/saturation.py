@@ -37,7 +37,7 @@ def imposed_limits(trajectory: Trajectory) -> Limits | None:
 def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> Mask:
     """Which of q, v, a and tau stand at a bound, shape (M, 4, nv)."""
     q = motion.q
-    if robot is not None and not robot.vector_joints:  # no bounds on q there
-        q = np.zeros_like(motion.v)
+    if robot is not None and not robot.vector_joints:
+        q = robot.space.coordinates(q)
     outputs = np.stack([q, motion.v, motion.a, motion.tau], axis=1)
     return np.asarray(limits.excess(outputs) >= -AT_LIMIT)
