@@ -13,19 +13,24 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
 from joblib import Parallel, delayed, parallel_config
 
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import stretched, with_bump
+from hovi.guess import stretched, with_bump, with_turns
 from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
+from hovi.robot import Robot
 from hovi.scene import Scene
 from hovi.solver import Solution, Status, solve
 from hovi.state import State
 from hovi.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
 
 ROUND = 16
 """Starts of one round; the result does not depend on the number of processes."""
@@ -169,8 +174,19 @@ def _round(
     for i in range(done, min(done + ROUND, starts)):
         base = stretched(bases[i % len(bases)], T)
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
+        if robot.space.angles:
+            curve = with_turns(curve, robot, T, _random_turns(robot, seed * 100_003 + i))
         guesses.append(problem.path(curve))
     return guesses
+
+
+def _random_turns(robot: Robot, seed: int) -> Array:
+    """For every continuous joint a turn more or less, or mostly none, shape (nv,)."""
+    random = np.random.default_rng([seed, 1])
+    turns = np.zeros(robot.nv)
+    for factor in robot.space.angles:
+        turns[factor.v] = random.choice([-1.0, 0.0, 1.0], p=[0.15, 0.7, 0.15])
+    return turns
 
 
 def distinct(solutions: Sequence[Solution]) -> list[Solution]:

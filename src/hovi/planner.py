@@ -54,6 +54,7 @@ def plan(
     starts: int = 1,
     seed: int = 0,
     guess: str | Trajectory = "cubic",
+    turns: Mapping[str, int | Sequence[int]] | None = None,
     weight: npt.ArrayLike | None = None,
     max_iterations: int = 500,
     time_limit: float | None = None,
@@ -79,6 +80,7 @@ def plan(
     starts: number of solves from seeded random perturbations; all minima found are refined on
         the grid that was asked for and ranked after that. seed: of the perturbations.
     guess: "cubic", "minimum-jerk" or a Trajectory.
+    turns: full turns that the guess makes on top of the shortest way, by joint: see State.
     weight: weight of each joint's torque in the cost, shape (nv,).
     max_iterations: of one solve. time_limit: of everything, in [s]; returns the best so far.
     processes: for the starts; all processors by default.
@@ -116,6 +118,10 @@ def plan(
         as_limits(scene.robot, limits),
         passed,
     )
+    if turns is not None:
+        if not isinstance(fine.goal, State):
+            raise InputError("turns are for a goal of the joints: give a State instead of a frame.")
+        fine = dataclasses.replace(fine, goal=dataclasses.replace(fine.goal, turns=turns))
     ends = None if time_limit is None else time.monotonic() + time_limit
     chatter = progress or _silent
     count = processes or default_processes()

@@ -43,6 +43,7 @@ class TrajectoryProblem:
     boundary: (q0, v0, q1, v1) of the two ends, first guesses where they are free.
     free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, nv).
     conditions: what has to hold at nodes besides. unreachable: why the goal cannot be met, or "".
+    turns: rotation vectors over 2 pi by which the first guess goes beyond the shortest way, (nv,).
     Raises InputError, ModelError or SchemeError when no motion can be planned.
     """
 
@@ -55,6 +56,7 @@ class TrajectoryProblem:
     free_ends: Mask = field(init=False, repr=False)
     conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
+    turns: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
@@ -76,6 +78,7 @@ class TrajectoryProblem:
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
         object.__setattr__(self, "unreachable", unreachable)
+        object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
 
     @cached_property
     def structure(self) -> ActionStructure:

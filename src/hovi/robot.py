@@ -94,6 +94,11 @@ class Robot:
     def _space(self) -> tuple[ConfigurationSpace, tuple[str, ...]]:
         return configuration_space(self.model)
 
+    def joint_at(self, place: int) -> str:
+        """The joint to which a place in v belongs."""
+        pairs = zip(self.joint_names, list(self.model.joints)[1:], strict=True)
+        return next(n for n, joint in pairs if joint.idx_v <= place < joint.idx_v + joint.nv)
+
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:
         """The joints whose configuration is not a plain vector (nq != nv)."""

@@ -20,7 +20,7 @@ from hovi.equality_rounds import satisfy
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
-from hovi.guess import check_path, moved, named_curve, stretched
+from hovi.guess import check_path, moved, named_curve, stretched, with_turns
 from hovi.lagrangian import PointTerms
 from hovi.limited_solver import LimitedOutcome, solve_limited
 from hovi.multipliers import Multipliers
@@ -325,7 +325,10 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
         check_path(guess, grid, robot)
         return moved(guess, grid, problem.ends(guess.q[[0, -1]], guess.v[[0, -1]]), robot)
     if isinstance(guess, str):
-        return problem.path(named_curve(guess, robot, boundary, grid.duration))
+        curve = named_curve(guess, robot, boundary, grid.duration)
+        if problem.turns.any():
+            curve = with_turns(curve, robot, grid.duration, problem.turns)
+        return problem.path(curve)
     if guess.v.shape[1] != robot.nv:
         raise InputError(
             f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."

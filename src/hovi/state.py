@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -25,13 +25,18 @@ class State:
     q: configuration, shape (nq,), in [rad] or [m].
     v: velocity, shape (nv,), per [s]; zero when not given.
     free, free_velocity: joints whose configuration or velocity is left to the optimiser, by name;
-        what q and v say of them is the first guess. ALL stands for every joint.
+        what q and v say of them is the first guess. ALL stands for every joint, and a joint with
+        several coordinates may be named by one of them, as "root_joint[3]".
+    turns: of a goal, full turns that the first guess makes on top of the shortest way, by joint: a
+        whole number where one coordinate turns, a rotation vector in the body's axes whose length
+        is a whole number for orientations.
     """
 
     q: npt.ArrayLike
     v: npt.ArrayLike | None = None
     free: Sequence[str] = ()
     free_velocity: Sequence[str] = ()
+    turns: Mapping[str, int | Sequence[int]] = field(default_factory=dict)
 
     def on(self, robot: Robot, name: str) -> tuple[Array, Array]:
         """q and v as arrays that fit the robot.
@@ -54,12 +59,46 @@ class State:
         ]
         return np.stack(rows)
 
+    def turns_on(self, robot: Robot, name: str) -> Array:
+        """Rotation vectors over 2 pi in the tangent space, shape (nv,).
+
+        Raises InputError for a joint that makes no full turns, or turns that are not full.
+        """
+        full = np.zeros(robot.nv)
+        for joint, turns in self.turns.items():
+            places = _turning_places(robot, name, joint)
+            given = np.atleast_1d(np.asarray(turns, dtype=np.float64))
+            size = float(np.linalg.norm(given)) if np.isfinite(given).all() else 0.5
+            if given.shape != (len(places),) or abs(size - round(size)) > 1e-9:
+                wanted = "a whole number" if len(places) == 1 else "three numbers of whole length"
+                raise InputError(f"{name}.turns: {joint!r} takes {wanted}, got {turns!r}.")
+            full[places] = given
+        return full
+
+
+def _turning_places(robot: Robot, state: str, joint: str) -> list[int]:
+    """Places in v of the rotation of a joint that can make full turns."""
+    turning = {}
+    for factor in robot.space.factors:
+        name = robot.joint_at(factor.v.start)
+        turning[name] = [factor.v.start + i for i in factor.group.angular]
+    if joint not in turning:
+        known = nearest(str(joint), turning) if turning else "it has none."
+        raise InputError(
+            f"{state}.turns: robot {robot.name!r} has no joint {joint!r} that makes full turns and "
+            f"comes back: {known}"
+        )
+    return turning[joint]
+
 
 def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
     chosen = np.zeros(robot.nv, dtype=bool)
     for joint in (joints,) if isinstance(joints, str) else joints:
         if joint == ALL:
             return np.ones(robot.nv, dtype=bool)
+        if joint in robot.coordinate_names:
+            chosen[robot.coordinate_names.index(joint)] = True
+            continue
         if joint not in robot.joint_names:
             hint = nearest(str(joint), (*robot.joint_names, ALL))
             raise InputError(f"{state}.{key}: robot {robot.name!r} has no joint {joint!r}: {hint}")

@@ -26,7 +26,7 @@ def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> Stat
             if getattr(goal, key) is not None:
                 raise toml.error((*keys, key), f"`{key}` needs the `frame` that it is about")
         return read_state(goal, keys, robot, toml)
-    for key in ("q", "v", "free"):
+    for key in ("q", "v", "free", "turns"):
         if getattr(goal, key):
             raise toml.error((*keys, key), f"a goal of a frame takes no `{key}`: leave it out")
     rotation = None if goal.rpy is None else pin.rpy.rpyToMatrix(np.array(goal.rpy))
@@ -50,11 +50,13 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
     q = read_configuration(end.q, name, robot, toml)
     v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, name, robot, toml)
     free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
-    state = State(q, v, tuple(free), tuple(free_velocity))
+    turns: dict[str, Any] = dict(getattr(end, "turns", {}))
+    state = State(q, v, tuple(free), tuple(free_velocity), turns)
     for key, check in (
         ("q", lambda: robot.check_configuration(q, f"{name}.q")),
         ("v", lambda: robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")),
         ("free", lambda: state.free_on(robot, name)),
+        ("turns", lambda: state.turns_on(robot, name)),
     ):
         try:
             check()
@@ -101,6 +103,9 @@ def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
     for key in ("free", "free_velocity"):
         if getattr(state, key):
             table[key] = list(getattr(state, key))
+    if state.turns:
+        turns = {joint: np.asarray(x, dtype=float).tolist() for joint, x in state.turns.items()}
+        table["turns"] = turns
     return table
 
 

@@ -106,6 +106,9 @@ class GoalTable(Table):
     )
     free: list[str] = Field(default=[], description=_JOINTS)
     free_velocity: list[str] = Field(default=[], description=_JOINTS)
+    turns: ByJoint = Field(
+        default={}, description="a table of joint names with full turns of the first guess"
+    )
     frame: str | None = Field(default=None, description="the name of a frame of the robot")
     position: Direction | None = Field(default=None, description="a list of three finite numbers")
     rpy: Direction | None = Field(
