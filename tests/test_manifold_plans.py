@@ -259,9 +259,9 @@ def test_nodes_and_cost_have_their_orders_on_a_free_flyer_with_an_arm() -> None:
 def test_nodes_and_cost_have_their_orders_on_kinova() -> None:
     robot = load_robot("kinova")
     q0 = robot.integrate(robot.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
-    q1 = robot.integrate(q0, np.array([0.6, 0.4, -0.5, 0.7, 0.5, -0.9]))
-    schemes = {"galerkin-0": [32, 64], "galerkin-1": [16, 32], "galerkin-2": [16, 24]}
-    errors = reference_and_errors(
-        robot, State(q0), State(q1), 1.0, schemes, [Gravity(), Armature(0.1)]
-    )
+    q1 = robot.integrate(q0, np.random.default_rng(2).uniform(-1, 1, 6))
+    schemes = {"galerkin-0": [16, 32], "galerkin-1": [16, 24], "galerkin-2": [10, 16]}
+    # reflected inertias tame what the light wrist would do otherwise
+    effects = [Gravity(), Armature(0.3)]
+    errors = reference_and_errors(robot, State(q0), State(q1), 1.0, schemes, effects)
     assert_orders(errors, schemes)
