@@ -25,6 +25,7 @@ from hovi.effects import (
     ViscousFriction,
 )
 from hovi.errors import SceneError
+from hovi.planner import plan
 from hovi.rigid_body import casadi_functions
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -209,3 +210,16 @@ def test_an_effect_is_toml_and_back(two_link: Robot, tmp_path: Path, key: str) -
     scene = Scene(two_link, with_gravity(sample_effects(two_link)[key]))
     task = Task(scene, State([0.0, 0.0]), State([1.0, 0.5]), 1.0)
     assert load_task(save_task(task, tmp_path / "scene.toml")).scene.effects == scene.effects
+
+
+def test_effects_that_a_clock_drives_are_known(panda: Robot) -> None:
+    scene = Scene(panda, list(sample_effects(panda).values()))
+    timed = ("wrench", "drag", "moving_base", "custom", "reference_cost")
+    assert set(scene.timed_effects) == set(timed)
+    assert Scene(panda, list(powerless_effects(panda).values())[:7]).timed_effects == ()
+
+
+def test_a_free_duration_is_refused_where_a_clock_drives_the_scene(two_link: Robot) -> None:
+    scene = Scene(two_link, [sample_effects(two_link)["moving_base"]])
+    with pytest.raises(SceneError, match="'moving_base' depends on the time, and a free duration"):
+        plan(scene, [0.0, 0.0], [1.0, 0.0], (0.5, 2.0))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from hovi.adaptive import refine_to_tolerance
 from hovi.blas_threads import one_blas_thread
-from hovi.errors import InputError
+from hovi.errors import InputError, SceneError
 from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
 from hovi.goals import Via
@@ -99,6 +99,8 @@ def plan(
     wanted = None if tolerance is None else Tolerance.of(tolerance, scene.robot)
     table = by_name(scheme) if isinstance(scheme, str) else scheme
     free = _free(duration, time_weight, via)
+    if free is not None:
+        _require_timeless(scene)
     if wanted is not None and free is not None:
         raise InputError(
             "a tolerance is for a given duration: find the best duration first, and plan with it."
@@ -262,6 +264,15 @@ def _free(
     if via:
         raise InputError("via points at given times need a given duration, not a free one.")
     return FreeDuration(pair[0], pair[1], weight)
+
+
+def _require_timeless(scene: Scene) -> None:
+    """Raise SceneError for effects that a clock drives: the best duration is not known of them."""
+    if scene.timed_effects:
+        raise SceneError(
+            f"effect {scene.timed_effects[0]!r} depends on the time, and a free duration needs "
+            "effects that do not; give the duration as one number."
+        )
 
 
 def _on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:

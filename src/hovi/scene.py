@@ -140,6 +140,21 @@ class Scene:
         q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
         return self.torques.torque(q, v, a, None if t is None else np.asarray(t, dtype=np.float64))
 
+    @cached_property
+    def timed_effects(self) -> tuple[str, ...]:
+        """Keys of the effects whose torque, cost or motion of the base depends on the time."""
+        symbols, robot = self.symbols, self.robot
+        timed = []
+        for effect in self.effects:
+            terms = (
+                effect.torque(robot, dataclasses.replace(symbols, base=None)),
+                effect.potential(robot, symbols),
+                effect.base(robot, symbols),
+            )
+            if any(term is not None and ca.depends_on(term, symbols.t) for term in terms):
+                timed.append(effect.key)
+        return tuple(timed)
+
     def without(self, key: str) -> Scene:
         """The same scene without one of its effects."""
         kept = [effect for effect in self.effects if effect.key != key]
