@@ -209,7 +209,8 @@ class ActionObjective(Objective[DiscretePath]):
         dv = np.concatenate([local[:, 1] / h, end[:, 1] / h[-1]])
         dZ = local[:, 2:4]
         if band:
-            dZ = np.stack([dZ[:, 0] - local[:, 0] - local[:, 1], dZ[:, 1] - local[:, 1]], axis=1)
+            dZ = dZ - local[:, :2]
+            dZ[:, 0] -= local[:, 1]
         q = self.problem.robot.integrate(x.q, dq)
         hh = h[:, None] ** 2
         path = DiscretePath(q, x.v + dv, x.z + dZ / hh, x.inner + local[:, 4:] / hh)
@@ -220,10 +221,9 @@ class ActionObjective(Objective[DiscretePath]):
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
         """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
         local = model.gather(step)
-        m = local.shape[1]
         T = self.problem.grid.duration
         size = max(1.0, float(np.max(np.abs(x.q))), T * float(np.max(np.abs(x.v))))
-        changes = [local[:, k] for k in (0, *range(4, m))]
+        changes = [local[:, 0], local[:, 4:]]
         speeds = [local[:, 1] / self._h]
         if not self.problem.plain:
             changes.append(local[-1, 2])
