@@ -13,8 +13,8 @@ from scipy.integrate import solve_bvp
 
 import hovi
 
-TOLERANCE = 1e-7
-MOST_NODES = 3000
+TOLERANCE = 1e-4
+MOST_NODES = 20_000
 
 
 def extremal_cost(trajectory: hovi.Trajectory) -> float | None:

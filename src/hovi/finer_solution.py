@@ -10,7 +10,6 @@ one. On the way the Hessian of the first step tells what each interval would gai
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +21,7 @@ from hovi.guess import stretched
 from hovi.motion_error import places
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.problem import TrajectoryProblem
-from hovi.schemes import Scheme, galerkin
+from hovi.schemes import galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
 from hovi.solver import solve
 from hovi.trajectory import Trajectory
@@ -158,12 +157,7 @@ def finer_grid(grid: Grid) -> Grid:
             f"errors are estimated for schemes of up to {MAX_INNER_MODES - MORE_MODES} inner "
             f"modes, not {grid.inner_modes}; use more intervals instead."
         )
-    return Grid(grid.steps, tuple(_table(s.inner_modes + MORE_MODES) for s in grid.schemes))
-
-
-@cache
-def _table(inner_modes: int) -> Scheme:
-    return galerkin(inner_modes)
+    return Grid(grid.steps, tuple(galerkin(s.inner_modes + MORE_MODES) for s in grid.schemes))
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:

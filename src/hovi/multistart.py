@@ -12,6 +12,8 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,10 +62,18 @@ class Job:
     via: tuple[Via, ...] = ()
 
     def problem(self) -> TrajectoryProblem:
-        """The trajectory problem."""
+        """The trajectory problem, built once."""
+        return self._problem
+
+    @cached_property
+    def _problem(self) -> TrajectoryProblem:
         lagrangian = self.scene.effort_lagrangian(self.weight)
         ld = DiscreteLagrangian(lagrangian, self.grid)
         return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the problem, so that worker processes build their own."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
 @dataclass(eq=False)

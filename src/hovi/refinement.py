@@ -10,13 +10,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.grid import DiscretePath, Grid
-from hovi.schemes import Scheme, galerkin
+from hovi.schemes import galerkin
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -75,7 +74,7 @@ def refined(grid: Grid, rho: Array, demands: Sequence[Demand]) -> Grid:
     pieces, chosen = _choice(degrees, rho, demands)
     chosen = _fewer_schemes(pieces, chosen)
     steps = np.repeat(grid.steps / pieces, pieces)
-    return Grid(steps, tuple(table(int(r)) for r in np.repeat(chosen, pieces)))
+    return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(chosen, pieces)))
 
 
 def _choice(degrees: Index, rho: Array, demands: Sequence[Demand]) -> tuple[Index, Index]:
@@ -120,9 +119,3 @@ def _decay_of_pieces(rho: Array) -> Array:
     """
     y = 0.5 * (1 / rho - rho)[:, None] * PIECES
     return np.asarray(np.sqrt(1 + y**2) - y)
-
-
-@cache
-def table(inner_modes: int) -> Scheme:
-    """The Galerkin scheme with so many inner modes."""
-    return galerkin(inner_modes)

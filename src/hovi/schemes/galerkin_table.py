@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from numbers import Integral
 
 import numpy as np
@@ -33,6 +34,12 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
             f"a Galerkin scheme is for Lagrangians of order 1 to {MAX_DERIVATIVES}, "
             f"got {derivatives!r}."
         )
+    return _table(int(inner_modes), int(derivatives))
+
+
+@cache
+def _table(inner_modes: int, derivatives: int) -> Scheme:
+    """The table, made once: nobody writes into a scheme."""
     x, w = np.polynomial.legendre.leggauss(inner_modes + derivatives)
     points, weights = (x + 1) / 2, w / 2
     order = 2 * (inner_modes + derivatives)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -28,6 +30,7 @@ def regularity_matrix(scheme: Scheme) -> Array:
     return np.asarray(H[:2, 2:])
 
 
+@lru_cache(maxsize=256)
 def is_regular(scheme: Scheme) -> bool:
     """Whether W_d is invertible, so that end data determine a discrete motion."""
     return bool(np.linalg.matrix_rank(regularity_matrix(scheme), tol=1e-10) == 2)

@@ -1,0 +1,80 @@
+"""
+As accurate as asked
+====================
+
+State the accuracy that you need, in a unit that you have, and get a plan that has it, with a
+certificate.
+"""
+
+# %%
+# A UR5 whose tool has to be where it should be to a tenth of a millimetre, at any time.
+
+import sys
+import tempfile
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hovi
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
+folder.mkdir(parents=True, exist_ok=True)
+scene = hovi.Scene(hovi.load_robot("ur5"), effects=[hovi.effects.Gravity()])
+start, goal = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
+plan = hovi.plan(scene, start, goal, duration=1.5, limits="none", tolerance="0.1 mm at tool0")
+print(plan.message)
+assert plan.accuracy.reached
+assert plan.accuracy.estimate.largest_tip <= 1e-4
+
+# %%
+# A bare number is relative in the cost. Each further digit costs a little more.
+
+for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
+    plan = hovi.plan(scene, start, goal, duration=1.5, limits="none", tolerance=tolerance)
+    last = plan.accuracy.rounds[-1]
+    print(f"{tolerance:.0e}: estimate {plan.error_estimate:.1e}, {last.points} points")
+    assert plan.error_estimate <= tolerance
+
+# %%
+# The certificate says what is known of the plan, each statement with its number. The replay drives
+# the arm with the planned torques by SciPy and Pinocchio: it certifies dynamics and torques, not
+# optimality.
+
+certificate = hovi.certify(plan)
+print(f"spread of Pontryagin's Hamiltonian: {certificate.hamiltonian.spread:.1e}")
+print(f"action {certificate.action:.9g}, integral {certificate.integral:.9g}")
+print(f"the driven arm misses the next node by {certificate.replay.angle:.1e} rad at most")
+assert certificate.n_neg == 0
+assert certificate.hamiltonian.spread < 1e-6
+assert certificate.replay.angle < 1e-9
+
+# %%
+# Where a motion turns sharply its intervals become short; where it is smooth they get more inner
+# modes instead.
+
+task = hovi.load_task(hovi.example("two_link_swing_up"))
+swing = {"duration": task.duration, "limits": "none"}
+coarse = hovi.plan(task.scene, task.start, task.goal, intervals=60, **swing)
+fine = hovi.plan(
+    task.scene,
+    task.start,
+    task.goal,
+    intervals=24,
+    guess=coarse.trajectory,
+    tolerance=1e-7,
+    **swing,
+)
+grid = fine.trajectory.grid
+t = np.linspace(0.0, task.duration, 2001)
+figure, (above, below) = plt.subplots(2, 1, sharex=True)
+above.plot(t, np.linalg.norm(fine.trajectory.sample(t).a, axis=1))
+above.set_ylabel("|a| [rad/s²]")
+below.step(grid.t, np.append(grid.steps, grid.steps[-1]), where="post")
+below.set_ylabel("length of the interval [s]")
+below.set_xlabel("t [s]")
+figure.savefig(folder / "interval_lengths.png")
+assert grid.steps.max() > 2 * grid.steps.min()
