@@ -21,18 +21,20 @@ from hovi.effects import (
     ViscousFriction,
     Wrench,
 )
+from hovi.effects.positions import positioned
 from hovi.robot import Robot
 
 
 def sample_effects(robot: Robot) -> dict[str, Effect]:
     """Effects by key, none of them trivial."""
-    first, last, tip = robot.coordinate_names[0], robot.coordinate_names[-1], robot.tip_frame
+    placed = [robot.coordinate_names[i] for i in positioned(robot)]
+    first, last, tip = placed[0], placed[-1], robot.tip_frame
     effects: list[Effect] = [
         Gravity(3.7, (0.3, -0.2, -1.0)),
         ViscousFriction({first: 0.4, last: 0.1}),
         DryFriction(0.3, dict.fromkeys(robot.coordinate_names, 0.5), 0.3, 0.2),
         Armature(0.07),
-        JointSprings(2.0, {last: 0.4}),
+        JointSprings({first: 2.0, last: 1.0}, {last: 0.4}),
         JointLimitPotential({first: (-0.1, 0.1)}, 30.0, 0.5, stops=True),
         Payload(tip, 0.8, (0.02, 0.01, 0.1), (2e-3, 3e-3, 4e-3, 1e-4, 0.0, 2e-4)),
         Wrench(tip, (3.0, "2*sin(3*t)", -1.0), ("t", 0.5, 0.0), "frame"),

@@ -38,8 +38,15 @@ Array = npt.NDArray[np.float64]
 
 def points(robot: Robot, count: int = 4) -> tuple[Array, Array, Array, Array]:
     random = np.random.default_rng(robot.nv)
-    q, v, a = random.normal(size=(3, count, robot.nv))
+    dq, v, a = random.normal(size=(3, count, robot.nv))
+    q = robot.integrate(np.tile(robot.neutral(), (count, 1)), dq)
     return q, v, a, random.uniform(0.1, 2.0, count)
+
+
+@pytest.fixture(scope="module")
+def kinova() -> Robot:
+    """An arm with joints that turn without end (nq = 2, nv = 1)."""
+    return load_robot("kinova")
 
 
 def with_gravity(effect: Effect) -> list[Effect]:
@@ -51,18 +58,21 @@ def test_there_is_a_sample_of_every_effect(two_link: Robot) -> None:
 
 
 @pytest.mark.parametrize("key", REGISTRY)
-@pytest.mark.parametrize("name", ["two_link", "panda"])
+@pytest.mark.parametrize("name", ["two_link", "panda", "kinova"])
 def test_gradient_and_hessian_are_the_derivatives_of_the_cost(
     request: pytest.FixtureRequest, name: str, key: str
 ) -> None:
     robot: Robot = request.getfixturevalue(name)
     lagrangian = Scene(robot, with_gravity(sample_effects(robot)[key])).effort_lagrangian()
     *jet, t = points(robot)
-    x, m = np.concatenate(jet, axis=1), 3 * robot.nv
+    n, m = robot.nv, 3 * robot.nv
     _, gradient, hessian = lagrangian.evaluate(*jet, t=t)
     e = 1e-5
     for i in range(m):
-        above, below = (np.split(x + s * e * np.eye(m)[i], 3, axis=1) for s in (1, -1))
+        dq, dv, da = np.split(np.tile(e * np.eye(m)[i], (len(t), 1)), [n, 2 * n], axis=1)
+        above, below = (
+            [robot.integrate(jet[0], s * dq), jet[1] + s * dv, jet[2] + s * da] for s in (1, -1)
+        )
         slope = (lagrangian.value(*above, t=t) - lagrangian.value(*below, t=t)) / (2 * e)
         scale = np.abs(gradient).max()
         np.testing.assert_allclose(gradient.reshape(-1, m)[:, i], slope, atol=1e-7 * scale)

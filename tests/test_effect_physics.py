@@ -366,9 +366,10 @@ def test_stops_push_with_the_slope_of_their_potential(two_link: Robot) -> None:
 def test_stops_hold_a_falling_arm(two_link: Robot) -> None:
     stop = JointLimitPotential({"shoulder": (-0.3, 0.3)}, 400.0, 0.02, stops=True)
     scene = Scene(two_link, [Gravity(), stop, ViscousFriction(0.5)])
-    motion = simulate(scene, State([0.0, 0.0]), 2.0, intervals=2000)
+    motion = simulate(scene, State([0.0, 0.0]), 1.0, intervals=500)
     assert motion.q[:, 0].min() > -0.35
-    assert simulate(scene.without(stop.key), State([0.0, 0.0]), 2.0).q[:, 0].min() < -0.5
+    loose = simulate(scene.without(stop.key), State([0.0, 0.0]), 1.0, intervals=50)
+    assert loose.q[:, 0].min() < -0.5
 
 
 # Costs

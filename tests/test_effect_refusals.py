@@ -54,6 +54,9 @@ CASES: dict[str, tuple[Effect, str]] = {
     "negative mass": (Payload(TIP, -1.0), "mass must be finite and 0 or more, got -1.0 kg"),
     "mass of the base": (Payload("panda_link0", 1.0), "is fixed to the base"),
     "no center": (Payload(TIP, 1.0, (0.0, np.nan, 0.0)), "center must be three finite numbers"),
+    "flat center": (Payload(TIP, 1.0, (0.0, 0.0)), "center must be three"),  # type: ignore[arg-type]
+    "half an inertia": (Payload(TIP, 1.0, inertia=(1.0,)), "six numbers"),  # type: ignore[arg-type]
+    "flat wind": (Drag(TIP, wind=(1.0, 2.0)), "wind needs three components, got 2"),  # type: ignore[arg-type]
     "no body": (
         Payload(TIP, 1.0, inertia=(1.0, 1.0, -0.1, 0.0, 0.0, 0.0)),
         "must not have a negative principal value",
@@ -103,6 +106,7 @@ FORMULAS = {
     "a joint's name": ('v["elbwo"]', "the joint 'elbwo', which is unknown: did you mean 'elbow'"),
     "no joint": ("v", "needs a joint behind 'v', as in v"),
     "a number for a joint": ("v[0]", "brackets only behind q, v and a"),
+    "an escape": (r"'\d'", "holds more than"),
     "infinity": ("1e999", "must be a finite number or a formula"),
     "a division by zero": ("1/0", "must be a finite number or a formula"),
     "powers of powers": ("9**9**9**9", "must be a finite number or a formula"),
@@ -144,6 +148,8 @@ def test_a_joint_without_a_single_position_has_no_spring() -> None:
     with pytest.raises(SceneError, match=r"'j2s6s200_joint_1' has no single position"):
         Scene(robot, [JointSprings({"j2s6s200_joint_1": 2.0})])
     Scene(robot, [JointSprings({"j2s6s200_joint_2": 2.0})])
+    with pytest.raises(SceneError, match=r"names the joint 'j2s6s200_joint_1', which is unknown"):
+        Scene(robot, [Custom({"j2s6s200_joint_2": 'q["j2s6s200_joint_1"]'})])
 
 
 # In scene files

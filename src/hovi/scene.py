@@ -173,12 +173,7 @@ class Scene:
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
     def evaluation(self) -> Callable[..., Any]:
-        """(q, v, a, t) -> L~ with its derivatives at a batch of points, as an optimiser asks.
-
-        Where configurations are not vectors, tau alone.
-        """
-        if not self.robot.vector_joints:
-            return self.torques.torque
+        """(q, v, a, t) -> L~ with its derivatives at a batch of points, as an optimiser asks."""
         lagrangian = self.effort_lagrangian()
         return lambda q, v, a, t: lagrangian.expand(q, v, a, t=t)
 

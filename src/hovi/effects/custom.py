@@ -10,7 +10,7 @@ import casadi as ca
 
 from hovi.effects.effect import Effect, SceneSymbols, Touch
 from hovi.effects.formula import Number, Symbols, expression
-from hovi.effects.positions import positions
+from hovi.effects.positions import positioned, positions
 from hovi.errors import SceneError, nearest
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True)
 class Custom(Effect):
     """Torques and a cost, each a formula of q["joint"], v["joint"], a["joint"] and t.
+
+    Joints with nq != nv have no q["joint"], since they have no single position.
 
     In Python, a subclass of Effect takes any CasADi expression instead of a formula.
 
@@ -65,8 +67,7 @@ class Custom(Effect):
 
 def _by_joint(robot: Robot, symbols: SceneSymbols) -> Symbols:
     """q, v and a by the names of their coordinates, and t."""
-    columns = {"q": positions(robot, symbols.q), "v": symbols.v, "a": symbols.a}
-    tables: dict[str, ca.SX | Mapping[str, ca.SX]] = {"t": symbols.t}
-    for letter, column in columns.items():
-        tables[letter] = dict(zip(robot.coordinate_names, ca.vertsplit(column), strict=True))
-    return tables
+    names, q = robot.coordinate_names, positions(robot, symbols.q)
+    by_name = (dict(zip(names, ca.vertsplit(x), strict=True)) for x in (symbols.v, symbols.a))
+    v, a = by_name
+    return {"t": symbols.t, "q": {names[i]: q[i] for i in positioned(robot)}, "v": v, "a": a}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import math
+import warnings
 from collections.abc import Callable, Mapping
 
 import casadi as ca
@@ -104,7 +105,9 @@ def _parsed(what: str, text: str) -> ast.expr:
     if len(text) > LONGEST:
         raise SceneError(f"{what}: a formula has at most {LONGEST} characters, not {len(text)}.")
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        with warnings.catch_warnings():  # of strange escapes in a string that is refused anyway
+            warnings.simplefilter("ignore")
+            return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise _Reader(what, text, {}).refused("is not arithmetic") from None
 

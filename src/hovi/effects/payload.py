@@ -47,9 +47,14 @@ class Payload(Effect):
             raise SceneError(
                 f"effect 'payload': mass must be finite and 0 or more, got {self.mass} kg."
             )
-        if not np.isfinite(self.center).all():
+        if len(self.center) != 3 or not np.isfinite(self.center).all():
             raise SceneError(
                 f"effect 'payload': center must be three finite numbers, got {list(self.center)}."
+            )
+        if len(self.inertia) != 6:
+            raise SceneError(
+                "effect 'payload': inertia needs six numbers (Ixx, Iyy, Izz, Ixy, Ixz, Iyz), got "
+                f"{len(self.inertia)}."
             )
         tensor = self._tensor()
         if not np.isfinite(tensor).all() or np.linalg.eigvalsh(tensor)[0] < -1e-12 * tensor.max():

@@ -20,6 +20,11 @@ def positions(robot: Robot, q: ca.SX) -> ca.SX:
     return ca.vertcat(*places)
 
 
+def positioned(robot: Robot) -> list[int]:
+    """The coordinates that have a position."""
+    return [i for i, place in enumerate(_places(robot)) if place >= 0]
+
+
 def require_positions(robot: Robot, what: str, coordinates: npt.NDArray[np.intp]) -> None:
     """Raise SceneError for a coordinate of a joint with nq != nv. what: begins the sentence."""
     places = _places(robot)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from hovi.effects.formula import Number, expression
+from hovi.errors import SceneError
 
 TimeVector = tuple[Number, Number, Number]
 """(x, y, z), each a number or a formula of t such as "0.1*sin(2*pi*t)"."""
@@ -16,6 +17,8 @@ def time_vector(what: str, given: TimeVector, t: ca.SX) -> ca.SX:
     what: the effect and its key, to begin a sentence with. Raises SceneError.
     """
     names = ("x", "y", "z")
+    if len(given) != 3:
+        raise SceneError(f"{what} needs three components, got {len(given)}.")
     parts = (
         expression(f"{what}, component {name}", each, {"t": t})
         for name, each in zip(names, given, strict=True)
