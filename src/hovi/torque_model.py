@@ -70,10 +70,13 @@ class CasadiTorque:
         return PointFunction(function, self._compile)
 
     @cached_property
-    def _curvature(self) -> PointFunction:
+    def _curvature(self) -> PointFunction | None:
+        """The weighted second derivatives; None where tau is affine."""
         weight = ca.SX.sym("weight", self.nv)
         weighted = ca.dot(weight, self._tau)
         curvature = tangent.hessian(weighted, self._symbols, self._space)[0]
+        if curvature.nnz() == 0:
+            return None
         function = ca.Function("ddtau", [*self._symbols, weight], [curvature])
         return PointFunction(function, self._compile)
 
@@ -95,7 +98,14 @@ class CasadiTorque:
 
     def curvature(self, q: Array, v: Array, a: Array, t: Array | None, weight: Array) -> Array:
         """sum_i weight_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        if self._curvature is None:
+            return np.zeros((len(q), 3 * self.nv, 3 * self.nv))
         return self._curvature(q, v, a, times(t, len(q)), weight)[0]
+
+    @property
+    def bends(self) -> bool:
+        """Whether tau has any second derivatives."""
+        return self._curvature is not None
 
     def expand(
         self,
@@ -198,16 +208,19 @@ class SummedTorque:
         R: Array,
         curvature: Array | None,
     ) -> tuple[Array, Array, Array]:
-        """tau, J and the Hessian of TorqueModel.expand: (J + J')^T R (J + J') in four parts."""
+        """tau, J and the Hessian of TorqueModel.expand.
+
+        (J + J')^T R (J + J') = J^T R J + X + X^T with X = (J + J'/2)^T R J'.
+        """
         more, dmore = self.added.linearize(q, v, a, t)
         if curvature is None:
             curvature = R * (self.main.torque(q, v, a, t) + more)
         tau, J, hessian = self.main.expand(q, v, a, t, R, curvature)
-        RdJ = R[..., None] * dmore
-        cross = np.matmul(J.transpose(0, 2, 1), RdJ)
-        hessian += cross + cross.transpose(0, 2, 1)
-        hessian += np.matmul(dmore.transpose(0, 2, 1), RdJ)
-        hessian += self.added.curvature(q, v, a, t, curvature)
+        cross = np.matmul((J + 0.5 * dmore).transpose(0, 2, 1), R[..., None] * dmore)
+        hessian += cross
+        hessian += cross.transpose(0, 2, 1)
+        if self.added.bends:
+            hessian += self.added.curvature(q, v, a, t, curvature)
         return tau + more, J + dmore, hessian
 
 
