@@ -288,16 +288,6 @@ def test_swing_ups_end_in_minima(arm_scene: Scene, duration: float) -> None:
     assert_stationary(problem, solution, 1e-8)
 
 
-@pytest.mark.parametrize("turns", [1, 5])
-def test_motions_of_many_turns_are_found(arm_scene: Scene, turns: int) -> None:
-    goal = State(-HANG + [2 * np.pi * turns, 0.0])
-    problem = problem_on(arm_scene, START, goal, duration=10.0, intervals=60)
-    solution = solve(problem)
-    assert solution.status is Status.MINIMUM
-    assert_fits(problem, solution)
-    assert_stationary(problem, solution, 1e-8)
-
-
 def test_random_motions_are_minima_or_honest(two_link: Robot, pendulum: Robot) -> None:
     for robot in (pendulum, two_link):
         scene = Scene(robot, [Gravity()])

@@ -32,6 +32,8 @@ STEPS = "steps"
 UNLIMITED = "inertia", "the intervals", "gravity", "the duration"
 LIMITED = "the limits", "the duration", "the intervals", "inertia", "gravity"
 """Ways in the order in which they are tried, the most promising first."""
+INFEASIBLE = "the limits", "the duration"
+"""Ways when no motion within the limits was found: the others change none of them."""
 AGAIN = 4
 """Solves that go on from the best motion so far."""
 ENDED = Status.TIME_LIMIT, Status.INTERRUPTED
@@ -91,6 +93,8 @@ def _order(job: Job, failed: Solution) -> list[str]:
 
     A direct way that ran out of steps in a valley of positive curvature is followed on first.
     """
+    if failed.status is Status.INFEASIBLE:
+        return list(INFEASIBLE)
     ways = LIMITED if job.limits.bounded.any() else UNLIMITED
     first = failed.status is Status.ITERATION_LIMIT and failed.n_neg == 0
     return [STEPS, *ways] if first else [*ways, STEPS]
@@ -127,7 +131,7 @@ class _Ladder:
         guess = self.guess
         for i, rung in enumerate([*rungs, Rung("the task itself", self.job)]):
             solution = self._solve(rung, guess, i / (len(rungs) + 1))
-            if solution is None or self.ended is not None:
+            if solution is None or solution.status is Status.INFEASIBLE or self.ended is not None:
                 return None
             if solution.status is not Status.DIVERGED:
                 guess = solution.trajectory

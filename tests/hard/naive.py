@@ -1,7 +1,8 @@
 """The paper, word for word: its Taylor scheme on the two-link arm, full Newton, the cubic guess.
 
 What such an implementation does on the hard cases. Its Lagrangian comes from paper_arm.py, its
-derivatives from CasADi, its linear algebra from SciPy's sparse LU: no part of hovi is in it.
+derivatives from CasADi, its linear algebra from SciPy's sparse LU: no part of hovi is in it but in
+`full_newton`, which takes the same steps for any robot on hovi's equations.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
+from hovi.problem import TrajectoryProblem
+from hovi.solver import guess_path
+from hovi.trajectory_objective import ActionObjective
 from paper_arm import symbols
 
 Array = npt.NDArray[np.float64]
@@ -23,8 +27,40 @@ NODE = 4
 """Numbers at a node: q and v of two joints."""
 
 
+@dataclass(frozen=True)
+class Cost:
+    """What is minimised: 1/2 |u|^2 and what is added to it.
+
+    gravity: whether there is any.
+    elbow: slope of a potential outside 0 to 170 degrees, piecewise linear as in the paper.
+    penalty: rho of rho/2 times the squared excess of |u| over `most`, in [N m].
+    """
+
+    gravity: bool = True
+    elbow: float = 0.0
+    penalty: float = 0.0
+    most: float = 2.0
+
+    def of(self, q: ca.SX, u: ca.SX) -> ca.SX:
+        """The integrand."""
+        outside = ca.fmax(0, -q[1]) + ca.fmax(0, q[1] - np.radians(170))
+        excess = ca.fmax(0, ca.fabs(u) - self.most)
+        return ca.sumsqr(u) / 2 + self.elbow * outside + self.penalty / 2 * ca.sumsqr(excess)
+
+
 @cache
-def discrete_lagrangian(gravity: bool = True) -> ca.Function:
+def _torque() -> ca.Function:
+    s = symbols()
+    return ca.Function("u", [s.q, s.v, s.a], [s.u])
+
+
+def torque(q: Array, v: Array, a: Array) -> Array:
+    """u at one point, shape (2,), in [N m]."""
+    return np.array(_torque()(q, v, a)).ravel()
+
+
+@cache
+def discrete_lagrangian(cost: Cost) -> ca.Function:
     """(x0, x1, h) -> L_d and its gradient and Hessian, x = (q, v).
 
     L_d = h/2 (L(qm, vm, a0) + L(qm, vm, a1)), a0 = 2/h^2 (q1 - q0 - h v0) and
@@ -32,8 +68,8 @@ def discrete_lagrangian(gravity: bool = True) -> ca.Function:
     """
     s = symbols()
     at_rest = ca.substitute(s.u, ca.vertcat(s.v, s.a), ca.SX.zeros(4))
-    u = s.u if gravity else s.u - at_rest
-    L = ca.Function("L", [s.q, s.v, s.a], [ca.sumsqr(u) / 2])
+    u = s.u if cost.gravity else s.u - at_rest
+    L = ca.Function("L", [s.q, s.v, s.a], [cost.of(s.q, u)])
     x, h = ca.SX.sym("x", 2 * NODE), ca.SX.sym("h")
     q0, v0, q1, v1 = ca.vertsplit(x, 2)
     a0, a1 = 2 / h**2 * (q1 - q0 - h * v0), 2 / h**2 * (q0 - q1 + h * v1)
@@ -49,11 +85,11 @@ class Problem:
 
     x: Array
     h: float
-    gravity: bool = True
+    cost: Cost = Cost()
 
     @classmethod
     def cubic(
-        cls, start: Array, goal: Array, duration: float, intervals: int, gravity: bool = True
+        cls, start: Array, goal: Array, duration: float, intervals: int, cost: Cost = Cost()
     ) -> Problem:
         """The cubic through (q, v) at both ends."""
         s, T = np.linspace(0, 1, intervals + 1)[:, None], duration
@@ -61,14 +97,14 @@ class Problem:
         b, c = 3 * (q1 - q0) - T * (2 * v0 + v1), 2 * (q0 - q1) + T * (v0 + v1)
         q = q0 + T * v0 * s + b * s**2 + c * s**3
         v = v0 + (2 * b * s + 3 * c * s**2) / T
-        return cls(np.hstack([q, v]), duration / intervals, gravity)
+        return cls(np.hstack([q, v]), duration / intervals, cost)
 
     @property
     def expansion(self) -> tuple[float, Array, Array]:
         """The action, the residual of the inner nodes (N - 1, 4), and all L_d's Hessians."""
         N = len(self.x) - 1
         pairs = np.hstack([self.x[:-1], self.x[1:]]).T
-        values, g, H = discrete_lagrangian(self.gravity).map(N)(pairs, self.h)
+        values, g, H = discrete_lagrangian(self.cost).map(N)(pairs, self.h)
         gradient = np.array(g).T
         residual = gradient[1:, :NODE] + gradient[:-1, NODE:]
         blocks = np.array(H).reshape(2 * NODE, N, 2 * NODE).transpose(1, 0, 2)
@@ -93,7 +129,7 @@ class Problem:
         """-D1 L_d at the first node of every interval, (N, 2)."""
         N = len(self.x) - 1
         pairs = np.hstack([self.x[:-1], self.x[1:]]).T
-        gradient = np.array(discrete_lagrangian(self.gravity).map(N)(pairs, self.h)[1]).T
+        gradient = np.array(discrete_lagrangian(self.cost).map(N)(pairs, self.h)[1]).T
         return -gradient[:, :2]
 
     def newton(self, residual: Array, blocks: Array) -> Array:
@@ -134,3 +170,26 @@ def solve(problem: Problem, tolerance: float = 1e-10, most: int = 50) -> Run:
             if steps < most:
                 problem.newton(residual, blocks)
     return Run(problem, most, "still running", cost, size)
+
+
+def full_newton(problem: TrajectoryProblem, most: int = 60) -> str:
+    """Undamped Newton steps from the cubic guess, until one changes q and v by less than 1e-9."""
+    action = ActionObjective(problem, "tree")
+    path = guess_path(problem, "cubic")
+    with np.errstate(all="ignore"):
+        for steps in range(most):
+            model = action.model_with(path, None, None)
+            size = len(model.gradient)
+            G = np.stack([model.gather(e) for e in np.eye(size)], axis=-1)  # (N, m, n, size)
+            HG = np.einsum("kijab,kjbs->kias", model.intervals.hessian, G, optimize=True)
+            H = np.tensordot(G, HG, axes=([0, 1, 2], [0, 1, 2]))
+            cost = action.value(path)
+            if not (np.isfinite(H).all() and np.isfinite(cost)):
+                return f"not finite after {steps} steps"
+            step = np.linalg.solve(H, -model.gradient)
+            if action.relative_size(path, step, model) <= 1e-9:
+                n_neg = int(np.sum(np.linalg.eigvalsh((H + H.T) / 2) < 0))
+                return f"converged after {steps} steps, J = {cost:.4g}, n_neg = {n_neg}"
+            path = action.retract(path, step, model)
+    largest = np.abs(path.q).max()
+    return f"still running after {most} steps, J = {cost:.2g}, |q| up to {largest:.2g}"

@@ -143,7 +143,7 @@ def naive_noether() -> str:
     said = []
     for N in (200, 10_000):
         best = solve(problem(arm(False), START, REACH, 1.0, N, "taylor-midpoint")).trajectory
-        nodes = naive.Problem(np.hstack([best.q, best.v]), 1.0 / N, gravity=False)
+        nodes = naive.Problem(np.hstack([best.q, best.v]), 1.0 / N, naive.Cost(gravity=False))
         p = nodes.momenta[:, 0]
         said.append(f"spread {np.ptp(p) / np.abs(p).max():.1g} at N = {N}")
     return "; ".join(said)
