@@ -26,6 +26,7 @@ SCRIPTS = (
     "limits",
     "effects",
     "random_reaches",
+    "hard_cases",
     "underactuated",
     "growth",
     "tolerance",

@@ -110,6 +110,13 @@ class Problem:
         blocks = np.array(H).reshape(2 * NODE, N, 2 * NODE).transpose(1, 0, 2)
         return float(ca.sum2(values)), residual, blocks
 
+    @property
+    def values(self) -> Array:
+        """L_d of every interval, shape (N,)."""
+        N = len(self.x) - 1
+        pairs = np.hstack([self.x[:-1], self.x[1:]]).T
+        return np.array(discrete_lagrangian(self.cost).map(N)(pairs, self.h)[0]).ravel()
+
     @staticmethod
     def assembled(blocks: Array) -> sp.csc_matrix:
         """The Hessian of the action, over the inner nodes."""

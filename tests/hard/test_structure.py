@@ -1,0 +1,199 @@
+"""Hard cases 22 to 25: ill-conditioned masses, norms that are off, and the same bytes again."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import naive
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+from case import Case, Outcome, parameters
+from scenes import HANG_JET, UP_JET, hanging, links, uneven
+
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.errors import HoviError
+from hovi.optimize.trust_region import Options, minimize
+from hovi.planner import plan
+from hovi.problem import TrajectoryProblem
+from hovi.robot import Robot, load_robot
+from hovi.trajectory_objective import ActionObjective
+
+Array = npt.NDArray[np.float64]
+
+
+def mass_matrix(robot: Robot, q: Array) -> Array:
+    upper = np.triu(pin.crba(robot.model, robot.model.createData(), q))
+    return upper + np.triu(upper, 1).T
+
+
+def naive_square() -> str:
+    said = []
+    for count in (10, 30, 100):
+        robot = links(count).robot
+        M = mass_matrix(robot, np.random.default_rng(0).uniform(-1, 1, count))
+        x = np.ones(count)
+        W = M.T @ M
+        error = np.abs(np.linalg.solve(W, M.T @ (M @ x)) - x).max()
+        said.append(
+            f"{count} links: cond(W) = {np.linalg.cond(M) ** 2:.0e}, W^-1 off by {error:.0e}"
+        )
+    return "; ".join(said)
+
+
+def digits_of_a_chain(count: int) -> Callable[[], Outcome]:
+    """A minimum, its inertia by two algebras, and what the other algebra makes of it."""
+
+    def run() -> Outcome:
+        scene = links(count)
+        bent = np.full(count, 0.3)
+        bent[0] = 0.2
+        options = {"limits": "none", "processes": 1}
+        found = plan(scene, hanging(scene), bent, 2.0, **options)
+        assert found.problem is not None
+        moved, inertia = again(found.problem, found.trajectory.path)
+        D = DiscreteLagrangian.derivatives(found.problem.ld, found.trajectory.path)
+        residual = np.abs(D[1:, :2] + D[:-1, 2:]).max(axis=(0, 2)) / np.abs(D).max(axis=(0, 2))[:2]
+        shown = (
+            f"{found.status}, n_neg = {found.n_neg} and {inertia}; equations hold to "
+            f"{residual.max():.0e}; solved again in other coordinates q moves by {moved:.0e}"
+        )
+        good = found.success and found.n_neg == inertia == 0
+        return Outcome(shown, bool(good and residual.max() <= 1e-8 and moved <= 1e-6))
+
+    return run
+
+
+def again(problem: TrajectoryProblem, path: object) -> tuple[float, int]:
+    """How far regularised coordinates move a minimum that nodal ones found, and its inertia."""
+    tree = ActionObjective(problem, "tree")
+    outcome = minimize(tree, path, Options(decrease=1e-9, max_iterations=20))  # type: ignore[arg-type]
+    return float(np.abs(outcome.x.q - path.q).max()), tree.negative_eigenvalues(outcome.x)  # type: ignore[attr-defined]
+
+
+LIGHT = 1.0, 1e-17
+
+
+def naive_massless() -> str:
+    robot = uneven(LIGHT).robot
+    M = mass_matrix(robot, np.array([0.3, 0.4]))
+    u = np.array([1.0, 0.1])
+    a = np.abs(np.linalg.solve(M, u)).max()
+    return f"cond(M) = {np.linalg.cond(M):.0e}: a torque of 0.1 N m gives {a:.0e} rad/s^2"
+
+
+def refused_massless() -> Outcome:
+    return refusal(lambda: plan(uneven(LIGHT), [0.0, 0.0], [1.0, 0.0], 1.0), "singular", "joint2")
+
+
+def refusal(work: Callable[[], object], *words: str) -> Outcome:
+    """Whether one sentence with these words refuses."""
+    try:
+        work()
+    except HoviError as error:
+        sentence = str(error)
+        return Outcome(sentence[:160], all(word in sentence for word in words))
+    return Outcome("accepted", False)
+
+
+def base() -> Robot:
+    return load_robot("hector")
+
+
+def naive_quaternion() -> str:
+    robot = base()
+    v, a = np.random.default_rng(0).normal(size=(2, robot.nv))
+    q = pin.randomConfiguration(robot.model, -np.ones(7), np.ones(7))
+    data = robot.model.createData()
+    right = pin.rnea(robot.model, data, q, v, a).copy()
+    q[3:] *= 1.01
+    wrong = pin.rnea(robot.model, data, q, v, a)
+    return f"RNEA changes by {100 * np.abs(wrong - right).max() / np.abs(right).max():.1f} %"
+
+
+def refused_quaternion() -> Outcome:
+    robot = base()
+    q = robot.neutral()
+    q[3:] *= 1.01
+    return refusal(lambda: robot.check_configuration(q, "start"), "start", "unit norm", "normalize")
+
+
+SCRIPT = """
+import sys, hovi
+task = hovi.load_task(hovi.example("two_link_swing_up"))
+found = hovi.plan(task.scene, task.start, task.goal, 3.0, limits="none", starts=6, processes=1)
+found.trajectory.save(sys.argv[1])
+print(found.cost.hex())
+"""
+
+
+def naive_bytes() -> str:
+    values = naive.Problem.cubic(HANG_JET, UP_JET, 3.0, 1000).values
+    orders = [np.random.default_rng(seed).permutation(len(values)) for seed in range(8)]
+    sums = {sum(values[order].tolist()).hex() for order in orders}
+    return f"summed as processes finish, an action has {len(sums)} values in 8 runs"
+
+
+def same_bytes() -> Outcome:
+    digests, costs = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for i in range(2):
+            path = Path(folder) / f"{i}.npz"
+            command = [sys.executable, "-c", SCRIPT, str(path)]
+            done = subprocess.run(command, capture_output=True, check=True)
+            costs.append(done.stdout)
+            digests.append(hashlib.sha256(path.read_bytes()).hexdigest())
+    same = len(set(digests)) == len(set(costs)) == 1
+    return Outcome(f"SHA-256 {digests[0][:12]} and {digests[1][:12]}", same)
+
+
+CASES = (
+    Case(
+        "22a",
+        "a minimum of a chain of 10 links keeps its digits",
+        naive_square,
+        digits_of_a_chain(10),
+        "n_neg = 0 by two algebras, equations to 1e-8, solved again in others to 1e-6",
+    ),
+    Case(
+        "22b",
+        "so does one of 30 links",
+        naive_square,
+        digits_of_a_chain(30),
+        "n_neg = 0 by two algebras, equations to 1e-8, solved again in others to 1e-6",
+        long=True,
+    ),
+    Case(
+        "23",
+        "a link without mass to working precision is refused",
+        naive_massless,
+        refused_massless,
+        "refused by the joint's name",
+    ),
+    Case(
+        "24",
+        "a quaternion that is off by 1 % is refused",
+        naive_quaternion,
+        refused_quaternion,
+        "refused by name, at the door",
+    ),
+    Case(
+        "25",
+        "two processes write the same bytes",
+        naive_bytes,
+        same_bytes,
+        "one SHA-256",
+    ),
+)
+
+
+@pytest.mark.parametrize("case", parameters(CASES))
+def test_structure(case: Case) -> None:
+    outcome = case.run()
+    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
