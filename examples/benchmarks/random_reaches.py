@@ -1,9 +1,9 @@
 """Rest-to-rest reaches between random configurations, within every limit of the URDF.
 
 Twenty pairs are drawn evenly within the position limits of each robot, a turn at most, among those
-that the motors can hold with some torque to spare. The time is three times what the slowest joint needs at its velocity limit, one second at least. What does not
-end in a minimum directly goes on by continuation, and what does not end in one then is tried again
-from four guesses.
+that the motors can hold with some torque to spare. The time is three times what the slowest joint
+needs at its velocity limit, one second at least. What does not end in a minimum directly goes on
+by continuation, and what does not end in one then is tried again from four guesses.
 """
 
 from __future__ import annotations
