@@ -260,6 +260,24 @@ def test_a_mesh_outside_the_package_is_never_read(tmp_path: Path, mesh: str) -> 
     assert load_robot(urdf, package_dirs=[tmp_path / "outside"]).nv == 1
 
 
+def test_a_link_that_leads_out_of_the_package_is_not_followed(tmp_path: Path) -> None:
+    for folder in ("outside", "inside"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "outside" / "rod.stl").write_text(TRIANGLE)
+    (tmp_path / "inside" / "rod.stl").symlink_to(tmp_path / "outside" / "rod.stl")
+    robot = load_robot(mesh_arm(tmp_path / "inside", "rod.stl"))
+    assert robot.visual is None
+    assert "lies outside" in robot.visual_problem
+
+
+def test_a_package_may_itself_be_a_link(tmp_path: Path) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "rod.stl").write_text(TRIANGLE)
+    (tmp_path / "arm").symlink_to(tmp_path / "real")
+    urdf = mesh_arm(tmp_path / "arm", "package://arm/rod.stl")
+    assert load_robot(urdf).visual is not None
+
+
 # Names, limits, configurations
 
 

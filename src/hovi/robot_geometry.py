@@ -141,7 +141,9 @@ def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
 
 
 def _inside(path: Path, folder: Path) -> bool:
-    return path.is_relative_to(os.path.normpath(folder.absolute()))
+    """By name and by what symbolic links lead to."""
+    named = path.is_relative_to(os.path.normpath(folder.absolute()))
+    return named and path.resolve().is_relative_to(folder.resolve())
 
 
 def _places(candidates: list[tuple[Path, Path]]) -> str:
