@@ -61,7 +61,8 @@ Change = Callable[[Entries, Random], None]
 
 
 @cache
-def _original() -> bytes:
+def original() -> bytes:
+    """A motion of the two-link arm, as it is saved."""
     robot = hovi.load_robot(example("two_link.urdf"))
     scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
     solution = hovi.plan(scene, [0.0, 0.0], [0.3, 0.7], 1.0, intervals=4, processes=1)
@@ -75,8 +76,8 @@ def mutate(random: Random) -> Mutant:
     """A changed file: in its bytes, in its entries, or with something that must be refused."""
     kind = random.random()
     if kind < 0.4:
-        return Mutant(mutated_bytes(_original(), random, TOKENS))
-    with zipfile.ZipFile(io.BytesIO(_original())) as archive:
+        return Mutant(mutated_bytes(original(), random, TOKENS))
+    with zipfile.ZipFile(io.BytesIO(original())) as archive:
         entries = {name.removesuffix(".npy"): archive.read(name) for name in archive.namelist()}
     entries["header"] = entries["header"][entries["header"].index(b"\n") + 1 :]
     if kind < 0.75:
