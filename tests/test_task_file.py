@@ -214,6 +214,7 @@ ranges = { elbow = [0.0, 2.0] }
     [
         ("[0.0, 2.0]", "[0.0]", ["ranges", "elbow"]),
         ("[0.0, 2.0]", '[0.0, "2"]', ["ranges.elbow[1]", "finite number"]),
+        ("[0.0, 2.0]", "[0.0, 1e308]", ["ranges.elbow[1]", "1e+308"]),
         ("[0.0, 2.0]", "[0.0, inf]", ["ranges.elbow[1]", "inf"]),
         ("[0.0, 2.0]", "[2.0, 0.0]", ["'elbow'", "line"]),
         ("elbow", "elbw", ["'elbw'", "'elbow'"]),

@@ -27,7 +27,14 @@ from hovi.robot import Robot
 from hovi.task_file.schema import Table
 from hovi.task_file.sentences import TomlText, first_sentence
 
-_NUMBERS = {float: "finite number", int: "whole number", str: "string", bool: "true or false"}
+_LARGEST = 1e12
+"""In SI units; the squares of larger numbers overflow."""
+_NUMBERS = {
+    float: f"finite number of at most {_LARGEST:g} in size",
+    int: "whole number",
+    str: "string",
+    bool: "true or false",
+}
 
 
 def read_effects(
@@ -84,7 +91,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 def _strict(hint: Any) -> Any:
     """The hint with strict, finite scalars; a TOML list may still become a tuple."""
     if hint is float:
-        return Annotated[float, Strict(), AllowInfNan(False)]
+        return Annotated[float, Strict(), AllowInfNan(False), Field(ge=-_LARGEST, le=_LARGEST)]
     if hint in (int, str, bool):
         return Annotated[hint, Strict()]
     origin = get_origin(hint)
