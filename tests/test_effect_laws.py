@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
+from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar
 
@@ -23,6 +24,7 @@ from hovi.effects import (
     Touch,
     VelocityCost,
     ViscousFriction,
+    register,
 )
 from hovi.errors import SceneError
 from hovi.planner import plan
@@ -31,6 +33,7 @@ from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.state import State
 from hovi.task_file import Task, load_task, save_task
+from hovi.trajectory import Trajectory
 from sample_effects import powerless_effects, sample_effects
 
 Array = npt.NDArray[np.float64]
@@ -233,3 +236,61 @@ def test_a_free_duration_is_refused_where_a_clock_drives_the_scene(two_link: Rob
     scene = Scene(two_link, [sample_effects(two_link)["moving_base"]])
     with pytest.raises(SceneError, match="'moving_base' depends on the time, and a free duration"):
         plan(scene, [0.0, 0.0], [1.0, 0.0], (0.5, 2.0))
+
+
+# One's own
+
+
+@dataclasses.dataclass(frozen=True)
+class Cogging(Effect):
+    """tau_1 += c sin(12 q_1)."""
+
+    strength: float
+    key: ClassVar[str] = "cogging"
+
+    def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
+        return ca.vertcat(self.strength * ca.sin(12 * symbols.q[0]), ca.SX.zeros(robot.nv - 1))
+
+    def describe(self) -> str:
+        return f"cogging: {self.strength:g} N m"
+
+
+@pytest.fixture
+def registered() -> Iterator[None]:
+    register(Cogging)
+    yield
+    del REGISTRY["cogging"]
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_registered_effect_travels_in_scene_files_and_with_motions(
+    two_link: Robot, tmp_path: Path
+) -> None:
+    scene = Scene(two_link, [Gravity(), Cogging(0.2)])
+    ends = State([0.0, 0.0]), State([0.5, 0.5])
+    path = save_task(Task(scene, *ends, 1.0), tmp_path / "scene.toml")
+    assert load_task(path).scene.effects == scene.effects
+    motion = plan(scene, *ends, 1.0, intervals=4, limits="none").trajectory
+    motion.save(tmp_path / "motion.npz")
+    loaded = Trajectory.load(tmp_path / "motion.npz")
+    assert loaded.scene is not None
+    assert set(loaded.scene.effects) == set(scene.effects)
+    np.testing.assert_allclose(loaded.sample(0.3).tau, motion.sample(0.3).tau, rtol=1e-12)
+
+
+def test_an_effect_that_is_not_registered_is_in_no_file(two_link: Robot) -> None:
+    scene = Scene(two_link, [Cogging(0.2)])
+    jet = points(two_link)[:3]
+    added = scene.inverse_dynamics(*jet) - Scene(two_link).inverse_dynamics(*jet)
+    np.testing.assert_allclose(added[:, 0], 0.2 * np.sin(12 * jet[0][:, 0]), atol=1e-13)
+    with pytest.raises(SceneError, match="'cogging' is not registered, so that no file can hold"):
+        scene.to_dict()
+
+
+def test_a_key_belongs_to_one_effect() -> None:
+    @dataclasses.dataclass(frozen=True)
+    class Weight(Gravity):
+        pass
+
+    with pytest.raises(SceneError, match="the key 'gravity' belongs to the effect Gravity"):
+        register(Weight)

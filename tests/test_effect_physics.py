@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,7 @@ from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.simulator import simulate
 from hovi.state import State
+from hovi.tracking import play
 
 Array = npt.NDArray[np.float64]
 Jet = tuple[Array, Array, Array, Array]
@@ -414,3 +416,44 @@ def test_a_heavy_cost_on_distance_follows_its_reference(two_link: Robot) -> None
     ends = State([0.0, 0.0], [0.0, 0.9]), State([0.5, 0.3 * np.sin(3.0)], [0.0, 0.9 * np.cos(3.0)])
     motion = plan(scene, *ends, 1.0, limits="none").trajectory
     np.testing.assert_allclose(motion.q[:, 1], 0.3 * np.sin(3 * motion.t), atol=1e-3)
+
+
+# Plans and simulations read the same scene
+
+
+def test_a_plan_arrives_where_it_should_when_it_is_played(two_link: Robot) -> None:
+    tip = two_link.tip_frame
+    effects = [
+        Gravity(),
+        MOVED,
+        DryFriction(0.1, width=0.3),
+        JointSprings(0.5, 0.2),
+        Armature(0.02),
+        Payload(tip, 0.1),
+        Wrench(tip, ("sin(3*t)", 0.0, 0.5), axes="frame"),
+        Drag(tip, 0.1, wind=(2.0, 0.0, 0.0), width=0.1),
+    ]
+    scene = Scene(two_link, effects)
+    found = plan(scene, [0.0, 0.0], [0.6, 0.3], 1.0, intervals=32, limits="none")
+    assert found.success
+    played = play(scene, found.trajectory, intervals=192, inner_modes=2)
+    assert np.abs(played.joint_deviation).max() < 1e-4
+    for effect in effects:
+        without = play(scene.without(effect.key), found.trajectory, intervals=32)
+        assert np.abs(without.joint_deviation).max() > 1e-3, effect.key
+
+
+@pytest.mark.parametrize(
+    "limits", [{"base": "none", "v": 2.2}, {"base": "none", "tau": {"shoulder": 14.0}}], ids=str
+)
+def test_limits_hold_whatever_the_cost_is(two_link: Robot, limits: dict[str, Any]) -> None:
+    scene = Scene(two_link, [Gravity(), PowerCost(1.0, 0.5), ViscousFriction(0.1)])
+    free = plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits="none")
+    held = plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits=limits)
+    assert held.success
+    assert held.cost > free.cost
+    motion = held.trajectory.sample(np.linspace(0, 1, 2001))
+    if "v" in limits:
+        assert np.abs(motion.v).max() <= 2.2 * (1 + 1e-5)
+    else:
+        assert np.abs(motion.tau[:, 0]).max() <= 14.0 * (1 + 1e-5)

@@ -196,6 +196,12 @@ class Scene:
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as JSON-able data, the URDF's text included."""
+        for effect in self.effects:
+            if REGISTRY.get(effect.key) is not type(effect):
+                raise SceneError(
+                    f"effect {effect.key!r} is not registered, so that no file can hold it: put "
+                    f"@hovi.effects.register before its class {type(effect).__name__}."
+                )
         effects = {effect.key: dataclasses.asdict(effect) for effect in self.effects}
         passive = {"passive": list(self.passive)} if self.passive else {}
         return {"robot": self.robot.to_dict(), "effects": effects, **passive}

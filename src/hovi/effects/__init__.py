@@ -16,29 +16,9 @@ from hovi.effects.moving_base import MovingBase
 from hovi.effects.payload import Payload
 from hovi.effects.power_cost import PowerCost
 from hovi.effects.reference_cost import ReferenceCost
+from hovi.effects.registry import REGISTRY, register
 from hovi.effects.viscous_friction import ViscousFriction
 from hovi.effects.wrench import Wrench
-
-EFFECTS: tuple[type[Effect], ...] = (
-    Gravity,
-    ViscousFriction,
-    DryFriction,
-    Armature,
-    JointSprings,
-    JointLimitPotential,
-    Payload,
-    Wrench,
-    Drag,
-    MovingBase,
-    Custom,
-    EffortWeight,
-    VelocityCost,
-    AccelerationCost,
-    ReferenceCost,
-    PowerCost,
-)
-REGISTRY: dict[str, type[Effect]] = {effect.key: effect for effect in EFFECTS}
-"""Effects by the name of their table in a scene file."""
 
 __all__ = [
     "REGISTRY",
@@ -61,4 +41,5 @@ __all__ = [
     "VelocityCost",
     "ViscousFriction",
     "Wrench",
+    "register",
 ]
