@@ -30,7 +30,7 @@ from hovi.task_file.sentences import TomlText, first_sentence
 _LARGEST = 1e12
 """In SI units; the squares of larger numbers overflow."""
 _NUMBERS = {
-    float: f"finite number of at most {_LARGEST:g} in size",
+    float: "finite number",
     int: "whole number",
     str: "string",
     bool: "true or false",
