@@ -125,6 +125,21 @@ def test_a_time_limit_is_named_with_what_was_reached(arm_scene: Scene) -> None:
     assert "stopped early: the time limit was reached" in ended.message
 
 
+@pytest.mark.long
+def test_a_minimum_that_moves_away_is_not_given_its_small_estimate(arm_scene: Scene) -> None:
+    # fifty seconds: every finer grid leads further down a long valley
+    options = {"limits": "none", "intervals": 60, "tolerance": 1e-6}
+    found = plan(arm_scene, HANG, -HANG, 50.0, **options)  # type: ignore[arg-type]
+    accuracy = accuracy_of(found)
+    assert not accuracy.reached
+    assert "stopped early" in found.message
+    assert found.problem is not None
+    assert found.error_estimate is not None
+    every = np.ones(found.trajectory.grid.intervals, dtype=bool)
+    finer = solve(found.problem.on(found.trajectory.grid.halved(every)), found.trajectory)
+    assert abs(finer.cost / found.cost - 1) <= 10 * found.error_estimate
+
+
 def test_no_error_is_claimed_for_what_is_no_minimum(arm_scene: Scene) -> None:
     goal = State(REACH_Q, REACH_V)
     options = {"limits": "none", "max_iterations": 2, "continuation": False}
@@ -186,6 +201,7 @@ def test_a_motion_of_mixed_schemes_is_saved_and_loaded(
     loaded = Trajectory.load(file)
     t = np.linspace(0.0, 1.0, 77)
     np.testing.assert_array_equal(loaded.sample(t).tau, found.trajectory.sample(t).tau)
+    assert loaded.metadata["error_estimate"] == found.error_estimate
 
 
 # Other problems than between two states

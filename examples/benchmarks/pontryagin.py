@@ -13,7 +13,7 @@ from scipy.integrate import solve_bvp
 
 import hovi
 
-TOLERANCE = 1e-4
+TOLERANCES = 1e-4, 1e-3
 MOST_NODES = 20_000
 
 
@@ -37,8 +37,11 @@ def extremal_cost(trajectory: hovi.Trajectory) -> float | None:
     p, pt = np.moveaxis(trajectory.momenta, 1, 0)
     zeros = np.zeros((len(p), 1))
     y = np.concatenate([trajectory.q, trajectory.v, p, pt, zeros], axis=1).T * scale
-    found = solve_bvp(rhs, boundary, trajectory.t / T, y, tol=TOLERANCE, max_nodes=MOST_NODES)
-    return float(found.y[-1, -1] / T**3) if found.success else None
+    for tolerance in TOLERANCES:
+        found = solve_bvp(rhs, boundary, trajectory.t / T, y, tol=tolerance, max_nodes=MOST_NODES)
+        if found.success:
+            return float(found.y[-1, -1] / T**3)
+    return None
 
 
 class _Rates:

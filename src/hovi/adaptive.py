@@ -46,6 +46,9 @@ CAUTION = 1.5
 BLUR = 10.0
 """Relative error of the cost that limits leave, in units of their tolerance: bounds are drawn in
 by some tolerances, and may be exceeded by one."""
+CONTRADICTED = 10.0
+"""Ratio of the difference of costs on two grids and their errors beyond which it is no error: the
+motion went on to another minimum."""
 STALLED = 2
 """Rounds without a smaller error after which rounding, or the motion, sets the limit."""
 MOST_POINTS = 400_000
@@ -97,6 +100,8 @@ class _Candidate:
     error: float
     whole: float
     """As the error, with contributions to the cost that do not cancel, and by the Hamiltonian."""
+    contradicted: float = 0.0
+    """Relative difference of the cost on the next grid, where it is far more than the error."""
 
 
 @dataclass(eq=False)
@@ -117,7 +122,9 @@ class _Search:
             reason = self._ended(candidate, stalled)
             if reason:
                 break
-            candidate = self._next(candidate)
+            previous, candidate = candidate, self._next(candidate)
+            if best is previous and _contradicts(candidate, best):
+                best = self._corrected(best, candidate)
             smaller = candidate.error < 0.5 * best.error
             stalled = 0 if smaller or np.isnan(best.error) else stalled + 1
             if _better(candidate, best):
@@ -153,6 +160,12 @@ class _Search:
         error = self.tolerance.measure(estimate)
         error *= CAUTION if finer.problem.limited else 1.0
         return error, error
+
+    def _corrected(self, candidate: _Candidate, later: _Candidate) -> _Candidate:
+        """A candidate whose minimum moved away on the next grid, with what that says of it."""
+        moved = relative_difference(candidate.solution.cost, later.solution.cost)
+        known = moved if self.tolerance.quantity is Quantity.COST else np.nan
+        return dataclasses.replace(candidate, error=known, contradicted=moved)
 
     def _enough(self, candidate: _Candidate) -> bool:
         size = self.tolerance.size
@@ -190,7 +203,7 @@ class _Search:
             grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
             return self._solved(problem.on(grid), candidate.solution.trajectory)
         rho = _decay(candidate.solution, finer)
-        grid = refined(problem.grid, rho, self._demands(candidate, finer))
+        grid = refined(problem.grid, rho, self._demands(candidate, finer), problem.robot.nv)
         if _same(grid, problem.grid):
             grid = finer_grid(grid)
         fine = problem.on(grid)
@@ -229,6 +242,10 @@ class _Search:
         solution, finer = chosen.solution, chosen.finer
         if finer is None and not reason:
             reason = "no finer solution was found nearby"
+        known = None if finer is None else _error_of_cost(solution, finer)
+        if known is not None and chosen.contradicted > 0:
+            known, finer = max(known, chosen.contradicted), None
+            reason = f"{reason}, and the minimum moves when the grid becomes finer"
         reached = chosen.error <= self.tolerance.size
         accuracy = Accuracy(
             self.tolerance,
@@ -238,14 +255,15 @@ class _Search:
             tuple(self.rounds),
             None if finer is None else partial(estimate_against, solution, finer, self._frame),
         )
-        known = None if finer is None else _error_of_cost(solution, finer)
         steps = sum(done.nit for done in self.rounds)
         message = solution.message
         if solution.success:
             message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"
             message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
+        told = {**solution.trajectory.metadata, "error_estimate": known}
         return dataclasses.replace(
             solution,
+            trajectory=dataclasses.replace(solution.trajectory, metadata=told),
             message=f"{message.removesuffix('.')}; {accuracy}",
             nit=steps,
             error_estimate=known,
@@ -313,6 +331,16 @@ def _error_of_cost(solution: Solution, finer: FinerSolution) -> float:
 def _contributions(finer: FinerSolution) -> Array:
     """What each interval adds to the error of the cost, relative, without its sign."""
     return np.asarray(np.abs(finer.gains) / max(abs(finer.cost), np.finfo(float).tiny))
+
+
+def _contradicts(later: _Candidate, known: _Candidate) -> bool:
+    """Whether a finer grid's cost is another by far more than both errors."""
+    if known.finer is None:
+        return False
+    errors = _error_of_cost(known.solution, known.finer)
+    if later.finer is not None:
+        errors += _error_of_cost(later.solution, later.finer)
+    return relative_difference(known.finer.cost, later.solution.cost) > CONTRADICTED * errors
 
 
 def _better(one: _Candidate, other: _Candidate) -> bool:

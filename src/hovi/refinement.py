@@ -29,8 +29,9 @@ DEGREES = np.array([0, 1, 2, 3, 4, 6, 8, 10, 12])
 together."""
 OVERHEAD = 1.0
 """What an interval costs besides its quadrature points, in points."""
-GROUP = 24.0
-"""What a scheme costs besides, since its intervals are evaluated on their own, in points."""
+GROUP = 900.0
+"""What a scheme costs besides, since its intervals are evaluated on their own: in points, for one
+joint. A point's cost grows like the square of the joints, this does not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +66,14 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
     return np.clip(rho, *DECAY)
 
 
-def refined(grid: Grid, rho: Array, demands: Sequence[Demand]) -> Grid:
+def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) -> Grid:
     """The cheapest grid that is foreseen to meet every demand.
 
-    rho: decay of each interval. An interval whose demands nothing meets is cut into four.
+    rho: decay of each interval. joints: degrees of freedom of what moves. An interval whose demands nothing meets is cut into four.
     """
     degrees = np.array([scheme.inner_modes for scheme in grid.schemes])
     pieces, chosen = _choice(degrees, rho, demands)
-    chosen = _fewer_schemes(pieces, chosen)
+    chosen = _fewer_schemes(pieces, chosen, GROUP / joints**2)
     steps = np.repeat(grid.steps / pieces, pieces)
     return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(chosen, pieces)))
 
@@ -97,15 +98,18 @@ def _choice(degrees: Index, rho: Array, demands: Sequence[Demand]) -> tuple[Inde
     return pieces, np.where(hopeless, np.maximum(degrees, 2), more[np.arange(len(rho)), d])
 
 
-def _fewer_schemes(pieces: Index, chosen: Index) -> Index:
-    """Inner modes raised to the next of a few values that cost the least together."""
+def _fewer_schemes(pieces: Index, chosen: Index, group: float) -> Index:
+    """Inner modes raised to the next of a few values that cost the least together.
+
+    group: what a value costs besides its points, in points.
+    """
     values = np.unique(chosen)
     best, least = chosen, np.inf
     for size in range(1, min(len(values), 4) + 1):
         for kept in itertools.combinations(values[:-1], size - 1):
             levels = np.array([*kept, values[-1]])
             raised = levels[np.searchsorted(levels, chosen)]
-            work = float(np.sum(pieces * (raised + 2))) + GROUP * size
+            work = float(np.sum(pieces * (raised + 2))) + group * size
             if work < least:
                 best, least = raised, work
     return best
