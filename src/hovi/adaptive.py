@@ -113,23 +113,34 @@ class _Search:
     deadline: float | None
     told: Told | None
     rounds: list[Round] = field(default_factory=list)
+    best: _Candidate = field(init=False)
 
     def run(self, solution: Solution) -> Solution:
         """Refine until the error is small enough, or something ends it."""
-        best = candidate = self._estimated(solution)
-        stalled, reason = 0, ""
+        self.best = _Candidate(solution, None, np.nan, np.nan)
+        try:
+            reason = self._refine(solution)
+        except KeyboardInterrupt:
+            reason = "it was interrupted"
+        return self._finished(self.best, reason)
+
+    def _refine(self, solution: Solution) -> str:
+        """The rounds; returns why they ended early, or ""."""
+        candidate = self.best = self._estimated(solution)
+        stalled = 0
         while not self._enough(candidate):
             reason = self._ended(candidate, stalled)
             if reason:
-                break
+                return reason
             previous, candidate = candidate, self._next(candidate)
-            if best is previous and _contradicts(candidate, best):
-                best = self._corrected(best, candidate)
-            smaller = candidate.error < 0.5 * best.error
-            stalled = 0 if smaller or np.isnan(best.error) else stalled + 1
-            if _better(candidate, best):
-                best = candidate
-        return self._finished(candidate if self._enough(candidate) else best, reason)
+            if self.best is previous and _contradicts(candidate, previous):
+                self.best = self._corrected(previous, candidate)
+            smaller = candidate.error < 0.5 * self.best.error
+            stalled = 0 if smaller or np.isnan(self.best.error) else stalled + 1
+            if _better(candidate, self.best):
+                self.best = candidate
+        self.best = candidate
+        return ""
 
     def _solved(self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath) -> _Candidate:
         """Solve and estimate."""
@@ -255,7 +266,7 @@ class _Search:
             tuple(self.rounds),
             None if finer is None else partial(estimate_against, solution, finer, self._frame),
         )
-        steps = sum(done.nit for done in self.rounds)
+        steps = sum(done.nit for done in self.rounds) or solution.nit
         message = solution.message
         if solution.success:
             message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"

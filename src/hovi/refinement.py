@@ -69,7 +69,8 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
 def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) -> Grid:
     """The cheapest grid that is foreseen to meet every demand.
 
-    rho: decay of each interval. joints: degrees of freedom of what moves. An interval whose demands nothing meets is cut into four.
+    rho: decay of each interval. joints: degrees of freedom of what moves.
+    An interval whose demands nothing meets is cut into four.
     """
     degrees = np.array([scheme.inner_modes for scheme in grid.schemes])
     pieces, chosen = _choice(degrees, rho, demands)
