@@ -76,7 +76,7 @@ FLOORS = [
     {"inverse_kinematics"},
     {"goals", "scene_account"},
     {"scene"},
-    {"discrete_lagrangian", "lagrangians"},
+    {"free_fall", "discrete_lagrangian", "lagrangians"},
     {"action_structure"},
     {"trajectory", "segment_lagrangian"},
     {"guess", "legendre_transforms", "motion_error", "refinement"},

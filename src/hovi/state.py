@@ -25,7 +25,8 @@ class State:
     q: configuration, shape (nq,), in [rad] or [m].
     v: velocity, shape (nv,), per [s]; zero when not given.
     free, free_velocity: joints whose configuration or velocity is left to the optimiser, by name;
-        what q and v say of them is the first guess. ALL stands for every joint.
+        what q and v say of them is the first guess. ALL stands for every joint, "joint[i]" for one
+        coordinate: 0 to 2 of a free base move its place along its own axes, 3 to 5 turn it.
     turns: of a goal, full turns that the first guess makes on top of the shortest way, by joint: a
         whole number where one coordinate turns, a rotation vector in the body's axes whose length
         is a whole number for orientations.
@@ -95,6 +96,9 @@ def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
     for joint in (joints,) if isinstance(joints, str) else joints:
         if joint == ALL:
             return np.ones(robot.nv, dtype=bool)
+        if joint in robot.coordinate_names:
+            chosen[robot.coordinate_names.index(joint)] = True
+            continue
         if joint not in robot.joint_names:
             hint = nearest(str(joint), (*robot.joint_names, ALL))
             raise InputError(f"{state}.{key}: robot {robot.name!r} has no joint {joint!r}: {hint}")
