@@ -45,12 +45,12 @@ def test_the_spacecraft_ends_turned_and_its_place_follows() -> None:
     assert np.linalg.norm(pin.log3(turn)) < 1e-12
     np.testing.assert_allclose(motion.q[-1, 8:], goal[8:], atol=1e-14)
     assert np.linalg.norm(motion.q[-1, :3]) > 1e-3
-    np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-9)
+    np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-7)
 
 
 def test_the_six_momenta_of_the_action_are_equal_at_every_node() -> None:
     """Discrete Noether, the multipliers of the base included; the goal fixes how it is turned."""
-    J = momentum_map(reorientation(16))
+    J = momentum_map(reorientation(8))
     size = np.max(np.abs(J))
     assert size > 1e-3
     assert np.max(np.ptp(J, axis=0)) < 1e-10 * size
@@ -60,7 +60,7 @@ def test_the_mechanical_momentum_drifts_by_the_order_of_the_scheme() -> None:
     """A motion that keeps its equations at the points only keeps momentum up to quadrature."""
     model = spacecraft().scene.model
     drifts = []
-    for N in (8, 16, 32):
+    for N in (16, 32, 64):
         motion, data = reorientation(N).trajectory, model.createData()
         h = [
             pin.computeCentroidalMomentum(model, data, q, v).vector.copy()
@@ -117,12 +117,11 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
 def test_a_redundant_goal_is_met() -> None:
     """Everything is fixed, in agreement with what free fall keeps."""
     free = reorientation(16)
-    task, end = spacecraft(), free.trajectory.q[-1]
-    again = hovi.plan(
-        task.scene, task.start, end, task.duration, limits="none", guess=free.trajectory
-    )
+    end, problem = free.trajectory.q[-1], free.problem
+    again = hovi.solve(problem.between(problem.start, hovi.State(end)), free.trajectory)
     assert again.success, again.message
-    assert again.cost == pytest.approx(free.cost, rel=1e-6)
+    assert again.cost == pytest.approx(free.cost, rel=1e-9)
+    np.testing.assert_allclose(again.trajectory.q[-1], end, atol=1e-8)
 
 
 def test_a_base_with_thrusters_may_go_anywhere() -> None:

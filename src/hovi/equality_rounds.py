@@ -37,6 +37,8 @@ NODE_MISS = 1e-11
 """Residual of a condition that counts as met, in [rad] or [m]."""
 CLOSE = 1e-6
 """The same for a round whose residuals rounding keeps from falling further."""
+SOFTER = 4
+"""Powers of ten by which a penalty may be lowered for the last steps."""
 FIRST_DECREASE = 1e-3
 """Relative decrease that a first round may leave; later rounds leave what their residual allows."""
 
@@ -107,6 +109,48 @@ def satisfy(
     if result.stop is Stop.STATIONARY and not _met(residuals, CLOSE, CLOSE):
         reason = _why(problem, path, residuals)
     return Satisfied(result, multipliers, residuals, reason)
+
+
+def polished(
+    problem: TrajectoryProblem, path: DiscretePath, known: Multipliers, steps: int
+) -> tuple[DiscretePath, Multipliers]:
+    """Newton steps from a minimum, each with the multipliers that the last one leads to.
+
+    With the least penalty that leaves the Hessian positive definite: rounding in a passive joint's
+    torque reaches its multiplier, and so the momenta, times the penalty. What the penalties exert
+    besides belongs to the multipliers that are returned.
+    """
+    objective = ActionObjective(problem, multipliers=known)
+    residuals = objective.residuals(path)
+    first = path, known.updated(residuals, problem.passive)
+    allowed = max(TORQUE_SHARE, residuals.torque_share), max(NODE_MISS, residuals.node_miss)
+    known = _softest(problem, path, known) if steps > 0 else known
+    for _ in range(steps):
+        known = known.updated(
+            ActionObjective(problem, multipliers=known).residuals(path), problem.passive
+        )
+        objective = ActionObjective(problem, multipliers=known)
+        model = objective.model(path, None, None)
+        factor = model.factor(0.0)
+        if factor is None:
+            return first
+        path = objective.retract(path, factor.solve(-model.gradient), model)
+    residuals = objective.residuals(path)
+    if not _met(residuals, *allowed):
+        return first
+    return path, known.updated(residuals, problem.passive)
+
+
+def _softest(problem: TrajectoryProblem, path: DiscretePath, known: Multipliers) -> Multipliers:
+    """The least penalty of torques, by tens, with which the Hessian is positive definite."""
+    softest = known
+    for _ in range(SOFTER):
+        softer = softest.stiffer(0.1, 1.0)
+        model = ActionObjective(problem, multipliers=softer).model(path, None, None)
+        if model.factor(0.0) is None:
+            break
+        softest = softer
+    return softest
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:

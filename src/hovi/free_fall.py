@@ -81,6 +81,22 @@ def free_fall_contradiction(
     return ""
 
 
+def without_redundancy(scene: Scene, free: Mask) -> Mask:
+    """Which components of both ends are free, with those freed that follow from what is kept.
+
+    The base's place follows where all else of the goal's configuration is fixed, and its velocity
+    where all joint rates are. Equations that repeat others would have no unique multipliers.
+    """
+    if not falls_freely(scene) or free[0].any():
+        return free
+    freed = free.copy()
+    if not free[1, 0].any():
+        freed[1, 0, :3] = True
+    if not free[1, 0, 3:].any() and not free[1, 1, 6:].any():
+        freed[1, 1, :6] = True
+    return freed
+
+
 def _momentum(scene: Scene, q: Array, v: Array, free: Mask, expected: Kept, base: str) -> str:
     """Why no choice of the free velocities has the momenta that are kept."""
     data = scene.model.createData()

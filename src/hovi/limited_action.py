@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 from functools import cached_property
 
@@ -90,12 +89,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
             PointTerms(force[p, :k], zero[p, :k], force[p, k:], zero[p, k:]) for p in self._parts
         ]
         known = self.action.multipliers
-        if known is None:
-            return terms
-        return [
-            dataclasses.replace(term, effort_gradient=term.effort_gradient + torque)
-            for term, torque in zip(terms, known.torque, strict=True)
-        ]
+        return terms if known is None else known.added_to(terms)
 
     def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
         """Change of the action and of the bounded outputs, to first order."""

@@ -240,7 +240,7 @@ class _Search:
         self, outcome: BoundedOutcome[DiscretePath], reason: str, excess: float
     ) -> LimitedOutcome:
         """The result of the stages."""
-        objective = self._objective(self.multipliers)
+        objective = self._objective(self._exerted(outcome.x))
         return LimitedOutcome(
             self.problem,
             outcome.x,
@@ -253,6 +253,13 @@ class _Search:
             reason or self.unmet,
             excess,
         )
+
+    def _exerted(self, path: DiscretePath) -> Multipliers | None:
+        """The multipliers of the equations, with what their penalties exert besides."""
+        if self.multipliers is None:
+            return None
+        action = self._objective(self.multipliers).action
+        return self.multipliers.updated(action.residuals(path), self.problem.passive)
 
     def _halved(self, excess: Excess) -> BoundedOutcome[DiscretePath]:
         """Solve again with the intervals halved in which a limit is exceeded, and their neighbours.

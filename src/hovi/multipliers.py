@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.grid import DiscretePath
+from hovi.lagrangian import PointTerms
 from hovi.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
@@ -79,6 +80,20 @@ class Multipliers:
         pairs = zip(self.nodes, residuals.nodes, strict=True)
         nodes = [mu + self.node_penalty * c for mu, c in pairs]
         return dataclasses.replace(self, torque=torque, nodes=nodes)
+
+    @property
+    def forces(self) -> list[PointTerms]:
+        """What they exert on the torques at the quadrature points."""
+        return self.added_to(None)
+
+    def added_to(self, terms: list[PointTerms] | None) -> list[PointTerms]:
+        """What limits add at the points, and the forces on the torques."""
+        if terms is None:
+            return [PointTerms.of_effort(force) for force in self.torque]
+        return [
+            dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
+            for term, force in zip(terms, self.torque, strict=True)
+        ]
 
     def stiffer(self, torque: float, node: float) -> Multipliers:
         """The same multipliers with larger penalties, by the given factors."""

@@ -13,7 +13,7 @@ from hovi.conditions import NodeCondition
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, ModelError
 from hovi.frame_goal import FrameGoal
-from hovi.free_fall import free_fall_contradiction
+from hovi.free_fall import free_fall_contradiction, without_redundancy
 from hovi.goals import Via, met, via_conditions
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import Boundary, Curve, path_on_grid
@@ -82,6 +82,7 @@ class TrajectoryProblem:
             self.scene, self.boundary, self.free_ends, self.grid.duration
         )
         object.__setattr__(self, "unreachable", unreachable)
+        object.__setattr__(self, "free_ends", without_redundancy(self.scene, self.free_ends))
         object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
 
     @cached_property

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from hovi.blas_threads import one_blas_thread
 from hovi.budget import TimeLeft
 from hovi.carried_momenta import carried_momenta
-from hovi.equality_rounds import satisfy
+from hovi.equality_rounds import polished, satisfy
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
@@ -40,6 +40,10 @@ CORRECTIONS = 6
 """Quasi-Newton steps that may correct the guess of a motion between other states."""
 DECREASE = 1e-9
 """Relative decrease that the last step but one may predict; the last has the exact Hessian."""
+
+
+POLISHES = 8
+"""Newton steps after the last round of equations, until only rounding is left."""
 
 
 class Status(StrEnum):
@@ -255,7 +259,9 @@ def _with_equations(
     status, message = _verdict(outcome, n_neg)
     if rounds.reason:
         status, message = Status.INFEASIBLE, f"{rounds.reason}."
-    forces, value = objective.forces, outcome.value
+    polish = POLISHES if status is Status.MINIMUM else 0
+    outcome.x, known = polished(problem, outcome.x, rounds.multipliers, polish)
+    forces, value = known.forces, problem.ld.action(outcome.x)
     return _Answer(problem, outcome.x, value, status, message, nit, n_neg, history, forces)
 
 

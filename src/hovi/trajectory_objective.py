@@ -150,7 +150,7 @@ class ActionObjective(Objective[DiscretePath]):
         curvatures: weights of the curvature of tau, multipliers of equations included.
         """
         if self.multipliers is not None:
-            terms = _with_forces(terms, self.multipliers.torque)
+            terms = self.multipliers.added_to(terms)
         self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
         if self.multipliers is not None:
             self._add_conditions(x, self._expansion, self.multipliers)
@@ -177,11 +177,6 @@ class ActionObjective(Objective[DiscretePath]):
         metric = self.structure.metric["regular"]
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
-
-    @property
-    def forces(self) -> list[PointTerms] | None:
-        """Multipliers of the passive joints' torques at the quadrature points; None without."""
-        return None if self.multipliers is None else _with_forces(None, self.multipliers.torque)
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """What conditions at nodes add to the intervals that have these nodes."""
@@ -245,13 +240,3 @@ def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> Discrete
     weight = lagrangian.weight.copy()
     weight[problem.passive] = multipliers.torque_penalty
     return DiscreteLagrangian(dataclasses.replace(lagrangian, weight=weight), problem.grid)
-
-
-def _with_forces(terms: list[PointTerms] | None, forces: list[Array]) -> list[PointTerms]:
-    """What limits add at the points, and the forces of multipliers on the torques."""
-    if terms is None:
-        return [PointTerms.of_effort(force) for force in forces]
-    return [
-        dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
-        for term, force in zip(terms, forces, strict=True)
-    ]
