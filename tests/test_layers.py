@@ -91,6 +91,7 @@ FLOORS = [
     },
     {
         "multipliers",
+        "non_finite",
         "tolerance",
         "stepper",
         "variational_error",

@@ -15,6 +15,7 @@ from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import check_path, regularised
 from hovi.model_files import example
+from hovi.non_finite import non_finite_sentence
 from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
 from hovi.rigid_body import casadi_functions
@@ -378,7 +379,7 @@ def test_an_interrupt_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert_fits(problem, stopped)
 
 
-def test_a_guess_without_a_finite_cost_is_diverged(arm_scene: Scene) -> None:
+def test_a_guess_without_a_finite_cost_is_diverged_and_says_where(arm_scene: Scene) -> None:
     problem = problem_on(arm_scene)
     path = guess_path(problem, "cubic")
     inner = path.inner.copy()
@@ -387,6 +388,18 @@ def test_a_guess_without_a_finite_cost_is_diverged(arm_scene: Scene) -> None:
         solution = solve(problem, dataclasses.replace(path, inner=inner))
     assert (solution.success, solution.status) == (False, Status.DIVERGED)
     assert "hand in another guess" in solution.message
+    assert "the torque of joint 'shoulder' is nan at t = 0.09" in solution.message
+    assert "(interval 3)" in solution.message
+    inner[3, 1, 1] = np.inf
+    assert "the acceleration of joint" in non_finite_sentence(
+        problem, dataclasses.replace(path, inner=inner)
+    )
+    v = path.v.copy()
+    v[5, 1] = np.nan
+    assert non_finite_sentence(problem, dataclasses.replace(path, v=v)) == (
+        "the velocity of joint 'elbow' is nan at node 5 of 32 (t = 0.1562 s)"
+    )
+    assert non_finite_sentence(problem, path) == ""
 
 
 @pytest.mark.parametrize("guess", ["cubic", "minimum-jerk"])

@@ -24,6 +24,7 @@ from hovi.guess import check_path, moved, named_curve, stretched, with_turns
 from hovi.lagrangian import PointTerms
 from hovi.limited_solver import LimitedOutcome, solve_limited
 from hovi.multipliers import Multipliers
+from hovi.non_finite import non_finite_sentence
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
@@ -227,7 +228,7 @@ def _without_limits(
     objective = ActionObjective(problem, structure=problem.structure)
     outcome = minimize(objective, path, options, report)
     n_neg, outcome = _certify(objective, outcome)
-    status, message = _verdict(outcome, n_neg)
+    status, message = _verdict(problem, outcome, n_neg)
     nit, history = outcome.iterations, outcome.history
     return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None)
 
@@ -256,7 +257,7 @@ def _with_equations(
     n_neg, outcome = _certify(objective, rounds.result)
     nit = len(history)
     outcome.value, outcome.iterations = problem.ld.action(outcome.x), nit
-    status, message = _verdict(outcome, n_neg)
+    status, message = _verdict(problem, outcome, n_neg)
     if rounds.reason:
         status, message = Status.INFEASIBLE, f"{rounds.reason}."
     polish = POLISHES if status is Status.MINIMUM else 0
@@ -360,10 +361,16 @@ def _certify(
     return 0, outcome
 
 
-def _verdict(outcome: Outcome[DiscretePath], n_neg: int) -> tuple[Status, str]:
+def _verdict(
+    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
+) -> tuple[Status, str]:
     """Status and sentence of an outcome."""
-    if not np.isfinite(outcome.value):
-        return Status.DIVERGED, "the cost of the guess is not finite; hand in another guess."
+    if outcome.stop is Stop.DIVERGED:
+        reason = non_finite_sentence(problem, outcome.x)
+        if reason:
+            return Status.DIVERGED, (
+                f"{reason}, after {outcome.iterations} steps; hand in another guess."
+            )
     left = "".join(
         f" A saddle of cost {cost:.10g} was left along negative curvature."
         for cost in outcome.saddles_left
