@@ -77,7 +77,7 @@ class SceneAccount:
     def lines(self) -> list[str]:
         """The account as text, a line for each effect."""
         first = (
-            f"cost: {1e6 * self.seconds:.3g} us per point with derivatives, "
+            f"cost: {_microseconds(self.seconds)} per point with derivatives, "
             f"{self.instructions} instructions in the expression graph"
         )
         if not self.effects:
@@ -87,8 +87,13 @@ class SceneAccount:
         return [first, head, *(self._line(cost, width) for cost in self.effects)]
 
     def _line(self, cost: EffectCost, width: int) -> str:
-        without = f"{1e6 * cost.seconds_without:.3g} us"
+        without = _microseconds(cost.seconds_without)
         return f"  {cost.key:{width}}  {cost.touches:12}  {cost.instructions:>+12d}  {without:>11}"
+
+
+def _microseconds(seconds: float) -> str:
+    us = 1e6 * seconds
+    return f"{us:.3g} us" if us < 1000 else f"{us:.0f} us"
 
 
 def account(scene: AccountedScene) -> SceneAccount:

@@ -44,6 +44,10 @@ def plan(
     certificate: Annotated[
         bool, typer.Option(help="Say what is known of the plan: errors, energy, a replay.")
     ] = True,
+    compile: Annotated[
+        bool,
+        typer.Option("--compile", help="Machine code for what CasADi evaluates; kept for later."),
+    ] = False,
     tolerance: Annotated[
         str | None,
         typer.Option(
@@ -79,17 +83,20 @@ def plan(
     overrides: dict[str, Any] = {k: value for k, value in chosen.items() if value is not None}
     if scheme is not None or intervals is not None:
         overrides["tolerance"] = None
-    task = _task(scene, overrides)
+    task = _task(scene, overrides, compile)
     raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json, certificate))
 
 
-def _task(scene: str, overrides: dict[str, Any]) -> Task:
+def _task(scene: str, overrides: dict[str, Any], compile: bool) -> Task:
     import dataclasses
 
     from hovi.cli.files import find_scene
     from hovi.task_file import load_task
 
-    return dataclasses.replace(load_task(find_scene(scene)), **overrides)
+    task = load_task(find_scene(scene))
+    if compile:
+        overrides["scene"] = dataclasses.replace(task.scene, compile=True)
+    return dataclasses.replace(task, **overrides)
 
 
 def _guess(guess: str) -> str | Trajectory:

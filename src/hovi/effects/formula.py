@@ -84,7 +84,7 @@ class _Reader:
         found = self.symbols.get(name)
         if isinstance(found, Mapping):
             raise self.refused(
-                f'needs a joint behind {name!r}, as in {name}["{next(iter(found))}"]'
+                f'needs a joint behind {name!r}, as in {name}["{next(iter(found), "joint")}"]'
             )
         if found is None:
             names = [*self.symbols, "pi", *_FUNCTIONS]
