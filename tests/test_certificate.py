@@ -14,10 +14,11 @@ from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
 from hovi.nodal_hamiltonian import depends_on_time, nodal_hamiltonian
 from hovi.planner import plan
-from hovi.robot import Robot
+from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.solver import Solution, solve
 from hovi.state import State
+from manifold_robots import with_arm
 from paper_arm import HANG, REACH_Q, REACH_V, effort
 
 GOAL = State(REACH_Q, REACH_V)
@@ -206,3 +207,21 @@ def test_a_force_on_a_link_is_part_of_the_replay(two_link: Robot) -> None:
         replay_dynamics(reach(Scene(two_link, effects=[Gravity(9.8), push])).trajectory).angle
         < 1e-8
     )
+
+
+@pytest.mark.parametrize("base", ["free-flyer", "spherical", "continuous"])
+def test_joints_on_groups_are_certified_like_others(base: str) -> None:
+    robot = load_robot(with_arm(base))
+    scene = Scene(robot, effects=[Gravity()])
+    turn = 0.3 * np.random.default_rng(1).uniform(-1, 1, robot.nv)
+    goal = robot.integrate(robot.neutral(), turn)
+    found = plan(scene, robot.neutral(), goal, 1.0, limits="none", tolerance=1e-5)
+    certificate = certify(found)
+    assert found.accuracy is not None
+    assert found.accuracy.reached
+    assert certificate.missing == {}
+    assert certificate.hamiltonian is not None
+    assert certificate.hamiltonian.spread < 1e-7
+    assert certificate.replay is not None
+    assert certificate.replay.angle < 1e-9
+    assert certificate.replay.slide < 1e-9

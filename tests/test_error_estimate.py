@@ -20,6 +20,7 @@ from hovi.scene import Scene
 from hovi.schemes import by_name, galerkin
 from hovi.solver import Solution, solve
 from hovi.state import State
+from manifold_robots import BASES, with_arm
 from paper_arm import HANG, REACH_Q, REACH_V, REST, extremal
 
 UR5_START = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
@@ -178,6 +179,13 @@ def test_turning_and_sliding_joints_are_told_apart() -> None:
 
     robot = cart(joint(1, "prismatic") + joint(2, "revolute"))
     np.testing.assert_array_equal(sliding_coordinates(robot), [True, False])
+
+
+def test_lengths_of_bases_are_told_from_their_angles() -> None:
+    slides = {base: sliding_coordinates(load_robot(with_arm(base))) for base in BASES}
+    assert slides["free-flyer"].tolist() == [True] * 3 + [False] * 5 + [True]
+    assert slides["planar"].tolist() == [True] * 2 + [False] * 3 + [True]
+    assert slides["spherical"].tolist() == [False] * 5 + [True]
 
 
 def cart(body: str) -> Robot:

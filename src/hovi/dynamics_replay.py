@@ -79,7 +79,7 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         tau = trajectory.sample_intervals(k, np.full(N, s)).tau
         t = trajectory.t[:-1] + s * trajectory.grid.steps
         a = forward(robot.integrate(start, x), hv / h, tau, t)
-        return np.concatenate([hv, h * h * a]).ravel()
+        return np.concatenate([chart_rates(robot, start, x, hv), h * h * a]).ravel()
 
     first = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
     done = solve_ivp(rates, (0.0, 1.0), first, "DOP853", t_eval=[1.0], rtol=RELATIVE, atol=ABSOLUTE)
@@ -95,6 +95,20 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         name,
         sliding_coordinates(robot),
     )
+
+
+def chart_rates(robot: Robot, origin: Array, x: Array, v: Array) -> Array:
+    """x' of q = origin (+) x that moves with velocity v: v itself for ordinary joints, (M, nv).
+
+    Elsewhere v = D x' with the derivative D of (+) by x, in the tangent space at q.
+    """
+    if all(joint.nq == joint.nv or joint.nv == 1 for joint in list(robot.model.joints)[1:]):
+        return v
+    rates = np.empty_like(v)
+    for i, (q, dq) in enumerate(zip(origin, x, strict=True)):
+        D = pin.dIntegrate(robot.model, q, dq, pin.ArgumentPosition.ARG1)
+        rates[i] = np.linalg.solve(D, v[i])
+    return rates
 
 
 class _ForwardDynamics:
@@ -140,8 +154,4 @@ def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:
     scene = trajectory.scene
     if scene is None:
         raise InputError("the motion was saved without its scene")
-    for joint in list(scene.robot.model.joints)[1:]:
-        if joint.nq != joint.nv and joint.nv > 1:
-            name = scene.robot.model.names[joint.id]
-            raise InputError(f"the rates of joint {name!r} are not its velocities")
     return scene, scene.robot

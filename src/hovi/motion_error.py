@@ -17,6 +17,8 @@ Index = npt.NDArray[np.intp]
 
 LEAST_PLACES = 9
 """Places of an interval at which two motions are compared, both ends included, at the least."""
+LENGTHS_OF = {"JointModelFreeFlyer": 3, "JointModelTranslation": 3, "JointModelPlanar": 2}
+"""How many coordinates of a joint are lengths, the first ones, where not all or none are."""
 _SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
 
 
@@ -124,8 +126,7 @@ def sliding_coordinates(robot: Robot) -> npt.NDArray[np.bool_]:
         coordinates = slice(joint.idx_v, joint.idx_v + joint.nv)
         name = joint.shortname()
         sliding[coordinates] = name.startswith(_SLIDING)
-        if name == "JointModelFreeFlyer":
-            sliding[joint.idx_v : joint.idx_v + 3] = True
+        sliding[joint.idx_v : joint.idx_v + LENGTHS_OF.get(name, 0)] = True
     return sliding
 
 
