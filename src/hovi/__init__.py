@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from hovi.certificate import Certificate as Certificate
     from hovi.certificate import certify as certify
     from hovi.chain_urdf import chain as chain
+    from hovi.clearance import Clearance as Clearance
     from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
     from hovi.error_estimate import estimate_error as estimate_error
     from hovi.errors import HoviError as HoviError
@@ -38,6 +39,9 @@ if TYPE_CHECKING:
     from hovi.limits import Limits as Limits
     from hovi.model_files import example as example
     from hovi.motion_error import MotionError as MotionError
+    from hovi.obstacles import Box as Box
+    from hovi.obstacles import Capsule as Capsule
+    from hovi.obstacles import Sphere as Sphere
     from hovi.planner import plan as plan
     from hovi.playback import replay as replay
     from hovi.plotting import plot as plot
@@ -70,8 +74,11 @@ if TYPE_CHECKING:
 
 _PLACES = {
     "Accuracy": "hovi.tolerance",
+    "Box": "hovi.obstacles",
+    "Capsule": "hovi.obstacles",
     "CasadiLagrangian": "hovi.lagrangian",
     "Certificate": "hovi.certificate",
+    "Clearance": "hovi.clearance",
     "DiscreteLagrangian": "hovi.discrete_lagrangian",
     "DiscretePath": "hovi.grid",
     "ExactDiscreteLagrangian": "hovi.exact_discrete_lagrangian",
@@ -86,6 +93,7 @@ _PLACES = {
     "SchemeLagrangian": "hovi.segment_lagrangian",
     "Simulation": "hovi.simulator",
     "Solution": "hovi.solver",
+    "Sphere": "hovi.obstacles",
     "State": "hovi.state",
     "Status": "hovi.solver",
     "Symmetry": "hovi.symmetry",

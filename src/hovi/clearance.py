@@ -50,9 +50,11 @@ class Clearance:
             if names.count(name) > 1:
                 raise InputError(f"two obstacles are called {name!r}; give each its own name.")
         object.__setattr__(self, "obstacles", named)
-        if isinstance(self.margin, bool) or not (math.isfinite(self.margin) and self.margin >= 0):
+        number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
+        if not (number and math.isfinite(self.margin) and self.margin >= 0):
             raise InputError(
-                f"the margin from obstacles is a length of 0 or more, in metres, got {self.margin}."
+                "the margin from obstacles is a length of 0 or more, in metres, got "
+                f"{self.margin!r}."
             )
 
     @property

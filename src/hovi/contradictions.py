@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.clearance_check import in_words
 from hovi.limits import KINDS, NAMES, Limits, unit_of
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
+
+ROUNDING = 1e-9
+"""By how much an end may be nearer than the margin, in [m]."""
 
 
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
@@ -29,7 +33,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
             sentence = _outside(problem.robot, end, row, state[row], limits, held)
             if sentence:
                 return sentence
-    return _too_short(problem, limits, names)
+    return _too_near(problem) or _too_short(problem, limits, names)
 
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
@@ -65,6 +69,25 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, he
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
         f"{end} or widen them"
     )
+
+
+def _too_near(problem: TrajectoryProblem) -> str:
+    """Which end is inside an obstacle, or nearer to one than the margin; "" where none is."""
+    if problem.distances is None or problem.clearance is None:
+        return ""
+    margin, pairs = float(problem.clearance.margin), problem.distances.pairs
+    for i, end in enumerate(("start", "goal")):
+        if problem.free_ends[i, 0].any():
+            continue
+        d = problem.distances.values(problem.boundary[2 * i][None])[0]
+        k = int(np.argmin(d))
+        if d[k] < margin - ROUNDING:
+            needed = "" if d[k] < 0 else f", less than the margin of {margin:g} m"
+            return (
+                f"at the {end} {pairs[k]} {in_words(float(d[k]))}{needed}; move the {end} or what "
+                "is in its way"
+            )
+    return ""
 
 
 def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:

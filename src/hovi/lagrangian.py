@@ -80,15 +80,17 @@ class PointTerms:
     """What limits add to an effort Lagrangian's derivatives at P points.
 
     With x = (q, v, a), gradient: jet_gradient + J^T effort_gradient; Hessian: diag(jet_weight) +
-    J^T diag(effort_weight) J.
+    J^T diag(effort_weight) J, and configuration_weight in its block of q.
 
     jet_gradient, jet_weight: shape (P, 3 nv). effort_gradient, effort_weight: shape (P, nv).
+    configuration_weight: shape (P, nv, nv); nothing when None.
     """
 
     jet_gradient: Array
     jet_weight: Array
     effort_gradient: Array
     effort_weight: Array
+    configuration_weight: Array | None = None
 
     @classmethod
     def of_effort(cls, gradient: Array) -> PointTerms:
@@ -214,6 +216,8 @@ class EffortLagrangian(Lagrangian):
             gradient += terms.jet_gradient
             diagonal = np.arange(hessian.shape[1])
             hessian[:, diagonal, diagonal] += terms.jet_weight
+            if terms.configuration_weight is not None:
+                hessian[:, : self.nv, : self.nv] += terms.configuration_weight
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV

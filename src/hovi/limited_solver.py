@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.clearance_check import approach_along, approach_sentence
+from hovi.clearance_outputs import CUSHION, SCALE, ClearanceOutputs
 from hovi.contradictions import contradiction, static_sentence
 from hovi.equality_rounds import first_multipliers, satisfy
 from hovi.grid import DiscretePath
 from hovi.guess import stretched, with_bump
 from hovi.lagrangian import PointTerms
-from hovi.limit_check import Excess, excess_along, worst_sentence
+from hovi.limit_check import excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
 from hovi.limits import Limits
 from hovi.multipliers import Multipliers
@@ -27,6 +29,7 @@ from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Objective, Options, Stop, minimize
 from hovi.problem import TrajectoryProblem
 from hovi.trajectory import Trajectory
+from hovi.trajectory_objective import ActionObjective
 
 Array = npt.NDArray[np.float64]
 Report = Callable[[int, float], None]
@@ -57,6 +60,12 @@ PENALTY_STEPS = 150
 """Steps with each penalty."""
 BUMPED_GUESSES = 3
 """Perturbed guesses that are tried before limits are called infeasible."""
+STAGE = 0.04
+"""Depth by which a motion is moved out of obstacles at a time, in [m]."""
+MOST_STAGES = 8
+"""Most times that it is."""
+STAGE_STEPS = 80
+"""Steps of each, whose result is only a guess."""
 HELD = 1e-3
 """Violation, as a share of the range, below which the larger penalty counts as having found one."""
 
@@ -126,12 +135,60 @@ class _Search:
 
     def __post_init__(self) -> None:
         self.history: list[Iteration] = []
-        shape = (2, self.problem.grid.intervals, *self.limits.lower.shape)
-        self.margins = np.zeros(shape)
+        distances = self.problem.distances
+        self.kept_clear = None
+        if distances is not None:
+            self.kept_clear = ClearanceOutputs(distances, self._margin() + CUSHION * SCALE)
+        self.margins = self._no_margins()
+
+    def _margin(self) -> float:
+        """The distance that counts as held to the tolerance where it is kept exactly, in [m]."""
+        assert self.problem.clearance is not None
+        return float(self.problem.clearance.margin) + self.limits.tolerance * SCALE
+
+    def _no_margins(self) -> Array:
+        """Bounds where they are, in every interval: (2, N, 4 nv + pairs)."""
+        pairs = 0 if self.kept_clear is None else self.kept_clear.size
+        return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
 
     def first(self, path: DiscretePath) -> BoundedOutcome[DiscretePath]:
         """The interior point from a guess, at the quadrature points."""
+        if self.kept_clear is not None:
+            path = self._eased(path, self.kept_clear)
         return self._interior_point(path)
+
+    def _eased(self, path: DiscretePath, wanted: ClearanceOutputs) -> DiscretePath:
+        """A guess: the least action without obstacles, moved out of them little by little.
+
+        A guess that runs deep into obstacles is pushed out on other sides at other times.
+        """
+        options, self.kept_clear = self.options, None
+        path = self._without_distances(path)
+        self.guess = path
+        approach = approach_along(self._trajectory(path), wanted.distances, wanted.least)
+        depth = wanted.least - float(approach.distance.min())
+        stages = int(np.clip(np.ceil(depth / STAGE), 1, MOST_STAGES))
+        self.options = dataclasses.replace(options, max_iterations=STAGE_STEPS)
+        for share in np.arange(1, stages) / stages:
+            least = wanted.least - (1.0 - share) * depth
+            self.kept_clear = ClearanceOutputs(wanted.distances, least)
+            outcome = self._interior_point(path)
+            path = outcome.x
+            if outcome.stop in ENDED:
+                break
+        self.options, self.kept_clear = options, wanted
+        return path
+
+    def _without_distances(self, path: DiscretePath) -> DiscretePath:
+        """The motion that knows of no obstacle, or the guess where none is found."""
+        if self.limits.bounded.any():
+            outcome = self._interior_point(path)
+            return outcome.x if outcome.feasible else path
+        if self.problem.constrained:
+            return path
+        result = minimize(ActionObjective(self.problem), path, self._options(), self.report)
+        self.iterations += result.iterations
+        return result.x if np.isfinite(result.value) else path
 
     def _interior_point(
         self, path: DiscretePath, start: Barrier | None = None
@@ -161,7 +218,9 @@ class _Search:
         return rounds.result
 
     def _objective(self, known: Multipliers | None) -> LimitedAction:
-        return LimitedAction(self.problem, self.limits, self.margins, multipliers=known)
+        return LimitedAction(
+            self.problem, self.limits, self.margins, multipliers=known, more=self.kept_clear
+        )
 
     def restored(
         self, outcome: BoundedOutcome[DiscretePath]
@@ -214,27 +273,39 @@ class _Search:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
         tightened, tolerance = 0, self.limits.tolerance
         for rounds in range(ROUNDS + 1):
-            excess = excess_along(self._trajectory(outcome.x), self.limits)
-            if excess.worst <= tolerance or rounds == ROUNDS:
+            sides = self._sides(outcome.x)
+            excess = float(sides.max())
+            if excess <= tolerance or rounds == ROUNDS:
                 break
             tightened += 1
-            coarse = excess.worst > SPLIT or tightened > PATIENCE
-            again = None if coarse else self._again(outcome, excess)
+            coarse = excess > SPLIT or tightened > PATIENCE
+            again = None if coarse else self._again(outcome, sides)
             lost = again is None or not (_solved(again) or again.stop in ENDED)
             if lost and self.halvings < HALVINGS:
-                again, tightened = self._halved(excess), 0
+                again, tightened = self._halved(sides), 0
             if again is None:
                 break
             outcome = again
             if not _solved(again):
                 break
         reason = ""
-        if excess.worst > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
+        if excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
             reason = (
                 f"{self._why(outcome.x)}, between the points where limits are imposed; use more "
                 "intervals"
             )
-        return self.finished(outcome, reason, excess.worst)
+        return self.finished(outcome, reason, excess)
+
+    def _sides(self, path: DiscretePath) -> Array:
+        """Excess over lower and upper bounds in every interval, (2, N, 4 nv + pairs)."""
+        trajectory = self._trajectory(path)
+        excess = excess_along(trajectory, self.limits)
+        sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
+        if self.kept_clear is None:
+            return sides
+        approach = approach_along(trajectory, self.kept_clear.distances, self._margin())
+        short = (self._margin() - approach.distance) / SCALE
+        return np.concatenate([sides, np.stack([short, np.full_like(short, -np.inf)])], axis=2)
 
     def finished(
         self, outcome: BoundedOutcome[DiscretePath], reason: str, excess: float
@@ -249,7 +320,7 @@ class _Search:
             self.iterations,
             self.history,
             self._inertia(outcome),
-            objective.forces(outcome.barrier.multipliers),
+            objective.forces(outcome.x, outcome.barrier.multipliers),
             reason or self.unmet,
             excess,
         )
@@ -261,7 +332,7 @@ class _Search:
         action = self._objective(self.multipliers).action
         return self.multipliers.updated(action.residuals(path), self.problem.passive)
 
-    def _halved(self, excess: Excess) -> BoundedOutcome[DiscretePath]:
+    def _halved(self, sides: Array) -> BoundedOutcome[DiscretePath]:
         """Solve again with the intervals halved in which a limit is exceeded, and their neighbours.
 
         From the first guess: a motion that far exceeds a limit between the points lives in the
@@ -269,7 +340,7 @@ class _Search:
         """
         self.halvings += 1
         grid = self.problem.grid
-        by_interval = excess.by_interval
+        by_interval = sides.max(axis=(0, 2))
         chosen = by_interval > min(SPLIT_TOO, 0.5 * float(by_interval.max()))
         worst = chosen.copy()
         chosen[1:] |= worst[:-1]
@@ -279,19 +350,18 @@ class _Search:
         self.guess = problem.path(curve)
         self.problem = problem
         self.multipliers = None
-        self.margins = np.zeros((2, problem.grid.intervals, *self.limits.lower.shape))
+        self.margins = self._no_margins()
         return self.first(self.guess)
 
     def _again(
-        self, outcome: BoundedOutcome[DiscretePath], excess: Excess
+        self, outcome: BoundedOutcome[DiscretePath], sides: Array
     ) -> BoundedOutcome[DiscretePath]:
         """Solve again with the bounds drawn in by what the interpolant exceeds them."""
-        sides = np.stack([excess.lower, excess.upper])
         tighter = np.where(sides > 0, OVERSHOOT * sides + ROOM * self.limits.tolerance, 0.0)
         looser = np.where(np.isfinite(sides) & (sides < -SPARE), sides + 0.5 * SPARE, 0.0)
         self.margins = np.clip(self.margins + tighter + looser, 0.0, 0.45)
         objective = self._objective(self.multipliers)
-        mu = float(np.clip(1e-2 * excess.worst, *WARM_MU)) * _density(outcome, objective)
+        mu = float(np.clip(1e-2 * float(sides.max()), *WARM_MU)) * _density(outcome, objective)
         start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
         return self._interior_point(outcome.x, start)
 
@@ -312,7 +382,9 @@ class _Search:
             return 0
         if not self.problem.plain and isinstance(outcome.model, BandModel):
             return outcome.model.negative_eigenvalues()
-        objective = LimitedAction(self.problem, self.limits, self.margins, "tree")
+        objective = LimitedAction(
+            self.problem, self.limits, self.margins, "tree", more=self.kept_clear
+        )
         barrier: Barrier = outcome.barrier
         model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
@@ -322,7 +394,15 @@ class _Search:
         return Trajectory(self.problem.grid, path, momenta, self.problem.scene)
 
     def _why(self, path: DiscretePath) -> str:
-        sentence = worst_sentence(self._trajectory(path), self.limits, self.problem.robot)
+        trajectory = self._trajectory(path)
+        if self.kept_clear is not None:
+            distances, sides = self.kept_clear.distances, self._sides(path)
+            first = self.limits.lower.size
+            if sides[:, :, first:].max() >= sides[:, :, :first].max():
+                approach = approach_along(trajectory, distances, self._margin())
+                margin = self._margin() - self.limits.tolerance * SCALE
+                return approach_sentence(trajectory, distances, approach, margin)
+        sentence = worst_sentence(trajectory, self.limits, self.problem.robot)
         return sentence + static_sentence(self.problem, self.limits)
 
 

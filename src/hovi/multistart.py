@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from joblib import Parallel, delayed, parallel_config
 
+from hovi.clearance import Clearance
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
@@ -60,6 +61,7 @@ class Job:
     max_iterations: int
     limits: Limits
     via: tuple[Via, ...] = ()
+    clearance: Clearance | None = None
 
     def problem(self) -> TrajectoryProblem:
         """The trajectory problem, built once."""
@@ -69,7 +71,7 @@ class Job:
     def _problem(self) -> TrajectoryProblem:
         lagrangian = self.scene.effort_lagrangian(self.weight)
         ld = DiscreteLagrangian(lagrangian, self.grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, self.clearance)
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the problem, so that worker processes build their own."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from hovi.adaptive import refine_to_tolerance
 from hovi.blas_threads import one_blas_thread
+from hovi.clearance import MARGIN, Clearance
 from hovi.errors import InputError, SceneError
 from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
@@ -22,6 +23,7 @@ from hovi.grid import Grid
 from hovi.ladder import climb, may_help
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
+from hovi.obstacles import Obstacle
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
@@ -51,6 +53,9 @@ def plan(
     intervals: int = 16,
     tolerance: float | str | Tolerance | None = None,
     limits: str | Limits | Mapping[str, Any] = "urdf",
+    obstacles: Sequence[Obstacle] = (),
+    margin: float = MARGIN,
+    self_collision: bool = False,
     starts: int = 1,
     seed: int = 0,
     guess: str | Trajectory = "cubic",
@@ -77,6 +82,9 @@ def plan(
         `intervals`; the solution's `accuracy` says what was reached.
     limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
         "none", a Limits, or a mapping as as_limits takes it.
+    obstacles: what the robot's collision shapes keep a distance of `margin` from, in [m], all along
+        the motion: hovi.Sphere, hovi.Capsule and hovi.Box.
+    self_collision: whether its links keep that distance from each other, too: see Clearance.
     starts: number of solves from seeded random perturbations; all minima found are refined on
         the grid that was asked for and ranked after that. seed: of the perturbations.
     guess: "cubic", "minimum-jerk" or a Trajectory.
@@ -119,6 +127,7 @@ def plan(
         max_iterations,
         as_limits(scene.robot, limits),
         passed,
+        Clearance(obstacles, margin, self_collision),
     )
     if turns is not None:
         if not isinstance(fine.goal, State):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -9,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
+from hovi.clearance import Clearance
 from hovi.conditions import NodeCondition
 from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.distances import Distances, distances_between
 from hovi.errors import InputError, ModelError
 from hovi.frame_goal import FrameGoal
 from hovi.free_fall import free_fall_contradiction, without_redundancy
@@ -41,6 +44,7 @@ class TrajectoryProblem:
     start: state at t = 0. goal: state at t = T, or a goal of a frame.
     limits: bounds that hold along the motion; none when None.
     via: what the motion passes through, at nodes of the grid.
+    clearance: what the robot keeps away from along the motion; nothing when None.
     boundary: (q0, v0, q1, v1) of the two ends, first guesses where they are free.
     free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, nv).
     conditions: what has to hold at nodes besides. unreachable: why the goal cannot be met, or "".
@@ -53,6 +57,7 @@ class TrajectoryProblem:
     goal: State | FrameGoal
     limits: Limits | None = None
     via: tuple[Via, ...] = ()
+    clearance: Clearance | None = None
     boundary: Boundary = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
@@ -84,6 +89,7 @@ class TrajectoryProblem:
         object.__setattr__(self, "unreachable", unreachable)
         object.__setattr__(self, "free_ends", without_redundancy(self.scene, self.free_ends))
         object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
+        _ = self.distances  # shapes that are missing speak before any work is done
 
     @cached_property
     def structure(self) -> ActionStructure:
@@ -94,11 +100,11 @@ class TrajectoryProblem:
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         ld = DiscreteLagrangian(self.ld.lagrangian, grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via)
+        return dataclasses.replace(self, ld=ld)
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""
-        problem = TrajectoryProblem(self.ld, start, goal, self.limits, self.via)
+        problem = dataclasses.replace(self, start=start, goal=goal)
         if np.array_equal(problem.free_ends, self.free_ends):
             object.__setattr__(problem, "structure", self.structure)
         return problem
@@ -140,8 +146,16 @@ class TrajectoryProblem:
 
     @property
     def limited(self) -> bool:
-        """Whether anything is bounded."""
-        return self.limits is not None and bool(self.limits.bounded.any())
+        """Whether anything is bounded, or has to be kept away from."""
+        bounded = self.limits is not None and bool(self.limits.bounded.any())
+        return bounded or self.distances is not None
+
+    @property
+    def distances(self) -> Distances | None:
+        """Distances to what the robot keeps away from; None where there is nothing."""
+        if self.clearance is None or not self.clearance.wanted:
+            return None
+        return distances_between(self.robot, self.clearance)
 
     @property
     def grid(self) -> Grid:

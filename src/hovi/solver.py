@@ -23,6 +23,7 @@ from hovi.grid import DiscretePath
 from hovi.guess import check_path, moved, named_curve, stretched, with_turns
 from hovi.lagrangian import PointTerms
 from hovi.limited_solver import LimitedOutcome, solve_limited
+from hovi.limits import no_limits
 from hovi.multipliers import Multipliers
 from hovi.non_finite import non_finite_sentence
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
@@ -215,6 +216,8 @@ class _Answer:
         }
         if problem.limits is not None and problem.limited:
             metadata["limits"] = problem.limits.to_dict()
+        if problem.clearance is not None and problem.distances is not None:
+            metadata["clearance"] = problem.clearance.to_dict()
         momenta = carried_momenta(problem.ld.derivatives(self.path, self.forces))
         return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
 
@@ -277,8 +280,8 @@ def _with_limits(
     problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
 ) -> _Answer:
     """By an interior point."""
-    assert problem.limits is not None
-    outcome = solve_limited(problem, problem.limits, path, options, report)
+    limits = problem.limits or no_limits(problem.robot)
+    outcome = solve_limited(problem, limits, path, options, report)
     status, message = _limited_verdict(outcome)
     return _Answer(
         outcome.problem,
