@@ -184,7 +184,7 @@ def test_an_effect_touches_what_it_says_and_nothing_else(panda: Robot, key: str)
     *jet, t = points(panda)
     same_torque = np.array_equal(scene.inverse_dynamics(*jet, t), bare.inverse_dynamics(*jet, t))
     assert same_torque == (effect.touches == (Touch.COST,))
-    named = (scene.added_torque(scene.symbols), scene.added_cost(scene.symbols))
+    named = (scene.terms.torque, scene.terms.potential)
     assert (named[0] is not None) <= (Touch.TORQUE in effect.touches)
     assert (named[1] is not None) <= (Touch.COST in effect.touches)
 
@@ -228,8 +228,8 @@ def test_an_effect_is_toml_and_back(two_link: Robot, tmp_path: Path, key: str) -
 def test_effects_that_a_clock_drives_are_known(panda: Robot) -> None:
     scene = Scene(panda, list(sample_effects(panda).values()))
     timed = ("wrench", "drag", "moving_base", "custom", "reference_cost")
-    assert set(scene.timed_effects) == set(timed)
-    assert Scene(panda, list(powerless_effects(panda).values())[:7]).timed_effects == ()
+    assert set(scene.terms.timed) == set(timed)
+    assert Scene(panda, list(powerless_effects(panda).values())[:7]).terms.timed == ()
 
 
 def test_a_free_duration_is_refused_where_a_clock_drives_the_scene(two_link: Robot) -> None:

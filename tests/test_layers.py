@@ -74,7 +74,7 @@ FLOORS = [
     {"state", "lagrangian", "effects", "limits"},
     {"frame_goal", "joint_condition", "convex_shapes", "point_outputs"},
     {"inverse_kinematics", "distances"},
-    {"goals", "scene_account"},
+    {"goals", "scene_account", "scene_terms"},
     {"scene"},
     {"free_fall", "discrete_lagrangian", "lagrangians"},
     {"action_structure"},

@@ -48,7 +48,7 @@ def mechanics(scene: Scene) -> CasadiLagrangian:
     L = functions.kinetic_energy(q, v) - functions.potential_energy(q)
     inertia = _added_inertia(scene)
     if inertia is not None:
-        A = ca.Function("A", [scene.symbols.q], [inertia])(q)
+        A = ca.Function("A", [scene.terms.symbols.q], [inertia])(q)
         L += ca.bilin(A, v, v) / 2
     return CasadiLagrangian([q, v], L)
 
@@ -131,7 +131,7 @@ def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
     resistance = resistance_of(scene)
     if resistance is None:
         return Force(scene.robot.nv, drive)
-    q, v, t = scene.symbols.q, scene.symbols.v, scene.symbols.t
+    q, v, t = scene.terms.symbols.q, scene.terms.symbols.v, scene.terms.symbols.t
     slope = ca.jacobian(resistance, ca.vertcat(q, v))
     function = ca.Function("resistance", [q, v, t], [resistance, slope])
     return Force(scene.robot.nv, drive, PointFunction(function, scene.compile))
@@ -140,31 +140,31 @@ def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
 def resistance_of(scene: Scene) -> ca.SX | None:
     """d(q, v, t) of M a + ... + d = u: what is not in the Euler-Lagrange equations of `mechanics`.
 
-    An expression of scene.symbols, shape (nv,); None where there is nothing.
+    An expression of scene.terms.symbols, shape (nv,); None where there is nothing.
     """
-    q, v, a, t = scene.symbols.columns()
+    q, v, a, t = scene.terms.symbols.columns()
     parts = []
-    added = scene.added_torque(scene.symbols)
+    added = scene.terms.torque
     if added is not None:
         inertia = _added_inertia(scene)
         parts.append(added if inertia is None else ca.substitute(added, a, ca.SX.zeros(a.shape)))
         if inertia is not None:
             momentum, energy = inertia @ v, ca.bilin(inertia, v, v) / 2
             parts.append(ca.gradient(energy, q) - ca.jtimes(momentum, q, v))
-    if scene.symbols.base is not None:
+    if scene.terms.symbols.base is not None:
         # masses do not depend on where a base is: without accelerations the difference is exact
         still = ca.SX.zeros(a.shape)
-        parts.append(inverse_dynamics(scene.model, scene.symbols.base, q, v, still, t))
+        parts.append(inverse_dynamics(scene.model, scene.terms.symbols.base, q, v, still, t))
         parts.append(-inverse_dynamics(scene.model, None, q, v, still, t))
     return sum(parts[1:], parts[0]) if parts else None
 
 
 def _added_inertia(scene: Scene) -> ca.SX | None:
     """A(q) of effects whose torque is A(q) a + ..., shape (nv, nv); None without such effects."""
-    q, v, a, t = scene.symbols.columns()
+    q, v, a, t = scene.terms.symbols.columns()
     total = None
     for effect in scene.effects:
-        term = effect.torque(scene.robot, scene.symbols)
+        term = effect.torque(scene.robot, scene.terms.symbols)
         if term is None or not ca.depends_on(term, a):
             continue
         A = ca.simplify(ca.jacobian(term, a))

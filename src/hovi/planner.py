@@ -277,9 +277,9 @@ def _free(
 
 def _require_timeless(scene: Scene) -> None:
     """Raise SceneError for effects that a clock drives: the best duration is not known of them."""
-    if scene.timed_effects:
+    if scene.terms.timed:
         raise SceneError(
-            f"effect {scene.timed_effects[0]!r} depends on the time, and a free duration needs "
+            f"effect {scene.terms.timed[0]!r} depends on the time, and a free duration needs "
             "effects that do not; give the duration as one number."
         )
 

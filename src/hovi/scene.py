@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.configuration_space import ConfigurationSpace
-from hovi.effects import REGISTRY, Effect, SceneSymbols, Touch
+from hovi.effects import REGISTRY, Effect
 from hovi.effort_term import EffortTerm
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
@@ -22,6 +22,7 @@ from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics
 from hovi.rigid_body import InverseDynamicsKernel
 from hovi.robot import Robot
 from hovi.scene_account import SceneAccount, account
+from hovi.scene_terms import SceneTerms
 from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 from hovi.twin_kernel import TwinKernel, joints_without_twin
 
@@ -71,8 +72,7 @@ class Scene:
 
         Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
         """
-        symbols = self.symbols
-        added = self.added_torque(symbols)
+        symbols, added = self.terms.symbols, self.terms.torque
         vector, space = self.robot.vector_joints, self._space
         if not self.analytic or not (vector or symbols.base is None):
             tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
@@ -89,16 +89,9 @@ class Scene:
         return SummedTorque(main, CasadiTorque(symbols.columns(), added, self.compile, space))
 
     @cached_property
-    def symbols(self) -> SceneSymbols:
-        """What the effects' expressions are written in, the base's motion included."""
-        symbols = SceneSymbols.of(self.robot)
-        motions = [effect.base(self.robot, symbols) for effect in self.effects]
-        named = [motion for motion in motions if motion is not None]
-        return dataclasses.replace(symbols, base=named[0]) if named else symbols
-
-    def added_torque(self, symbols: SceneSymbols) -> ca.SX | None:
-        """What the effects add to RNEA, a column of nv; or None."""
-        return _sum(self._touching(Touch.TORQUE, "torque", symbols))
+    def terms(self) -> SceneTerms:
+        """What the effects add to RNEA and to the cost, as expressions."""
+        return SceneTerms(self.robot, self.effects)
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
@@ -121,7 +114,7 @@ class Scene:
         Raises ModelError for joints whose configurations are not vectors.
         """
         require_known_joints(self.robot)
-        R = self._effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
+        R = self.terms.effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
         passive = self._is_passive
         if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
             raise SceneError(
@@ -140,21 +133,6 @@ class Scene:
         q, v, a = (np.asarray(x, dtype=np.float64) for x in (q, v, a))
         return self.torques.torque(q, v, a, None if t is None else np.asarray(t, dtype=np.float64))
 
-    @cached_property
-    def timed_effects(self) -> tuple[str, ...]:
-        """Keys of the effects whose torque, cost or motion of the base depends on the time."""
-        symbols, robot = self.symbols, self.robot
-        timed = []
-        for effect in self.effects:
-            terms = (
-                effect.torque(robot, dataclasses.replace(symbols, base=None)),
-                effect.potential(robot, symbols),
-                effect.base(robot, symbols),
-            )
-            if any(term is not None and ca.depends_on(term, symbols.t) for term in terms):
-                timed.append(effect.key)
-        return tuple(timed)
-
     def without(self, key: str) -> Scene:
         """The same scene without one of its effects."""
         kept = [effect for effect in self.effects if effect.key != key]
@@ -162,13 +140,12 @@ class Scene:
 
     def graph(self) -> ca.Function:
         """(q, v, a, t) -> (tau, L~): all that the scene names, as one expression graph."""
-        symbols = self.symbols
+        symbols, added = self.terms.symbols, self.terms.torque
         tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
-        added = self.added_torque(symbols)
         tau = tau if added is None else tau + added
-        weight = np.where(self._is_passive, 0.0, self._effort_weight)
+        weight = np.where(self._is_passive, 0.0, self.terms.effort_weight)
         cost = ca.dot(ca.DM(weight), tau**2) / 2
-        for more in (self.added_cost(symbols), self.added_effort_cost(tau, symbols.v)):
+        for more in (self.terms.potential, self.terms.effort_cost(tau, symbols.v)):
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
@@ -226,44 +203,15 @@ class Scene:
         return np.isin(np.arange(self.robot.nv), self.passive_coordinates)
 
     @cached_property
-    def _effort_weight(self) -> Array:
-        weights = [effect.effort_weight(self.robot) for effect in self.effects]
-        named = [weight for weight in weights if weight is not None]
-        return named[0] if named else np.ones(self.robot.nv)
-
-    @cached_property
     def _potential(self) -> PotentialTerm | None:
-        total = self.added_cost(self.symbols)
-        if total is None:
-            return None
-        return PotentialTerm(self.symbols.columns(), total, self.compile, self._space)
-
-    def added_cost(self, symbols: SceneSymbols) -> ca.SX | None:
-        """V of the effects, a number; or None."""
-        return _sum(self._touching(Touch.COST, "potential", symbols))
+        V, columns = self.terms.potential, self.terms.symbols.columns()
+        return None if V is None else PotentialTerm(columns, V, self.compile, self._space)
 
     @cached_property
     def _effort_term(self) -> EffortTerm | None:
-        tau, v = ca.SX.sym("tau", self.robot.nv), self.symbols.v
-        phi = self.added_effort_cost(tau, v)
+        tau, v = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.v
+        phi = self.terms.effort_cost(tau, v)
         return None if phi is None else EffortTerm(tau, v, phi, self.compile)
-
-    def added_effort_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """phi(tau, v) of the effects, a number; or None."""
-        return _sum(self._touching(Touch.COST, "effort_cost", tau, v))
-
-    def _touching(self, touch: Touch, term: str, *symbols: Any) -> Iterator[ca.SX]:
-        """The terms of one kind that effects add."""
-        for effect in self.effects:
-            added = getattr(effect, term)(self.robot, *symbols)
-            if added is None:
-                continue
-            if touch not in effect.touches:
-                raise SceneError(
-                    f"effect {effect.key!r} adds to the {touch} without saying so: put "
-                    f"Touch.{touch.name} into its `touches`."
-                )
-            yield added
 
     def _derivatives(self) -> str:
         if self.analytic:
@@ -293,12 +241,6 @@ class Scene:
     def __setstate__(self, state: dict[str, Any]) -> None:
         for name, value in state.items():
             object.__setattr__(self, name, value)
-
-
-def _sum(terms: Iterable[ca.SX]) -> ca.SX | None:
-    """The sum of all terms; None where there is none."""
-    named = list(terms)
-    return sum(named[1:], named[0]) if named else None
 
 
 def require_known_joints(robot: Robot) -> None:
