@@ -9,6 +9,7 @@ the choice are then timed in turn, in CPU time of one thread, and the best of ea
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -146,6 +147,10 @@ def main() -> None:
         rows += more
         oracle.append(f"{name}: {said}")
     print_table(columns, rows)
+    ratios = [float(row[-1]) for row in rows if row[-1] != "-"]
+    print(
+        f"Ratio: {min(ratios)} to {max(ratios)}, {statistics.median(ratios):.1f} in the middle.\n"
+    )
     print("Cost of the finest reference against SciPy's solve_bvp, relative: " + ", ".join(oracle))
     print()
     print_machine(1)

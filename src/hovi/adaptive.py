@@ -166,7 +166,10 @@ class _Search:
             return np.nan, np.nan
         if self.tolerance.quantity is Quantity.COST:
             error = _error_of_cost(solution, finer)
-            return error, max(error, float(_contributions(finer).sum()), _unsteady(solution))
+            whole = max(error, float(_contributions(finer).sum()))
+            if self._within(error, whole):  # else a finer grid is tried anyway
+                whole = max(whole, _unsteady(solution))
+            return error, whole
         estimate = estimate_against(solution, finer, self._frame)
         error = self.tolerance.measure(estimate)
         error *= CAUTION if finer.problem.limited else 1.0
@@ -179,8 +182,11 @@ class _Search:
         return dataclasses.replace(candidate, error=known, contradicted=moved)
 
     def _enough(self, candidate: _Candidate) -> bool:
+        return self._within(candidate.error, candidate.whole)
+
+    def _within(self, error: float, whole: float) -> bool:
         size = self.tolerance.size
-        return candidate.error <= ACCEPTED * size and candidate.whole <= CANCELLED * size
+        return error <= ACCEPTED * size and whole <= CANCELLED * size
 
     def _ended(self, candidate: _Candidate, stalled: int) -> str:
         """Why no finer grid is tried, or ""."""
