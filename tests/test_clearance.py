@@ -143,3 +143,16 @@ def test_a_start_in_which_links_overlap_is_infeasible_and_names_them(ur5: hovi.R
     assert solution.nit == 0
     for word in ("at the start link", "'upper_arm_link'", "'wrist_2_link'", "overlap by"):
         assert word in solution.message
+
+
+def test_the_shipped_scene_keeps_its_margin_at_ten_thousand_samples(ur5: hovi.Robot) -> None:
+    task = hovi.load_task(hovi.example("ur5_around_sphere"))
+    kept, ends = task.clearance, (task.start, task.goal, task.duration)
+    free = hovi.plan(task.scene, *ends, limits=task.limits)
+    assert least_distance(free.trajectory, ur5, kept) < -0.05
+    solution = hovi.plan(
+        task.scene, *ends, limits=task.limits, obstacles=kept.obstacles, margin=kept.margin
+    )
+    assert solution.success, solution.message
+    assert solution.n_neg == 0
+    assert least_distance(solution.trajectory, ur5, kept) >= kept.margin

@@ -83,6 +83,7 @@ FLOORS = [
     {
         "limit_check",
         "saturation",
+        "imposed_clearance",
         "limit_bands",
         "problem",
         "euler_lagrange",

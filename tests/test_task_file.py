@@ -375,3 +375,48 @@ def test_a_tolerance_survives_a_file(folder: Path, tolerance: float | str) -> No
     task = load_task(write(folder, REACH))
     wanted = dataclasses.replace(task, tolerance=tolerance)
     assert load_task(save_task(wanted, folder / "again.toml")).tolerance == tolerance
+
+
+BALL = """
+margin = 0.03
+self_collision = false
+[[obstacles]]
+name = "ball"
+kind = "sphere"
+position = [0.7, 0.0, -1.65]
+radius = 0.15
+[[obstacles]]
+kind = "box"
+size = [4, 4, 0.1]
+position = [0.0, 0.0, -3.0]
+"""
+
+
+def with_obstacles(text: str) -> str:
+    keys, tables = BALL.split("[[", 1)
+    return f"{keys}{text}\n[[{tables}"
+
+
+def test_obstacles_are_read_and_written(folder: Path, tmp_path: Path) -> None:
+    task = load_task(write(folder, with_obstacles(REACH)))
+    assert [each.kind for each in task.clearance.obstacles] == ["sphere", "box"]
+    assert [each.name for each in task.clearance.obstacles] == ["ball", "box 2"]
+    assert task.clearance.margin == 0.03
+    again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
+    assert again.clearance.to_dict() == task.clearance.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"sphere"', '"spere"', "did you mean 'sphere'"),
+        ("radius = 0.15", "radius = -1", "'ball': `radius` of a sphere must be positive"),
+        ("radius = 0.15", "radus = 1", "did you mean 'radius'"),
+        ("margin = 0.03", "margin = -0.03", "`margin` must be a length of 0 or more"),
+        ("self_collision = false", "self_collision = 1", "`self_collision` must be true or false"),
+    ],
+)
+def test_a_wrong_obstacle_is_one_sentence(folder: Path, old: str, new: str, words: str) -> None:
+    sentence = refusal(folder, with_obstacles(REACH).replace(old, new))
+    assert words in sentence
+    assert "line" in sentence

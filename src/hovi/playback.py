@@ -20,6 +20,7 @@ import pinocchio as pin
 
 from hovi.errors import DisplayError
 from hovi.highlights import AT_LIMIT_NOTE, Highlights, node_name
+from hovi.imposed_clearance import with_obstacles
 from hovi.meshcat_page import Page
 from hovi.meshcat_server import ServedPage
 from hovi.robot import Robot
@@ -222,6 +223,7 @@ def _draw(
         visual = skeleton(robot.model)
     if highlights is not None:
         visual = highlights.with_bright_copies(visual)
+    visual = with_obstacles(visual, trajectory)
     visualizer = MeshcatVisualizer(robot.model, None, visual)
     visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
     visualizer.loadViewerModel(rootNodeName="robot")

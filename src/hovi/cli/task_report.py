@@ -22,6 +22,8 @@ def describe_task(task: Task) -> str:
         how = f"tolerance {task.tolerance}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {task.starts}, seed {task.seed}, limits {_limits(task)}")
+    if task.clearance.wanted:
+        lines.append(f"keeps {task.clearance.margin:g} m from {_kept_from(task)}")
     lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)
     for via in task.via:
         lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
@@ -60,6 +62,11 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
         inner, world = (_numbers(np.asarray(each)) for each in goal.axis)
         parts.append(f"  its axis {inner} along {world}")
     return parts
+
+
+def _kept_from(task: Task) -> str:
+    names = [repr(each.name) for each in task.clearance.obstacles]
+    return ", ".join(names + (["itself"] if task.clearance.self_collision else []))
 
 
 def _limits(task: Task) -> str:

@@ -18,6 +18,7 @@ from hovi.schemes import by_name
 from hovi.task_file.effect_tables import read_effects
 from hovi.task_file.goal_tables import read_goal, read_state, read_via
 from hovi.task_file.limit_tables import read_limits
+from hovi.task_file.obstacle_tables import read_clearance
 from hovi.task_file.schema import TaskTable
 from hovi.task_file.sentences import TomlText, first_sentence
 from hovi.task_file.task import Task
@@ -50,6 +51,7 @@ def load_task(path: str | Path) -> Task:
         starts=table.starts,
         seed=table.seed,
         limits=read_limits(table.limits, robot, toml),
+        clearance=read_clearance(table, robot, toml),
         tolerance=_read_tolerance(table.tolerance, robot, toml),
         name=toml.path.stem,
     )

@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
 
+from hovi.clearance import MARGIN
+
 
 def _kind(value: object) -> str:
     if isinstance(value, dict):
@@ -170,6 +172,11 @@ class TaskTable(Table):
         default=0.0, ge=0, description="a number, 0 or more: the cost of a second"
     )
     limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
+    obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
+    margin: FiniteFloat = Field(
+        default=MARGIN, ge=0, description="a length of 0 or more, in metres"
+    )
+    self_collision: bool = Field(default=False, description="true or false")
     starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
     seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
     start: StartTable = Field(description="a table [start] with q and, if moving, v")

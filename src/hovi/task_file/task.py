@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from hovi.clearance import Clearance
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
@@ -33,6 +34,7 @@ class Task:
     starts: number of guesses that are tried.
     seed: seed of the random guesses.
     limits: what `hovi.plan` takes: "urdf", "none", a Limits, or a mapping as as_limits takes it.
+    clearance: what the robot keeps away from.
     tolerance: what `hovi.plan` takes: in place of the scheme, the error that is allowed.
     name: what the task is called in reports.
     """
@@ -50,6 +52,7 @@ class Task:
     name: str = "task"
     via: tuple[Via, ...] = ()
     time_weight: float = 0.0
+    clearance: Clearance = field(default_factory=Clearance)
 
     def __post_init__(self) -> None:
         """Refuse numbers that make no task, limits that do not fit, and unknown schemes."""

@@ -66,6 +66,9 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     document["seed"] = task.seed
     if task.tolerance is not None:
         document["tolerance"] = task.tolerance
+    if task.clearance.wanted:
+        document["margin"] = float(task.clearance.margin)
+        document["self_collision"] = task.clearance.self_collision
     if isinstance(limits, dict):
         document["limits"] = _table(limits)
     document["start"] = _table(state_table(task.start, task.scene.robot, "start"))
@@ -75,6 +78,11 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
         for via in task.via:
             tables.append(_table(via_table(via, task.scene.robot)))
         document["via"] = tables
+    if task.clearance.obstacles:
+        obstacles = tomlkit.aot()
+        for obstacle in task.clearance.obstacles:
+            obstacles.append(_table(obstacle.to_dict()))
+        document["obstacles"] = obstacles
     document["scheme"] = _table({"name": task.scheme, "intervals": task.intervals})
     if task.scene.effects:
         effects = tomlkit.table(is_super_table=True)
