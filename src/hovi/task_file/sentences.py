@@ -108,7 +108,7 @@ def in_toml(value: Any) -> str:
 def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:
     context = details.get("ctx", {})
     bound = context.get("le", context.get("ge"))
-    if isinstance(bound, float):  # of whatever number an effect holds
+    if isinstance(bound, float) and bound != 0:  # of whatever number an effect holds
         return f"at most {abs(bound):g} in size"
     owner = _model_at(model, keys[:-1])
     field = owner.model_fields.get(str(keys[-1])) if owner else None
