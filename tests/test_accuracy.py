@@ -6,6 +6,9 @@ import csv
 import io
 import json
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +21,7 @@ from hovi.accuracy import MotionError, Run, work_precision
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.measuring import LADDER, measure
-from hovi.accuracy.method import Answer, Method, Prepared
+from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.motion_error import Yardstick
 from hovi.accuracy.tables import as_csv
 from hovi.cli import main
@@ -190,6 +193,14 @@ def test_a_method_that_another_one_beats_thirty_times_stops_climbing(pendulum: R
     assert [run.intervals for run in found.runs if run.method == "slow"] == [4]
 
 
+def test_the_processor_clock_stands_still_while_a_process_waits() -> None:
+    watch = Stopwatch("processor")
+    time.sleep(0.3)
+    assert watch.seconds < 0.2
+    subprocess.run([sys.executable, "-c", "sum(range(5_000_000))"], check=True)
+    assert watch.seconds > 0.01  # a child's work counts
+
+
 def test_a_budget_of_nothing_is_refused() -> None:
     with pytest.raises(InputError, match="positive number of seconds, not 0"):
         Budget(0.0)
@@ -239,6 +250,7 @@ def test_a_scene_with_limits_says_that_the_diagram_leaves_them_out() -> None:
     [
         (["--budget", "0"], "positive number of seconds"),
         (["--guess", "qubic"], "did you mean 'cubic'"),
+        (["--clock", "well"], "did you mean 'wall'"),
         (["--out", __file__], "is a file; name a folder"),
     ],
 )

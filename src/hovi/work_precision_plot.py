@@ -73,7 +73,8 @@ def _cold(run: Run) -> float:
 
 def _title(diagram: Diagram) -> str:
     start = {"near": "a guess near the motion", "cubic": "the cubic guess"}[diagram.guess]
-    return f"{diagram.scene}: what accuracy costs, from {start}"
+    clock = "" if diagram.clock == "wall" else ", in processor time"
+    return f"{diagram.scene}: what accuracy costs, from {start}{clock}"
 
 
 def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:

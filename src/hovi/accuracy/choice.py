@@ -63,10 +63,12 @@ def choices(
     budget: Budget,
     intervals: int,
     repeats: int,
+    clock: str,
 ) -> tuple[Choice, ...]:
     """One choice per tolerance in TOLERANCES, as far as the budget allows.
 
     problem: on any grid. intervals: of the scene; a search begins with as many, up to 60.
+    clock: in CLOCKS.
     """
     first = min(intervals, COARSE_INTERVALS)
     coarse = on_grid(problem, Grid.uniform(problem.grid.duration, first, galerkin(2)))
@@ -76,7 +78,7 @@ def choices(
         tolerance = Tolerance(size)
         times: list[float] = []
         while len(times) <= repeats and budget.allows(max(times, default=0.0)):
-            watch = Stopwatch()
+            watch = Stopwatch(clock)
             solution = solve_to_tolerance(coarse, tolerance, path, time_limit=budget.left)
             times.append(watch.seconds)
         if times:

@@ -22,7 +22,7 @@ class Diagram:
     scene: its name. guess: "near" or "cubic". resolved: what errors are against.
     runs: by method, then by intervals. choices: of `plan(tolerance=)`, ascending in accuracy.
     notes: sentences on what was left out. complete: False where the time budget ended it.
-    seconds: what measuring took.
+    seconds: what measuring took. clock: "wall" or "processor", by which solves were timed.
     """
 
     scene: str
@@ -33,6 +33,7 @@ class Diagram:
     notes: tuple[str, ...] = ()
     complete: bool = True
     seconds: float = 0.0
+    clock: str = "wall"
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -99,6 +100,7 @@ class Diagram:
         return {
             "scene": self.scene,
             "guess": self.guess,
+            "clock": self.clock,
             "resolved": {
                 "scheme": self.resolved.scheme,
                 "intervals": self.resolved.intervals,

@@ -89,7 +89,7 @@ def _climb(
     for another reason than time.
     """
     expected = 0.0
-    for intervals in LADDER:
+    for intervals in [each for each in LADDER if each >= method.coarsest]:
         if not budget.allows(expected, share):
             return False
         watch = Stopwatch()

@@ -33,30 +33,34 @@ class VariationalMethod(Method):
     """A scheme, solved by the trust region.
 
     problem: what is planned, on any grid. guess: where every solve starts. scheme: its name.
+    clock: in CLOCKS.
     """
 
-    def __init__(self, problem: TrajectoryProblem, guess: Curve, scheme: str) -> None:
-        self._problem, self._guess = problem, guess
+    def __init__(
+        self, problem: TrajectoryProblem, guess: Curve, scheme: str, clock: str = "wall"
+    ) -> None:
+        self._problem, self._guess, self._clock = problem, guess, clock
         self._scheme = by_name(scheme)
         self.name, self.family, self.order = scheme, "hovi", self._scheme.order
 
     def prepare(self, intervals: int) -> Prepared:
         """Everything from the loaded robot on, as if nothing had been solved before."""
-        watch, old = Stopwatch(), self._problem
-        grid = Grid.uniform(old.grid.duration, intervals, self._scheme)
-        problem = on_grid(old, grid, anew=True)
-        path = problem.path(self._guess)
+        grid = Grid.uniform(self._problem.grid.duration, intervals, self._scheme)
+        path = on_grid(self._problem, grid).path(self._guess)
+        watch = Stopwatch(self._clock)
+        problem = on_grid(self._problem, grid, anew=True)
         problem.structure  # noqa: B018 - built here, and not in the first solve
+        seconds = watch.seconds
 
         def run() -> Answer:
-            watch = Stopwatch()
+            watch = Stopwatch(self._clock)
             found = solve(problem, path)
             seconds = watch.seconds
             cost = found.cost if np.isfinite(found.cost) else float("inf")
             where = found.trajectory.configurations
             return Answer(found.success, found.message, cost, where, found.nit, seconds)
 
-        return Prepared(run, watch.seconds)
+        return Prepared(run, seconds)
 
 
 def on_grid(problem: TrajectoryProblem, grid: Grid, anew: bool = False) -> TrajectoryProblem:

@@ -10,10 +10,10 @@ from hovi.accuracy.choice import choices
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import guess_curve
 from hovi.accuracy.measuring import REPEATS, SLOWEST, Progress, measure
-from hovi.accuracy.method import Method
+from hovi.accuracy.method import CLOCKS, Method
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
-from hovi.errors import InputError, UnmeasurableError
+from hovi.errors import InputError, UnmeasurableError, nearest
 from hovi.guess import Curve
 from hovi.limits import as_limits
 from hovi.planner import plan
@@ -31,12 +31,13 @@ class Setting:
     """What all methods have in common.
 
     problem: on the grid of the resolved motion. guess: where every solve starts.
-    longest: what one solve may take, in [s].
+    longest: what one solve may take, in [s]. clock: in CLOCKS.
     """
 
     problem: TrajectoryProblem
     guess: Curve
     longest: float = 60.0
+    clock: str = "wall"
 
 
 Peer = Callable[[Setting], Method]
@@ -51,6 +52,7 @@ def work_precision(
     peers: Sequence[Peer] = (),
     budget: float = 60.0,
     repeats: int = REPEATS,
+    clock: str = "wall",
     progress: Progress | None = None,
 ) -> Diagram:
     """Errors in cost, joints and tip against time, of many schemes on many grids.
@@ -62,6 +64,7 @@ def work_precision(
         the same minimum) or "cubic" (they may end in others, and then do not count).
     schemes: names as by_name takes them. peers: other people's methods.
     budget: of wall time, in [s]. repeats: of every solve, by which its time is judged.
+    clock: "wall", or "processor" on a machine that is busy with other work.
     progress: called with a line of text and the fraction done.
     Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
     resolved.
@@ -71,6 +74,8 @@ def work_precision(
             f"{task.name} has via points, and a diagram is of a motion between two ends: leave "
             "them out."
         )
+    if clock not in CLOCKS:
+        raise InputError(f"there is no clock {clock!r}: {nearest(clock, CLOCKS)}")
     time, report = Budget(budget), progress or _silent
     report(f"planning {task.name}", 0.0)
     found = plan(
@@ -92,8 +97,8 @@ def work_precision(
     resolved = resolve(found.problem, found, lambda: time.fraction > SEARCHING)
     problem = found.problem.on(resolved.trajectory.grid)
     curve = guess_curve(guess, problem, resolved.trajectory)
-    setting = Setting(problem, curve, SLOWEST * budget)
-    methods: list[Method] = [VariationalMethod(problem, setting.guess, name) for name in schemes]
+    setting = Setting(problem, curve, SLOWEST * budget, clock)
+    methods: list[Method] = [VariationalMethod(problem, curve, name, clock) for name in schemes]
     notes = list(_left_out(task))
     for peer in peers:
         try:
@@ -103,13 +108,14 @@ def work_precision(
     try:
         measured = measure(methods, resolved.yardstick, time, report, MEASURING, repeats)
         report("what a tolerance chooses", time.fraction)
-        chosen = choices(problem, curve, resolved.yardstick, time, task.intervals, repeats)
+        chosen = choices(problem, curve, resolved.yardstick, time, task.intervals, repeats, clock)
     finally:
         for method in methods:
             method.close()
     return Diagram(
         scene=task.name,
         guess=guess,
+        clock=clock,
         resolved=resolved,
         runs=measured.runs,
         choices=chosen,

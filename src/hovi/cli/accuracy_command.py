@@ -23,6 +23,12 @@ def accuracy(
     guess: Annotated[
         str, typer.Option(metavar="near|cubic", help="Where every solve starts.")
     ] = "near",
+    clock: Annotated[
+        str,
+        typer.Option(
+            metavar="wall|processor", help="processor on a machine that is busy with other work."
+        ),
+    ] = "wall",
     out: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Where the picture, the CSV and the JSON go."),
@@ -56,7 +62,9 @@ def accuracy(
     peers = _peers(collocation, crocoddyl, drake)
     try:
         with progress(quiet=json) as report:
-            diagram = work_precision(task, guess=guess, budget=budget, peers=peers, progress=report)
+            diagram = work_precision(
+                task, guess=guess, budget=budget, clock=clock, peers=peers, progress=report
+            )
     except UnmeasurableError as nothing:
         print(f"nothing was measured: {nothing}", file=sys.stderr)
         raise typer.Exit(1) from None

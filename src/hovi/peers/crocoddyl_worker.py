@@ -7,7 +7,6 @@ penalty leaves no bias. A lighter weight to begin with leads away from a guess t
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import crocoddyl as cr
@@ -93,32 +92,33 @@ class Solve:
             stages = tau[:-1:2], tau[1::2], tau[2::2]
             self.us = [np.concatenate(u) for u in zip(*stages, strict=True)]
 
-    def run(self) -> dict[str, Any]:
-        """One solve from the guess, timed."""
-        began = time.perf_counter()
-        xs, us, steps, feasible = self.xs, self.us, 0, False
+    def run(self) -> None:
+        """One solve from the guess."""
+        xs, us, self.steps, feasible = self.xs, self.us, 0, False
         reference = self.terminal.costs["goal"].cost.residual
         target = self.goal.copy()
         for shift in range(SHIFTS + 1):
             if shift:
                 target = target + self.goal - np.array(xs[-1])
             reference.reference = target
-            done = self.solver.solve(xs, us, STEPS, feasible, 1e-9)
-            steps += self.solver.iter
+            self.done = self.solver.solve(xs, us, STEPS, feasible, 1e-9)
+            self.steps += self.solver.iter
             xs, us = list(self.solver.xs), list(self.solver.us)
             feasible = self.solver.isFeasible
-        seconds = time.perf_counter() - began
-        self.problem.calc(xs, us)
-        x = np.array([np.array(each) for each in xs])
+        self.found = xs, us
+
+    def answer(self) -> dict[str, Any]:
+        """What the last solve found."""
+        self.problem.calc(*self.found)
+        x = np.array([np.array(each) for each in self.found[0]])
         n = x.shape[1] // 2
         missed = float(np.abs(x[-1] - self.goal).max())
-        converged = bool(done) or self.solver.stop < CONVERGED
+        converged = bool(self.done) or self.solver.stop < CONVERGED
         return {
             "success": converged and missed < REACHED,
             "message": f"stop {self.solver.stop:.1e}, goal missed by {missed:.1e}",
             "cost": float(sum(data.cost for data in self.problem.runningDatas)),
-            "steps": steps,
-            "seconds": seconds,
+            "steps": self.steps,
             "q": x[:, :n].tolist(),
             "v": x[:, n:].tolist(),
         }

@@ -7,7 +7,6 @@ DirectCollocation has first derivatives only) or by SNOPT.
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -88,18 +87,18 @@ class Solve:
         self.guess = self.prog.initial_guess().copy()
         self.solver, self.options = _solver(arm.solver, arm.longest)
 
-    def run(self) -> dict[str, Any]:
-        """One solve from the guess, timed."""
-        began = time.perf_counter()
-        found = self.solver.Solve(self.prog, self.guess, self.options)
-        seconds = time.perf_counter() - began
-        x = np.array([found.GetSolution(state) for state in self.x])
+    def run(self) -> None:
+        """One solve from the guess."""
+        self.found = self.solver.Solve(self.prog, self.guess, self.options)
+
+    def answer(self) -> dict[str, Any]:
+        """What the last solve found."""
+        x = np.array([self.found.GetSolution(state) for state in self.x])
         return {
-            "success": found.is_success(),
-            "message": str(found.get_solution_result()),
-            "cost": float(found.get_optimal_cost()),
+            "success": self.found.is_success(),
+            "message": str(self.found.get_solution_result()),
+            "cost": float(self.found.get_optimal_cost()),
             "steps": -1,
-            "seconds": seconds,
             "q": x[:, : self.n].tolist(),
             "v": x[:, self.n :].tolist(),
         }

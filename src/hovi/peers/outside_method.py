@@ -31,6 +31,8 @@ class OutsideMethod(Method):
     options: what the worker needs to know of the method.
     """
 
+    coarsest = 24
+
     def __init__(
         self,
         setting: Setting,
@@ -119,6 +121,7 @@ def _scene(setting: Setting) -> dict[str, Any]:
         "gravity": np.asarray(model.gravity.linear).tolist(),
         "armature": np.asarray(model.armature).tolist(),
         "longest": setting.longest,
+        "clock": setting.clock,
         "duration": problem.grid.duration,
         "ends": [np.asarray(x).tolist() for x in problem.boundary],
         "check": {name: x.tolist() for name, x in check.items()},

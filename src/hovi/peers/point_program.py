@@ -30,6 +30,7 @@ IPOPT = {
     "linear_solver": "mumps",
     "jac_c_constant": "yes",
 }
+LIBRARY = "kernels.so"
 COMPILE = ("gcc", "-O2", "-march=native", "-shared", "-fPIC")
 
 
@@ -71,7 +72,7 @@ def compiled(kernels: PointKernels, folder: Path) -> PointKernels:
     for function in functions:
         generator.add(function)
     generator.generate(f"{folder}/")
-    library = str(folder / "kernels.so")
+    library = str(folder / LIBRARY)
     command = [*COMPILE, "-o", library, str(folder / "kernels.c"), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:

@@ -2,7 +2,7 @@
 
 One JSON object per line, in and out. The first question is the scene; each later one is "prepare"
 or "solve" with a number of intervals. The argument names a module of this folder, which has an
-Arm (the scene, checked) and a Solve (a grid).
+Arm (the scene, checked) and a Solve (a grid), which can `run` and then has an `answer`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import sys
 import time
 from typing import Any
 
+CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
+
 
 class Session:
     """A tool with its scene and the grids that were prepared for it."""
@@ -20,19 +22,22 @@ class Session:
     def __init__(self, tool: Any) -> None:
         self._tool = tool
         self._arm: Any = None
+        self._clock = time.perf_counter
         self._solves: dict[int, Any] = {}
 
     def answer(self, question: dict[str, Any]) -> dict[str, Any]:
         """What the other side asked for."""
         if "urdf" in question:
-            self._arm = self._tool.Arm(question)
+            self._arm, self._clock = self._tool.Arm(question), CLOCKS[question["clock"]]
             return {"ready": True}
         if "solve" in question:
-            run: dict[str, Any] = self._solves[question["solve"]].run()
-            return run
-        began, intervals = time.perf_counter(), question["prepare"]
+            solve = self._solves[question["solve"]]
+            began = self._clock()
+            solve.run()
+            return {"seconds": self._clock() - began, **solve.answer()}
+        began, intervals = self._clock(), question["prepare"]
         self._solves[intervals] = self._tool.Solve(self._arm, intervals, question["guess"])
-        return {"seconds": time.perf_counter() - began}
+        return {"seconds": self._clock() - began}
 
 
 def main() -> None:

@@ -1,0 +1,160 @@
+"""What accuracy costs: hovi and other people's methods on the same scenes, in one run.
+
+Prints the table of time ratios and draws the diagrams of the docs. Crocoddyl and Drake live in
+environments of their own, whose Pythons are named by options or by HOVI_CROCODDYL_PYTHON and
+HOVI_DRAKE_PYTHON:
+
+    python -m venv crocoddyl && crocoddyl/bin/pip install crocoddyl==3.2.1 pin==4.0.0
+    python -m venv drake && drake/bin/pip install drake
+
+(Crocoddyl 3.2.1 beside pin 4.1.0 loses gravity without a word; its worker checks for that.)
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from measuring import alone, print_machine, print_table
+
+import hovi
+from hovi.accuracy import Diagram, Run, work_precision
+from hovi.peers.ipopt_method import ipopt_peers
+from hovi.peers.outside_method import crocoddyl_peers, drake_peers
+from hovi.work_precision_plot import plot_work_precision
+
+SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
+SHARES = {"two_link_reach": 0.4}
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
+INTERPRETED = ("hermite-simpson", "lg-3", "lg-5", "lgr-5")
+INTRODUCTION = """\
+Every solve starts near the motion (nine tenths of it, one tenth of the cubic). *Warm* is the
+fastest of up to eight solves, *cold* is building, compiling included, and the first solve, both in
+processor time, since other work ran on the machine. A method has an accuracy when the error of the
+cost stays below it on all finer grids too; - where none of its grids within the time had it."""
+
+
+def measure(
+    scene: str, budget: float, crocoddyl: str | None, drake: str | None, kernels: str | None
+) -> Diagram:
+    """All methods on one scene; the picture goes to the docs."""
+    folder = None if kernels is None else Path(kernels)
+    peers = [*ipopt_peers(compiled=True, folder=folder)]
+    peers += [*ipopt_peers(compiled=False, schemes=INTERPRETED)]
+    peers += crocoddyl_peers(Path(crocoddyl)) if crocoddyl else []
+    peers += drake_peers(Path(drake)) if drake else []
+
+    def progress(text: str, fraction: float) -> None:
+        print(f"{scene} {100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)
+
+    task = hovi.load_task(hovi.example(scene))
+    diagram = work_precision(task, peers=peers, budget=budget, clock="processor", progress=progress)
+    plot_work_precision(diagram, IMAGES / f"work_precision_{scene}.png", fastest=True)
+    return diagram
+
+
+def warm(run: Run) -> float:
+    return run.best_seconds
+
+
+def cold(run: Run) -> float:
+    return run.cold_seconds
+
+
+def of_hovi(run: Run) -> bool:
+    return run.family == "hovi"
+
+
+def cheapest(diagram: Diagram, of: object, time: object) -> list[Run | None]:
+    return [diagram.cheapest(tolerance, among=of, time=time) for tolerance in TOLERANCES]
+
+
+def milliseconds(seconds: float) -> str:
+    return f"{1e3 * seconds:.3g}"
+
+
+def print_ours(diagram: Diagram) -> None:
+    """hovi's cheapest runs and what a tolerance chooses."""
+    rows = []
+    choices = {choice.tolerance: choice for choice in diagram.choices}
+    runs = zip(cheapest(diagram, of_hovi, warm), cheapest(diagram, of_hovi, cold), strict=True)
+    for tolerance, (run, first) in zip(TOLERANCES, runs, strict=True):
+        row = [f"{tolerance:.0e}", "-", "-", "-", "-", "-"]
+        if run and first:
+            row[1:4] = f"`{run.method}`, {run.intervals}", milliseconds(warm(run)), ""
+            row[3] = milliseconds(cold(first))
+        choice = choices.get(tolerance)
+        if choice and run:
+            ratio = choice.best_seconds / warm(run)
+            row[4] = f"{milliseconds(choice.best_seconds)} ({ratio:.1f} times)"
+            row[5] = f"{choice.error.cost:.0e} ({choice.estimate:.0e})"
+        rows.append(row)
+    columns = ["relative error of the cost", "cheapest of hovi: scheme, intervals", "warm [ms]"]
+    columns += ["cheapest cold [ms]", "chosen by `tolerance=`, warm [ms]", "its error (estimate)"]
+    print_table(columns, rows)
+
+
+def ratios(diagram: Diagram, method: str) -> list[float | None]:
+    """Times of a method over hovi's, warm at each tolerance and then cold."""
+    found = []
+    for time in (warm, cold):
+        ours = cheapest(diagram, of_hovi, time)
+        theirs = cheapest(diagram, lambda run: run.method == method, time)
+        for a, b in zip(ours, theirs, strict=True):
+            found.append(time(b) / time(a) if a and b else None)
+    return found
+
+
+def print_ratios(diagram: Diagram) -> None:
+    """A row per method of somebody else."""
+    others = [m for m in diagram.methods if not of_hovi(diagram.of(m)[0])]
+    table = {method: ratios(diagram, method) for method in others}
+    columns = ["time / hovi's"]
+    columns += [f"{kind} {t:.0e}" for kind in ("warm", "cold") for t in TOLERANCES]
+    cell = "{:.2g}".format
+    rows = [
+        [method, *("-" if x is None else f"**{cell(x)}**" if x < 1 else _plain(x) for x in row)]
+        for method, row in table.items()
+    ]
+    print_table(columns, rows)
+    won = [m for m, row in table.items() if any(x is not None and x < 1 for x in row)]
+    if won:
+        print(f"Faster than hovi somewhere, in bold: {', '.join(won)}.\n")
+    else:
+        print("None of them is faster than hovi at any of these accuracies.\n")
+
+
+def _plain(ratio: float) -> str:
+    return f"{ratio:.2g}" if ratio < 100 else f"{ratio:,.0f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--budget", type=float, default=400.0, help="seconds for each arm")
+    parser.add_argument("--crocoddyl", default=os.environ.get("HOVI_CROCODDYL_PYTHON"))
+    parser.add_argument("--drake", default=os.environ.get("HOVI_DRAKE_PYTHON"))
+    parser.add_argument("--kernels", default=os.environ.get("HOVI_KERNELS"), help="kept here")
+    parser.add_argument("scenes", nargs="*", default=SCENES)
+    asked = parser.parse_args()
+    print(f"{INTRODUCTION}\n")
+    for scene in asked.scenes:
+        budget = asked.budget * SHARES.get(scene, 1.0)
+        diagram = alone(measure, scene, budget, asked.crocoddyl, asked.drake, asked.kernels)
+        resolved = diagram.resolved
+        print(
+            f"**{scene}**: against {resolved.scheme} on {resolved.intervals} intervals, known to "
+            f"{resolved.uncertainty.cost:.0e}; {len(diagram.runs)} runs in {diagram.seconds:.0f} "
+            "s.\n"
+        )
+        print_ours(diagram)
+        print_ratios(diagram)
+        for note in diagram.notes:
+            print(f"{note}\n")
+    print_machine(threads=1)
+
+
+if __name__ == "__main__":
+    main()
