@@ -187,7 +187,7 @@ def test_a_solve_that_would_take_a_tenth_of_the_budget_is_the_last_of_its_method
     assert slow.solves == 4 + 5
 
 
-def test_a_method_that_another_one_beats_thirty_times_stops_climbing(pendulum: Robot) -> None:
+def test_a_method_that_one_of_its_family_beats_by_far_stops_climbing(pendulum: Robot) -> None:
     found = measured(pendulum, 1e9, Pretended("fast", 1.0), Pretended("slow", 40.0))
     assert max(run.intervals for run in found.runs if run.method == "fast") == 64
     assert [run.intervals for run in found.runs if run.method == "slow"] == [4]

@@ -23,6 +23,7 @@ SCRIPTS = (
     "replanning",
     "dimensions",
     "peers",
+    "work_precision",
     "limits",
     "effects",
     "random_reaches",

@@ -20,7 +20,7 @@ from pathlib import Path
 from measuring import alone, print_machine, print_table
 
 import hovi
-from hovi.accuracy import Diagram, Run, work_precision
+from hovi.accuracy import Diagram, MotionError, Run, work_precision
 from hovi.peers.ipopt_method import ipopt_peers
 from hovi.peers.outside_method import crocoddyl_peers, drake_peers
 from hovi.work_precision_plot import plot_work_precision
@@ -29,10 +29,12 @@ SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
 SHARES = {"two_link_reach": 0.4}
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
+REPEATS = 4
+ENOUGH = MotionError(cost=1e-11, joints=1e-6, tip=1e-2)
 INTERPRETED = ("hermite-simpson", "lg-3", "lg-5", "lgr-5")
 INTRODUCTION = """\
 Every solve starts near the motion (nine tenths of it, one tenth of the cubic). *Warm* is the
-fastest of up to eight solves, *cold* is building, compiling included, and the first solve, both in
+fastest of up to five solves, *cold* is building, compiling included, and the first solve, both in
 processor time, since other work ran on the machine. A method has an accuracy when the error of the
 cost stays below it on all finer grids too; - where none of its grids within the time had it."""
 
@@ -51,7 +53,8 @@ def measure(
         print(f"{scene} {100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)
 
     task = hovi.load_task(hovi.example(scene))
-    diagram = work_precision(task, peers=peers, budget=budget, clock="processor", progress=progress)
+    options = {"budget": budget, "clock": "processor", "repeats": REPEATS, "enough": ENOUGH}
+    diagram = work_precision(task, peers=peers, progress=progress, **options)
     plot_work_precision(diagram, IMAGES / f"work_precision_{scene}.png", fastest=True)
     return diagram
 

@@ -6,6 +6,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hovi import accuracy as accuracy
     from hovi import effects as effects
     from hovi import schemes as schemes
     from hovi.certificate import Certificate as Certificate
@@ -135,7 +136,7 @@ _PLACES = {
     "variational_order": "hovi.variational_error",
     "write_csv": "hovi.export",
 }
-_SUBPACKAGES = ("effects", "schemes")
+_SUBPACKAGES = ("accuracy", "effects", "schemes")
 
 __all__ = ["__version__", *sorted(_PLACES), *_SUBPACKAGES]
 

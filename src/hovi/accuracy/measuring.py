@@ -26,7 +26,7 @@ CLIMBING = 0.7
 """Share of the budget in which first solves may start."""
 SLOWEST = 0.1
 """Share of the budget that one solve may take, and about what its repeats may take."""
-HOPELESS = 30.0
+HOPELESS = 15.0
 """A method stops where one of its family was more accurate in so many times less time."""
 _GROWTH = 2.0  # of time from one number of intervals to the next, at most
 
@@ -55,6 +55,7 @@ def measure(
     progress: Progress,
     share: float = 1.0,
     repeats: int = REPEATS,
+    enough: MotionError = ENOUGH,
 ) -> Measured:
     """Every method on finer and finer grids, until it is exact or its time is up.
 
@@ -62,6 +63,7 @@ def measure(
     repeats follow in rounds over all runs, so that a busy moment of the machine meets all alike.
 
     budget: of which `share` may be spent. repeats: of every run that counts.
+    enough: errors at which a method need not become finer.
     """
     all_rungs: list[Rungs] = []
     notes, complete = [], True
@@ -71,7 +73,7 @@ def measure(
         all_rungs.append(rungs)
         progress(method.name, budget.fraction)
         try:
-            ended = _climb(method, all_rungs, yardstick, budget, budget.fraction + part)
+            ended = _climb(method, all_rungs, yardstick, budget, budget.fraction + part, enough)
             complete = complete and ended
         except UnmeasurableError as refused:
             notes.append(f"{method.name}: {refused}")
@@ -81,7 +83,12 @@ def measure(
 
 
 def _climb(
-    method: Method, all_rungs: list[Rungs], yardstick: Yardstick, budget: Budget, share: float
+    method: Method,
+    all_rungs: list[Rungs],
+    yardstick: Yardstick,
+    budget: Budget,
+    share: float,
+    enough: MotionError,
 ) -> bool:
     """One grid of the ladder after the other, as long as the next is worth while.
 
@@ -97,14 +104,15 @@ def _climb(
         run = _first(method, intervals, prepared, yardstick)
         all_rungs[-1].append((prepared, run))
         slow = run.first_seconds > SLOWEST * budget.seconds
-        if slow or _exact(run.error) or _beaten(run, all_rungs):
+        if slow or _within(run.error, enough) or _beaten(run, all_rungs):
             break
         expected = _GROWTH * watch.seconds
     return True
 
 
-def _exact(error: MotionError) -> bool:
-    return all(getattr(error, m) <= getattr(ENOUGH, m) for m in ("cost", "joints", "tip"))
+def _within(error: MotionError, enough: MotionError) -> bool:
+    names = ("cost", "joints", "tip")
+    return all(getattr(error, name) <= getattr(enough, name) for name in names)
 
 
 def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:

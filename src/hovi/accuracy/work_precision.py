@@ -9,8 +9,9 @@ from hovi.accuracy.budget import Budget
 from hovi.accuracy.choice import choices
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import guess_curve
-from hovi.accuracy.measuring import REPEATS, SLOWEST, Progress, measure
+from hovi.accuracy.measuring import ENOUGH, REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import CLOCKS, Method
+from hovi.accuracy.motion_error import MotionError
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
 from hovi.errors import InputError, UnmeasurableError, nearest
@@ -53,6 +54,7 @@ def work_precision(
     budget: float = 60.0,
     repeats: int = REPEATS,
     clock: str = "wall",
+    enough: MotionError = ENOUGH,
     progress: Progress | None = None,
 ) -> Diagram:
     """Errors in cost, joints and tip against time, of many schemes on many grids.
@@ -65,6 +67,7 @@ def work_precision(
     schemes: names as by_name takes them. peers: other people's methods.
     budget: of wall time, in [s]. repeats: of every solve, by which its time is judged.
     clock: "wall", or "processor" on a machine that is busy with other work.
+    enough: errors at which a method need not become finer.
     progress: called with a line of text and the fraction done.
     Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
     resolved.
@@ -106,7 +109,7 @@ def work_precision(
         except UnmeasurableError as refused:
             notes.append(str(refused))
     try:
-        measured = measure(methods, resolved.yardstick, time, report, MEASURING, repeats)
+        measured = measure(methods, resolved.yardstick, time, report, MEASURING, repeats, enough)
         report("what a tolerance chooses", time.fraction)
         chosen = choices(problem, curve, resolved.yardstick, time, task.intervals, repeats, clock)
     finally:
