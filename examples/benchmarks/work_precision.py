@@ -21,6 +21,7 @@ from measuring import alone, print_machine, print_table
 
 import hovi
 from hovi.accuracy import Diagram, MotionError, Run, work_precision
+from hovi.accuracy.tables import as_json
 from hovi.peers.ipopt_method import ipopt_peers
 from hovi.peers.outside_method import crocoddyl_peers, drake_peers
 from hovi.work_precision_plot import plot_work_precision
@@ -140,6 +141,7 @@ def main() -> None:
     parser.add_argument("--crocoddyl", default=os.environ.get("HOVI_CROCODDYL_PYTHON"))
     parser.add_argument("--drake", default=os.environ.get("HOVI_DRAKE_PYTHON"))
     parser.add_argument("--kernels", default=os.environ.get("HOVI_KERNELS"), help="kept here")
+    parser.add_argument("--out", help="folder for all runs as JSON")
     parser.add_argument("scenes", nargs="*", default=SCENES)
     asked = parser.parse_args()
     print(f"{INTRODUCTION}\n")
@@ -152,6 +154,8 @@ def main() -> None:
             f"{resolved.uncertainty.cost:.0e}; {len(diagram.runs)} runs in {diagram.seconds:.0f} "
             "s.\n"
         )
+        if asked.out:
+            (Path(asked.out) / f"{scene}.json").write_text(as_json(diagram))
         print_ours(diagram)
         print_ratios(diagram)
         for note in diagram.notes:

@@ -116,10 +116,13 @@ def _within(error: MotionError, enough: MotionError) -> bool:
 
 
 def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:
-    """Whether finer grids of a method have no hope of being worth their time."""
+    """Whether finer grids of a method have no hope of being worth their time.
+
+    A run that went astray says nothing of them.
+    """
     runs = (other for rungs in all_rungs for _, other in rungs)
     others = [other for other in runs if other.family == run.family and other.counts]
-    return any(
+    return run.counts and any(
         other.error.cost <= run.error.cost and HOPELESS * other.first_seconds <= run.first_seconds
         for other in others
     )
