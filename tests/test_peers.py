@@ -43,7 +43,8 @@ def reach(scene: Scene, intervals: int = 8, modes: int = 1) -> TrajectoryProblem
 @pytest.fixture(scope="module")
 def setting(arm_scene: Scene) -> Setting:
     problem = reach(arm_scene, 32, 3)
-    return Setting(problem, guess_curve("near", problem, solve(problem).trajectory))
+    guess = guess_curve("near", problem, solve(problem).trajectory)
+    return Setting(problem, guess, guess)
 
 
 # Tables
@@ -154,7 +155,7 @@ def test_a_scene_that_other_tools_do_not_know_is_refused(two_link: Robot) -> Non
     kept = JointLimitPotential({"elbow": (0.0, 1.0)}, slope=10.0)
     problem = reach(Scene(two_link, [Gravity(), kept]))
     with pytest.raises(UnmeasurableError, match="gravity and armature"):
-        CollocationMethod(Setting(problem, None), "lg-3", Kernels(compiled=False))
+        CollocationMethod(Setting(problem, None, None), "lg-3", Kernels(compiled=False))
 
 
 # The robot that other tools read

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import pontryagin
 from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
 from hovi.errors import UnmeasurableError
 from hovi.model_files import example
@@ -13,6 +12,7 @@ from hovi.planner import plan
 from hovi.scene import Scene
 from hovi.solver import Solution
 from hovi.task_file import load_task
+from pontryagin_oracle import extremal
 
 
 def resolved(scene: str) -> tuple[ResolvedMotion, Solution]:
@@ -36,7 +36,7 @@ def test_a_resolved_motion_solves_pontryagins_equations(scene: str, tolerance: f
     assert problem is not None
     momenta = np.moveaxis(path.momenta, 1, 0)
     guess = np.concatenate([path.q, path.v, *momenta], axis=1).T
-    true = pontryagin.extremal(problem.scene.model, problem.boundary, path.t, guess, tolerance)
+    true = extremal(problem.scene.model, problem.boundary, path.t, guess, tolerance)
     assert motion.cost == pytest.approx(true.cost, rel=1e-2 * tolerance)
     t = motion.yardstick.times
     np.testing.assert_allclose(path.configurations(t), true.q(t), rtol=0, atol=0.1 * tolerance)

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 from measuring import alone, print_machine, print_table
+from pontryagin import extremal_cost
 
 import hovi
 from hovi.motion_error import deviation
 from hovi.schemes import galerkin
-from pontryagin import extremal_cost
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach", "z1", "chain of 4")
 TOLERANCES = [10.0**-k for k in range(2, 10)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.choice import choices
 from hovi.accuracy.diagram import Diagram
-from hovi.accuracy.guess_motion import guess_curve
+from hovi.accuracy.guess_motion import NEARER, guess_curve
 from hovi.accuracy.measuring import ENOUGH, REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import CLOCKS, Method
 from hovi.accuracy.motion_error import MotionError
@@ -31,12 +31,14 @@ MEASURING = 0.9
 class Setting:
     """What all methods have in common.
 
-    problem: on the grid of the resolved motion. guess: where every solve starts.
+    problem: on the grid of the resolved motion. guess: where every solve starts. nearer: a guess
+    that is ten times nearer, for a method that would end in other minima otherwise.
     longest: what one solve may take, in [s]. clock: in CLOCKS.
     """
 
     problem: TrajectoryProblem
     guess: Curve
+    nearer: Curve
     longest: float = 60.0
     clock: str = "wall"
 
@@ -100,7 +102,8 @@ def work_precision(
     resolved = resolve(found.problem, found, lambda: time.fraction > SEARCHING)
     problem = found.problem.on(resolved.trajectory.grid)
     curve = guess_curve(guess, problem, resolved.trajectory)
-    setting = Setting(problem, curve, SLOWEST * budget, clock)
+    nearer = guess_curve(guess, problem, resolved.trajectory, NEARER)
+    setting = Setting(problem, curve, nearer, SLOWEST * budget, clock)
     methods: list[Method] = [VariationalMethod(problem, curve, name, clock) for name in schemes]
     notes = list(_left_out(task))
     for peer in peers:

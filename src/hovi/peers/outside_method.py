@@ -28,7 +28,7 @@ class OutsideMethod(Method):
     """A tool that answers questions in JSON: see serve.py.
 
     setting: what is planned. python: of the tool's environment. tool: its worker.
-    options: what the worker needs to know of the method.
+    options: what the worker needs to know of the method. nearer: start from the nearer guess.
     """
 
     coarsest = 24
@@ -42,9 +42,11 @@ class OutsideMethod(Method):
         family: str,
         order: int | None,
         options: Mapping[str, Any],
+        nearer: bool = False,
     ) -> None:
         require_plain(setting)
         self._setting = setting
+        self._guess = setting.nearer if nearer else setting.guess
         self.name, self.family, self.order = name, family, order
         scene = _scene(setting) | {"options": dict(options)}
         self._worker = Worker(python, tool, patience=2 * setting.longest + STARTING)
@@ -58,7 +60,7 @@ class OutsideMethod(Method):
         """What the tool builds for N intervals, in its own process."""
         T = self._setting.problem.grid.duration
         t = np.linspace(0.0, T, 2 * intervals + 1)
-        q, v, a = (x.tolist() for x in self._setting.guess(t))
+        q, v, a = (x.tolist() for x in self._guess(t))
         guess = {"q": q, "v": v, "a": a}
         answer = self._worker.ask({"prepare": intervals, "guess": guess})
         return Prepared(partial(self._solve, intervals), float(answer["seconds"]))
@@ -77,7 +79,10 @@ class OutsideMethod(Method):
 
 
 def crocoddyl_peers(python: Path) -> list[partial[OutsideMethod]]:
-    """Crocoddyl's FDDP with RK4 and two ways to write the torque in an interval."""
+    """Crocoddyl's FDDP with RK4 and two ways to write the torque in an interval.
+
+    From the near guess it leaves for other minima on the arms, so it starts from the nearer one.
+    """
     kinds = {"zero": ("constant torque", 2), "two": ("quadratic torque", 4)}
     return [
         partial(
@@ -88,6 +93,7 @@ def crocoddyl_peers(python: Path) -> list[partial[OutsideMethod]]:
             family="Crocoddyl",
             order=order,
             options={"control": control},
+            nearer=True,
         )
         for control, (words, order) in kinds.items()
     ]
