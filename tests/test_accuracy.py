@@ -215,6 +215,8 @@ def test_the_picture_has_a_curve_for_every_scheme(reach: Diagram) -> None:
         "hermite-simpson, order 4",
     ]
     assert len(figure.axes) == 4
+    named = [text.get_text() for text in figure.axes[0].texts]
+    assert named == ["1e-03", "1e-05", "1e-07", "1e-09"]
     assert all(ax.get_yscale() == "log" for ax in figure.axes)
 
 

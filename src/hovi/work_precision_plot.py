@@ -125,16 +125,23 @@ def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
     if chosen:
         (stars,) = ax.plot(x, y, color="#d00000", label="chosen by a tolerance")
         stars.set(**look)
-    for choice, left, below in zip(chosen, x, y, strict=True):
-        if measure == "cost":
-            ax.annotate(
-                f"{choice.tolerance:.0e}",
-                (left, below),
-                xytext=(7, -3),
-                textcoords="offset points",
-                color="#d00000",
-                fontsize="small",
-            )
+    if measure == "cost":
+        _name_tolerances(ax, diagram, x, y)
+
+
+def _name_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]) -> None:
+    """The tolerance beside its star; where several chose the same motion, one above the other."""
+    lines: dict[float, int] = {}
+    for choice, below in zip(diagram.choices, y, strict=True):
+        line = lines[below] = lines.get(below, -1) + 1
+        ax.annotate(
+            f"{choice.tolerance:.0e}",
+            (max(a for a, b in zip(x, y, strict=True) if b == below), below),
+            xytext=(8, -3 + 9 * line),
+            textcoords="offset points",
+            color="#d00000",
+            fontsize="small",
+        )
 
 
 def _points(runs: Sequence[Run], measure: str, time: Time) -> tuple[list[float], list[float]]:
