@@ -38,9 +38,20 @@ def test_products_move_as_in_pinocchio(base: str) -> None:
 
 
 def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
-    space = ConfigurationSpace((1, "SO(2)"))
-    x = space.unwound(np.array([9.0, -3.0]), np.array([0.0, 10.0]))
-    np.testing.assert_allclose(x, [9.0, -3.0 + 4 * np.pi])
+    space = ConfigurationSpace((1, "SO(2)", "SE(2)", "SO(3)", "SE(3)"))
+    random = np.random.default_rng(0)
+    q0 = space.normalized(random.normal(size=(20, space.nq)))
+    x = random.normal(size=(20, space.nv))
+    x[:, 1] *= 20.0
+    for factor in space.curved:
+        turn = [factor.v.start + i for i in factor.group.angular]
+        x[:, turn] *= random.uniform(3.2, 5.0, (20, 1)) / np.linalg.norm(
+            x[:, turn], axis=1, keepdims=True
+        )
+    q1 = space.integrate(q0, x)
+    expected = x + 0.3 * random.uniform(-1, 1, x.shape)
+    np.testing.assert_allclose(space.difference_near(q0, q1, expected), x, atol=1e-12)
+    assert np.abs(space.difference(q0, q1) - x).max() > 1.0
 
 
 @pytest.mark.parametrize("parts", [(0,), (-1,), ("SO(4)",), (1.5,), (True,)])

@@ -446,7 +446,7 @@ def test_the_description_names_what_a_scene_leaves_out() -> None:
     for words in ("7 joints", "nv = 7", "arm_left_2_joint", "damping", "dry friction", "armature"):
         assert words in text
     assert "<mimic>" in load_robot("panda").describe()
-    assert "do not add like vectors" in load_robot("kinova").describe()
+    assert "takes (cos, sin) of its angle" in load_robot("kinova").describe()
 
 
 def test_every_robot_can_be_described(two_link: Robot) -> None:

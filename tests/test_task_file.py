@@ -60,7 +60,8 @@ def test_a_saved_task_is_read_back_as_the_same_task(name: str, tmp_path: Path) -
         assert getattr(again, key) == getattr(task, key)
     for end in ("start", "goal"):
         ends = [getattr(each, end).on(each.scene.robot, end) for each in (task, again)]
-        np.testing.assert_array_equal(ends[0], ends[1])
+        for expected, found in zip(*ends, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
     assert again.scene.effects == task.scene.effects
     assert again.scene.to_dict() == task.scene.to_dict()
 

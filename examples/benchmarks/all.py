@@ -31,6 +31,7 @@ SCRIPTS = (
     "underactuated",
     "growth",
     "tolerance",
+    "example_robots",
 )
 
 

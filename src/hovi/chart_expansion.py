@@ -41,6 +41,16 @@ class IntervalCharts:
     def _m(self) -> int:
         return 4 + self.scheme.inner_modes
 
+    @property
+    def turns(self) -> Array:
+        """The largest turn of an orientation in every chart, at points and ends, (B,)."""
+        x = np.concatenate([self.x[:, :, 0], self.ends[:, :1]], axis=1)
+        turns = [
+            np.linalg.norm(x[..., [f.v.start + i for i in f.group.angular]], axis=-1).max(axis=1)
+            for f in self.chart.space.curved
+        ]
+        return np.asarray(np.max(turns, axis=0))
+
     @cached_property
     def nodal_table(self) -> Array:
         """(q0, x, h x', h^2 x'') over (q0, h v0, x1, h x1', c), shape (Q, 4, m)."""

@@ -39,10 +39,11 @@ def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
     return positions
 
 
-def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str]) -> Array:
+def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: str = "") -> Array:
     """`value` as a finite float array with one number per name in `entries`.
 
-    name: what the argument is called, for the message. Raises InputError.
+    name: what the argument is called, for the message. hint: the end of the sentence about a
+    wrong length. Raises InputError.
     """
     try:
         vector = np.array(value, dtype=float)
@@ -51,7 +52,7 @@ def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str]) -> Arr
     if vector.shape != (len(entries),):
         raise InputError(
             f"{name} has shape {vector.shape}, expected ({len(entries)},): "
-            f"one number each for {', '.join(entries)}."
+            f"one number each for {', '.join(entries)}{hint}."
         )
     for number, entry in zip(vector, entries, strict=True):
         if not np.isfinite(number):
@@ -73,6 +74,26 @@ def check_unit_norms(model: pin.Model, q: Array, name: str) -> None:
                 f"a joint with nq={joint.nq}, nv={joint.nv} holds a unit quaternion (x, y, z, w) "
                 "or (cos, sin) of its angle; normalize it."
             )
+
+
+_HELD = {
+    (2, 1): "(cos, sin) of its angle",
+    (4, 3): "a unit quaternion (x, y, z, w), or x, y, cos, sin on a plane",
+    (7, 6): "a position and a unit quaternion (x, y, z, w)",
+}
+
+
+def manifold_hint(model: pin.Model) -> str:
+    """What joints with more numbers in q than in v hold, as the end of a sentence; "" without."""
+    kinds: dict[tuple[int, int], list[str]] = {}
+    for joint, name in zip(model.joints[1:], model.names[1:], strict=True):
+        if joint.nq != joint.nv:
+            kinds.setdefault((joint.nq, joint.nv), []).append(str(name))
+    parts = []
+    for (nq, nv), names in kinds.items():
+        held = _HELD.get((nq, nv), f"{nq} numbers for {nv} degrees of freedom")
+        parts.append(f"{', '.join(names)} {'takes' if len(names) == 1 else 'take'} {nq}: {held}")
+    return f"; {'; '.join(parts)}" if parts else ""
 
 
 def entry_names(model: pin.Model, size: str) -> tuple[str, ...]:

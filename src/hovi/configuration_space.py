@@ -129,13 +129,15 @@ class ConfigurationSpace:
             result[..., columns] = group.difference(q0[..., rows], q1[..., rows])
         return result
 
-    def unwound(self, x: Array, expected: Array) -> Array:
-        """Tangent vectors (..., nv) with those full turns that are nearest to `expected`."""
-        result = np.array(x, dtype=np.float64)
-        for factor in self.angles:
-            i = factor.v.start
-            turns = np.round((expected[..., i] - result[..., i]) / (2 * np.pi))
-            result[..., i] += 2 * np.pi * turns
+    def difference_near(self, q0: Array, q1: Array, expected: Array) -> Array:
+        """As `difference`, with the full turns that come nearest to an expected answer, (..., nv).
+
+        Orientations are followed so beyond half a turn, where `difference` would jump.
+        """
+        result = self.difference(q0, q1)
+        for group, rows, columns in self._grouped:
+            parts = q0[..., rows], q1[..., rows], expected[..., columns]
+            result[..., columns] = group.difference_near(*parts)
         return result
 
     def normalized(self, q: Array) -> Array:

@@ -237,6 +237,16 @@ class DiscreteLagrangian:
         """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
         return [self._jet(batch, path) for batch in self._batches]
 
+    def turns(self, path: DiscretePath) -> Array:
+        """The largest turn of an orientation in the chart of every interval, shape (N,), in [rad].
+
+        At its quadrature points and its end; zero where there are no charts.
+        """
+        turns = np.zeros(self.grid.intervals)
+        for batch, charts in zip(self._batches, self._charts(path) or (), strict=False):
+            turns[batch.index] = charts.turns
+        return turns
+
     @cached_property
     def point_weights(self) -> list[Array]:
         """h w_j of every quadrature point, shape (P,), per batch."""

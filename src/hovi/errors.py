@@ -29,6 +29,10 @@ class InputError(HoviError):
     """An argument of a public function is missing, of the wrong shape, or not finite."""
 
 
+class ChartError(InputError):
+    """A motion turns an orientation too far within an interval for one chart."""
+
+
 class ModelError(HoviError):
     """A robot model cannot be read, is not physical, or cannot be planned on."""
 

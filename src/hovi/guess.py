@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import InputError, nearest
+from hovi.errors import ChartError, InputError, nearest
 from hovi.grid import DiscretePath, Grid
 from hovi.robot import Robot
 from hovi.schemes.polynomials import interval_rows
@@ -20,6 +20,8 @@ Boundary = tuple[Array, Array, Array, Array]
 
 QUADRATURE = 8
 """Points by which the turns of continuous joints within an interval are told."""
+WIDEST = 0.9 * np.pi
+"""Turn of an orientation within an interval that a guess may make, in [rad]."""
 BUMP_MODES = 8
 BUMP_AMPLITUDES = (0.2, 1.5)
 """Range of a random bump's amplitude, in [rad] or [m]."""
@@ -158,7 +160,7 @@ def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> 
     """
     q, v, _ = (x.copy() for x in curve(grid.t))
     q[0], v[0], q[-1], v[-1] = boundary
-    turned = None if robot.vector_joints else _turned(curve, grid)
+    turned = None if robot.vector_joints else _turned(curve, grid, robot)
     inner = _inner_modes(curve, grid, robot, q)
     return DiscretePath(q, v, regularised(robot, grid, q, v, turned), inner)
 
@@ -215,13 +217,15 @@ def regularised(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | No
     """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
 
     x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 where tangent vectors add.
-    turned: about how far the continuous joints turn in each interval, shape (N, nv); less than
-        half a turn when None.
+    turned: about how far joints turn in each interval, shape (N, nv); less than half a turn when
+        None.
     """
     h = grid.steps[:, None]
-    x1, dx1 = robot.difference(q[:-1], q[1:]), v[1:]
-    if turned is not None:
-        x1 = robot.space.unwound(x1, turned)
+    dx1 = v[1:]
+    if turned is None:
+        x1 = robot.difference(q[:-1], q[1:])
+    else:
+        x1 = robot.space.difference_near(q[:-1], q[1:], turned)
     if not robot.space.flat:
         dx1 = robot.chart.rates(x1, dx1)[0]
     return np.stack([(x1 - h * v[:-1]) / h**2, (dx1 - v[:-1]) / h], axis=1)
@@ -231,17 +235,31 @@ def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> Discrete
     """A path whose z follows its nodes where tangent vectors do not add, and is kept elsewhere."""
     if robot.space.flat:
         return path
-    z, known = path.z.copy(), regularised(robot, grid, path.q, path.v)
+    h = grid.steps[:, None]
+    turned = h * path.v[:-1] + h**2 * path.z[:, 0]
+    z, known = path.z.copy(), regularised(robot, grid, path.q, path.v, turned)
     for factor in robot.space.curved:
         z[:, :, factor.v] = known[:, :, factor.v]
     return DiscretePath(path.q, path.v, z, path.inner)
 
 
-def _turned(curve: Curve, grid: Grid) -> Array:
-    """The integral of v over every interval, by Gauss quadrature, shape (N, nv)."""
+def _turned(curve: Curve, grid: Grid, robot: Robot) -> Array:
+    """The integral of v over every interval, by Gauss quadrature, shape (N, nv).
+
+    Raises ChartError where an orientation turns by half a turn or nearly so in an interval.
+    """
     x, w = np.polynomial.legendre.leggauss(QUADRATURE)
     t = grid.t[:-1, None] + grid.steps[:, None] * (x + 1) / 2
     v = curve(t.ravel())[1].reshape(grid.intervals, QUADRATURE, -1)
+    for factor in robot.space.curved:
+        speed = np.linalg.norm(v[:, :, [factor.v.start + i for i in factor.group.angular]], axis=2)
+        turn = grid.steps * (speed @ (w / 2))  # (N,)
+        if turn.max() > WIDEST:
+            raise ChartError(
+                f"the guess turns joint {robot.joint_at(factor.v.start)!r} by {turn.max():.3g} rad "
+                f"within an interval, and a chart holds up to {WIDEST:.3g}: take more intervals, "
+                f"{int(np.ceil(grid.intervals * turn.max() / WIDEST))} or more."
+            )
     return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
 
 

@@ -35,7 +35,8 @@ class Group:
     angular: tuple[int, ...]
     unit: tuple[int, ...]
     _compose: Callable[[Array, Array], Array]
-    _log: Callable[[Array, Array], Array]
+    _turn: Callable[[Array, Array], Array]
+    _log: Callable[[Array, Array, Array], Array]
 
     def integrate(self, g: Array, d: Array) -> Array:
         """g exp(d): elements (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
@@ -43,7 +44,15 @@ class Group:
 
     def difference(self, g0: Array, g1: Array) -> Array:
         """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
-        return self._log(g0, g1)
+        return self._log(g0, g1, self._turn(g0, g1))
+
+    def difference_near(self, g0: Array, g1: Array, expected: Array) -> Array:
+        """As `difference`, with the full turns that come nearest to an expected answer."""
+        w, wanted = self._turn(g0, g1), expected[..., list(self.angular)]
+        size = np.sqrt(np.sum(w * w, axis=-1, keepdims=True))
+        axis = w / np.where(size > 0, size, 1.0)
+        turns = np.round((np.sum(axis * wanted, axis=-1, keepdims=True) - size) / (2 * np.pi))
+        return self._log(g0, g1, w + 2 * np.pi * turns * axis)
 
     def normalized(self, g: Array) -> Array:
         """Elements (..., nq) with their unit part of unit norm."""
@@ -54,7 +63,7 @@ class Group:
         return result
 
 
-def _turn(c: Array, p: Array) -> Array:
+def _rotate(c: Array, p: Array) -> Array:
     """The product of complex numbers (real, imaginary): p turned by c."""
     real = c[..., 0] * p[..., 0] - c[..., 1] * p[..., 1]
     return np.stack([real, c[..., 1] * p[..., 0] + c[..., 0] * p[..., 1]], axis=-1)
@@ -65,7 +74,7 @@ def _circle(angle: Array) -> Array:
 
 
 def _so2_compose(g: Array, d: Array) -> Array:
-    return _turn(g, _circle(d[..., 0]))
+    return _rotate(g, _circle(d[..., 0]))
 
 
 def _angle_between(g0: Array, g1: Array) -> Array:
@@ -74,27 +83,35 @@ def _angle_between(g0: Array, g1: Array) -> Array:
     return np.asarray(np.arctan2(sine, cosine))
 
 
-def _so2_log(g0: Array, g1: Array) -> Array:
+def _so2_turn(g0: Array, g1: Array) -> Array:
     return _angle_between(g0, g1)[..., None]
+
+
+def _turn_alone(g0: Array, g1: Array, w: Array) -> Array:
+    return w
 
 
 def _se2_compose(g: Array, d: Array) -> Array:
     w = d[..., 2]
     # V(w) d = (sin w / w) d + ((1 - cos w) / w) (-d_y, d_x)
     along, across = np.sinc(w / np.pi), 0.5 * w * np.sinc(w / (2 * np.pi)) ** 2
-    local = _turn(np.stack([along, across], axis=-1), d[..., :2])
+    local = _rotate(np.stack([along, across], axis=-1), d[..., :2])
     return np.concatenate(
-        [g[..., :2] + _turn(g[..., 2:], local), _turn(g[..., 2:], _circle(w))], axis=-1
+        [g[..., :2] + _rotate(g[..., 2:], local), _rotate(g[..., 2:], _circle(w))], axis=-1
     )
 
 
-def _se2_log(g0: Array, g1: Array) -> Array:
-    w = _angle_between(g0[..., 2:], g1[..., 2:])
+def _se2_turn(g0: Array, g1: Array) -> Array:
+    return _so2_turn(g0[..., 2:], g1[..., 2:])
+
+
+def _se2_log(g0: Array, g1: Array, turn: Array) -> Array:
+    w = turn[..., 0]
     back = g0[..., 2:] * np.array([1.0, -1.0])
-    p = _turn(back, g1[..., :2] - g0[..., :2])
+    p = _rotate(back, g1[..., :2] - g0[..., :2])
     along = 1.0 - w * w * half_cotangent(w * w)  # (w / 2) cot(w / 2)
-    v = _turn(np.stack([along, -0.5 * w], axis=-1), p)
-    return np.concatenate([v, w[..., None]], axis=-1)
+    v = _rotate(np.stack([along, -0.5 * w], axis=-1), p)
+    return np.concatenate([v, turn], axis=-1)
 
 
 def _quaternion(w: Array) -> Array:
@@ -126,7 +143,7 @@ def _so3_compose(g: Array, d: Array) -> Array:
     return quaternion_product(g, _quaternion(d))
 
 
-def _so3_log(g0: Array, g1: Array) -> Array:
+def _so3_turn(g0: Array, g1: Array) -> Array:
     product = quaternion_product(conjugate(g0), g1)
     product = np.where(product[..., 3:] < 0, -product, product)
     u, w = product[..., :3], product[..., 3:]
@@ -147,8 +164,11 @@ def _se3_compose(g: Array, d: Array) -> Array:
     )
 
 
-def _se3_log(g0: Array, g1: Array) -> Array:
-    w = _so3_log(g0[..., 3:], g1[..., 3:])
+def _se3_turn(g0: Array, g1: Array) -> Array:
+    return _so3_turn(g0[..., 3:], g1[..., 3:])
+
+
+def _se3_log(g0: Array, g1: Array, w: Array) -> Array:
     p = rotated(conjugate(g0[..., 3:]), g1[..., :3] - g0[..., :3])
     across = np.cross(w, p)
     square = np.sum(w * w, axis=-1, keepdims=True)
@@ -194,8 +214,8 @@ _COTANGENT = (
     77683 / 14101100039391805440000,
 )
 
-SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), _so2_compose, _so2_log)
-SE2 = Group("SE(2)", 4, 3, (2,), (2, 3), _se2_compose, _se2_log)
-SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _so3_compose, _so3_log)
-SE3 = Group("SE(3)", 7, 6, (3, 4, 5), (3, 4, 5, 6), _se3_compose, _se3_log)
+SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), _so2_compose, _so2_turn, _turn_alone)
+SE2 = Group("SE(2)", 4, 3, (2,), (2, 3), _se2_compose, _se2_turn, _se2_log)
+SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _so3_compose, _so3_turn, _turn_alone)
+SE3 = Group("SE(3)", 7, 6, (3, 4, 5), (3, 4, 5, 6), _se3_compose, _se3_turn, _se3_log)
 GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}

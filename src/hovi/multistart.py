@@ -21,10 +21,11 @@ from joblib import Parallel, delayed, parallel_config
 
 from hovi.clearance import Clearance
 from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.errors import ChartError
 from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import stretched, with_bump, with_turns
+from hovi.guess import Curve, stretched, with_bump, with_turns
 from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
@@ -188,8 +189,16 @@ def _round(
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
         if robot.space.angles:
             curve = with_turns(curve, robot, T, _random_turns(robot, seed * 100_003 + i))
-        guesses.append(problem.path(curve))
+        guesses.append(_on_charts(problem, curve, base))
     return guesses
+
+
+def _on_charts(problem: TrajectoryProblem, curve: Curve, base: Curve) -> DiscretePath:
+    """A curve on the grid, or what it was made from where it turns too far for a chart."""
+    try:
+        return problem.path(curve)
+    except ChartError:
+        return problem.path(base)
 
 
 def _random_turns(robot: Robot, seed: int) -> Array:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hovi.adaptive import refine_to_tolerance
 from hovi.blas_threads import one_blas_thread
 from hovi.clearance import MARGIN, Clearance
-from hovi.errors import InputError, SceneError
+from hovi.errors import ChartError, InputError, SceneError
 from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
 from hovi.goals import Via
@@ -34,6 +34,10 @@ from hovi.trajectory import Trajectory
 
 COARSE_INTERVALS = 60
 """Grids with more than twice as many intervals are first solved on a grid of this many."""
+MOST_INTERVALS = 2000
+"""To which intervals are halved so that their charts hold the orientations of the first guess."""
+CHART_ROUNDS = 4
+"""How often intervals are halved in which an orientation turns too far."""
 REFINED = 6
 """Coarse minima that are refined and ranked on the grid that was asked for."""
 EXPLORING = 0.7
@@ -133,6 +137,7 @@ def plan(
         if not isinstance(fine.goal, State):
             raise InputError("turns are for a goal of the joints: give a State instead of a frame.")
         fine = dataclasses.replace(fine, goal=dataclasses.replace(fine.goal, turns=turns))
+    fine = _with_room(fine, guess)
     ends = None if time_limit is None else time.monotonic() + time_limit
     chatter = progress or _silent
     count = processes or default_processes()
@@ -147,6 +152,24 @@ def plan(
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
     )
+
+
+def _with_room(job: Job, guess: str | Trajectory) -> Job:
+    """The job on a grid whose charts hold the orientations of the guess: intervals are halved.
+
+    Raises ChartError where that would take more than MOST_INTERVALS.
+    """
+    if job.scene.robot.space.flat:
+        return job
+    while True:
+        try:
+            guess_path(job.problem(), guess)
+            return job
+        except ChartError:
+            if 2 * job.grid.intervals > MOST_INTERVALS:
+                raise
+        every = np.ones(job.grid.intervals, dtype=bool)
+        job = dataclasses.replace(job, grid=job.grid.halved(every))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +200,8 @@ class _Search:
                 found = _on_coarse_grid(found[:1])
             else:
                 found = self._climbed(self.fine, self._refine(found), guess)
+        if not search.interrupted:
+            found = [self._in_charts(found[0]), *found[1:]]
         if self.free is not None and not search.interrupted:
             found = self._freed(self.free, found[:REFINED])
         best = found[0]
@@ -190,6 +215,28 @@ class _Search:
         if not self.continuation or not may_help(found[0]):
             return found
         return [climb(job, found[0], guess, self.deadline, self.progress)]
+
+    def _in_charts(self, best: Solution) -> Solution:
+        """The best solution where no orientation turns by half a turn within an interval.
+
+        Intervals in which one does are halved, at most CHART_ROUNDS times.
+        """
+        if self.fine.scene.robot.space.flat:
+            return best
+        for _ in range(CHART_ROUNDS):
+            grid = best.trajectory.grid
+            problem = dataclasses.replace(self.fine, grid=grid).problem()
+            wide = problem.ld.turns(best.trajectory.path) > np.pi
+            if not wide.any():
+                break
+            left = None if self.deadline is None else self.deadline - time.monotonic()
+            if left is not None and left <= 0:
+                break
+            finer = dataclasses.replace(self.fine, grid=grid.halved(wide))
+            halved = _with_room(finer, best.trajectory)
+            most = self.fine.max_iterations
+            best = solve(halved.problem(), best.trajectory, max_iterations=most, time_limit=left)
+        return best
 
     def _explore_until(self, job: Job) -> float | None:
         """The search's deadline, which leaves time for refining."""

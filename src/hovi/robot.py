@@ -250,7 +250,9 @@ class Robot:
 
         name: what the argument is called, for the message. Raises InputError.
         """
-        checked = configuration.check_vector(q, name, configuration.entry_names(self.model, "nq"))
+        entries = configuration.entry_names(self.model, "nq")
+        hint = configuration.manifold_hint(self.model)
+        checked = configuration.check_vector(q, name, entries, hint)
         if self.vector_joints:
             return checked
         configuration.check_unit_norms(self.model, checked, name)

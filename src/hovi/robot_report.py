@@ -116,7 +116,10 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     pairs = list(zip(model.joints[1:], model.names[1:], strict=True))
     manifold = [name for joint, name in pairs if joint.nq != joint.nv]
     if manifold:
-        yield f"nq and nv differ at {_some(manifold)}: these positions do not add like vectors"
+        yield (
+            f"nq and nv differ at {_some(manifold)}: a continuous joint takes (cos, sin) of its "
+            "angle, an orientation a unit quaternion (x, y, z, w)"
+        )
     for what, limit in (("velocity", model.velocityLimit), ("effort", model.effortLimit)):
         zero = np.flatnonzero(np.asarray(limit) == 0.0)
         if len(zero):

@@ -232,6 +232,7 @@ def _without_limits(
     outcome = minimize(objective, path, options, report)
     n_neg, outcome = _certify(objective, outcome)
     status, message = _verdict(problem, outcome, n_neg)
+    message += _chart_sentence(problem, outcome.x)
     nit, history = outcome.iterations, outcome.history
     return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None)
 
@@ -293,6 +294,18 @@ def _with_limits(
         outcome.n_neg,
         outcome.history,
         outcome.forces,
+    )
+
+
+def _chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """What to say where an orientation turns by more than half a turn in an interval, or ""."""
+    turns = problem.ld.turns(path)
+    k = int(np.argmax(turns))
+    if turns[k] <= np.pi:
+        return ""
+    return (
+        f" An orientation turns by {turns[k]:.3g} rad in the interval at t = "
+        f"{problem.grid.t[k]:.3g} s, more than half a turn: take more intervals."
     )
 
 

@@ -26,6 +26,8 @@ from hovi.problem import TrajectoryProblem
 Array = npt.NDArray[np.float64]
 LinearAlgebra = Literal["band", "tree"]
 
+CHART_END = 1.4 * np.pi
+"""Turn of an orientation within an interval, in [rad], at which no motion is looked for."""
 BAND_INTERVALS = 1000
 """Up to this many intervals the nodal band matrix, whose condition grows like N^4, is factored."""
 
@@ -72,6 +74,8 @@ class ActionObjective(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The discrete action, with what equations add."""
+        if self._overturned(x):
+            return float("inf")
         if self.multipliers is None:
             return self.ld.action(x, self.jets(x))
         return self.value_of(x, self.torques(x))
@@ -82,8 +86,14 @@ class ActionObjective(Objective[DiscretePath]):
         pairs = zip(self.jets(x), self.ld.point_times, strict=True)
         return [lagrangian.torques.torque(*jet, t) for jet, t in pairs]
 
+    def _overturned(self, x: DiscretePath) -> bool:
+        """Whether an orientation leaves the chart of an interval, which is singular at a turn."""
+        return self.ld.chart is not None and bool(self.ld.turns(x).max() > CHART_END)
+
     def value_of(self, x: DiscretePath, torques: list[Array]) -> float:
         """The value where the torques at the quadrature points are known."""
+        if self._overturned(x):
+            return float("inf")
         value = 0.0
         for i, (jet, t, weights) in enumerate(
             zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)

@@ -10,6 +10,8 @@ from hovi.lie_groups import SE2, SE3, SO2, SO3
 
 Array = npt.NDArray[np.float64]
 
+_NOTHING = 1e-9
+
 
 def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
     """Configurations (M, nq) along a motion as numbers (M, nv) that do not jump.
@@ -44,10 +46,10 @@ def _rotation_vector(quaternion: Array) -> Array:
     still = np.broadcast_to([0.0, 0.0, 0.0, 1.0], quaternion.shape)
     vectors = SO3.difference(still, quaternion)
     for i in range(1, len(vectors)):
-        size = float(np.linalg.norm(vectors[i]))
-        if size < 1e-9:
+        size, before = float(np.linalg.norm(vectors[i])), float(np.linalg.norm(vectors[i - 1]))
+        if max(size, before) < _NOTHING:
             continue
-        axis = vectors[i] / size
+        axis = vectors[i] / size if size > _NOTHING else vectors[i - 1] / before
         turns = np.round((vectors[i - 1] @ axis - size) / (2 * np.pi))
         vectors[i] += 2 * np.pi * turns * axis
     return vectors

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from hovi.errors import HoviError, nearest
@@ -12,7 +13,10 @@ from hovi.task_file.sentences import TomlText
 def read_configuration(
     given: list[float] | dict[str, Any] | str, end: str, robot: Robot, toml: TomlText
 ) -> list[float]:
-    """A configuration (nq,): a list, the name of a pose, or a table with every joint."""
+    """A configuration (nq,): a list, the name of a pose, or a table with every joint.
+
+    In a table the angle of a continuous joint is one number, in [rad].
+    """
     if isinstance(given, str):
         try:
             return [float(each) for each in robot.pose(given)]
@@ -28,8 +32,12 @@ def _by_joint(by_joint: dict[str, Any], end: str, robot: Robot, toml: TomlText) 
         raise toml.error((end, "q"), f"`{end}.q` leaves out joint {left_out[0]!r}")
     q: list[float] = []
     for joint in robot.joint_names:
-        size = robot.model.joints[robot.model.getJointId(joint)].nq
-        q += _numbers(by_joint[joint], size, (end, "q", joint), toml)
+        place = robot.model.joints[robot.model.getJointId(joint)]
+        given = by_joint[joint]
+        if (place.nq, place.nv) == (2, 1) and not isinstance(given, list):
+            q += [math.cos(given), math.sin(given)]
+        else:
+            q += _numbers(given, place.nq, (end, "q", joint), toml)
     return q
 
 

@@ -1,0 +1,74 @@
+"""Every robot of example-robot-data: joints, setup, and a small random motion."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+from measuring import print_machine, print_table
+
+import hovi
+from hovi.example_robots import BUILT_IN_CODE, example_names
+
+INTERVALS = 4
+SIZE = 0.1
+"""Of the random displacement of every coordinate, in [rad] or [m]."""
+SECONDS = 10.0
+"""What the motion may take."""
+
+
+def measure(name: str) -> list[object]:
+    """One row: name, nq, nv, joints, seconds to set up, what became of the motion."""
+    try:
+        robot = hovi.load_robot(name)
+    except hovi.HoviError as refused:
+        return [name, "", "", "", "", _cell(refused)]
+    joints = ", ".join(f"{n} {kind}" for kind, n in _kinds(robot).items())
+    row: list[object] = [name, robot.nq, robot.nv, joints]
+    began = time.perf_counter()
+    try:
+        scene = hovi.Scene(robot, [hovi.effects.Armature(0.1)])
+        d = SIZE * np.random.default_rng(0).uniform(-1, 1, robot.nv)
+        start = robot.neutral()
+        grid = hovi.Grid.uniform(1.0, INTERVALS, hovi.schemes.galerkin(1))
+        ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+        goal = hovi.State(robot.integrate(start, d))
+        problem = hovi.TrajectoryProblem(ld, hovi.State(start), goal)
+    except hovi.HoviError as refused:
+        return [*row, "", _cell(refused)]
+    row.append(f"{time.perf_counter() - began:.2f}")
+    solution = hovi.solve(problem, time_limit=SECONDS)
+    outcome = f"{solution.status}, cost {solution.cost:.4g}, {solution.nit} steps"
+    return [*row, outcome]
+
+
+def _kinds(robot: hovi.Robot) -> Counter[str]:
+    """How many joints there are of each of Pinocchio's kinds."""
+    short = (joint.shortname().removeprefix("JointModel") for joint in robot.model.joints[1:])
+    return Counter(kind.rstrip("XYZ") if len(kind) < 5 else kind for kind in short)
+
+
+def _cell(error: Exception) -> str:
+    return str(error).replace("|", "/").replace("\n", " ")
+
+
+def main() -> None:
+    """One table of all names."""
+    rows = []
+    for name in sorted({*example_names(), *BUILT_IN_CODE}):
+        print(name, file=sys.stderr, flush=True)
+        rows.append(measure(name))
+    print(
+        f"A motion of 1 s from the neutral configuration at rest by up to {SIZE} rad or m in every "
+        f"coordinate without gravity, rotors of 0.1 kg m², `galerkin-1` on {INTERVALS} intervals, "
+        f"at most {SECONDS:.0f} s. Joints by Pinocchio's names: RUB turns without end, R revolute, "
+        "P prismatic.\n"
+    )
+    print_table(["robot", "nq", "nv", "joints", "setup [s]", "motion"], rows)
+    print_machine()
+
+
+if __name__ == "__main__":
+    main()
