@@ -16,6 +16,7 @@ from hovi.errors import InputError
 from hovi.finer_solution import FinerSolution, finer_grid
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
+from hovi.limits import TOLERANCE
 from hovi.motion_error import relative_difference
 from hovi.nodal_hamiltonian import nodal_hamiltonian
 from hovi.problem import TrajectoryProblem
@@ -196,12 +197,10 @@ class _Search:
         if self.deadline is not None and time.monotonic() > self.deadline:
             return "the time limit was reached"
         cost = self.tolerance.quantity is Quantity.COST
-        limits = None if solution.problem is None else solution.problem.limits
-        least = ROUNDING
-        if limits is not None and limits.bounded.any():
-            least = BLUR * limits.tolerance
-        if cost and candidate.error <= least:
-            what = "rounding leaves" if least == ROUNDING else "the limits' tolerance leaves"
+        assert solution.problem is not None
+        if cost and candidate.error <= _least_error(solution.problem):
+            limited = solution.problem.limited
+            what = "the limits' tolerance leaves" if limited else "rounding leaves"
             return f"{what} no smaller error"
         if stalled >= STALLED:
             return f"the last {STALLED} grids brought no smaller error"
@@ -340,9 +339,15 @@ def _error_of_cost(solution: Solution, finer: FinerSolution) -> float:
         return error
     problem = solution.problem
     assert problem is not None
-    if problem.limits is not None and problem.limited:
-        return max(CAUTION * error, BLUR * problem.limits.tolerance)
-    return max(error, ROUNDING)
+    error *= CAUTION if problem.limited else 1.0
+    return max(error, _least_error(problem))
+
+
+def _least_error(problem: TrajectoryProblem) -> float:
+    """The smallest error of the cost that is claimed, relative."""
+    if not problem.limited:
+        return ROUNDING
+    return BLUR * (TOLERANCE if problem.limits is None else problem.limits.tolerance)
 
 
 def _contributions(finer: FinerSolution) -> Array:
