@@ -32,6 +32,7 @@ SCRIPTS = (
     "growth",
     "tolerance",
     "example_robots",
+    "manifold_points",
 )
 
 

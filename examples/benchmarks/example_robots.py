@@ -15,7 +15,7 @@ from hovi.example_robots import BUILT_IN_CODE, example_names
 INTERVALS = 4
 SIZE = 0.1
 """Of the random displacement of every coordinate, in [rad] or [m]."""
-SECONDS = 10.0
+SECONDS = 60.0
 """What the motion may take."""
 
 
