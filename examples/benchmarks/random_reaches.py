@@ -24,7 +24,7 @@ PAIRS, SEED, STARTS = 20, 0, 4
 SCHEME, INTERVALS = "galerkin-2", 16
 HOLDING = 0.9
 """Share of the torque limits that holding an end may take."""
-TIME_LIMIT = 60.0  # [s], of one call of plan
+TIME_LIMIT = 600.0  # [s], of one call of plan
 
 
 def pairs(scene: hovi.Scene) -> list[tuple[np.ndarray, np.ndarray, float]]:
@@ -65,7 +65,6 @@ def _said(solution: hovi.Solution) -> dict[str, object]:
         "status": str(solution.status),
         "message": solution.message,
         "steps": solution.nit,
-        "seconds": solution.solve_seconds,
         "intervals": solution.trajectory.grid.intervals,
     }
 
@@ -83,25 +82,23 @@ def main() -> None:
         bad = [row for row in rows if not row["solution"]["success"]]
         rescued = sum(row["again"]["success"] for row in bad)
         steps = [s["steps"] for s in good]
-        ms = [1e3 * s["seconds"] for s in good]
         table.append(
             [
                 f"`{name}`",
                 f"{len(good)} of {len(rows)}",
                 f"{np.median(steps):.0f}, {max(steps)}",
-                f"{np.median(ms):.0f}, {max(ms):.0f}",
                 max(s["intervals"] for s in good),
                 f"{len(good) + rescued} of {len(rows)}",
             ]
         )
         failures += [(name, row) for row in bad]
-    columns = ["robot", "minima", "steps", "ms", "most intervals"]
+    columns = ["robot", "minima", "steps", "most intervals"]
     print_table([*columns, f"minima, with {STARTS} starts for the rest"], table)
     for name, row in failures:
         said, again = row["solution"], row["again"]
-        print(f"- `{name}` {row['number']}: {said['status']} after {said['steps']} steps and")
-        print(f"  {said['seconds']:.1f} s: {said['message']}")
-        print(f"  With {STARTS} starts: {again['status']} after {again['seconds']:.1f} s.")
+        print(f"- `{name}` {row['number']}: {said['status']} after {said['steps']} steps:")
+        print(f"  {said['message']}")
+        print(f"  With {STARTS} starts: {again['status']}.")
     print()
     print_machine(threads=1)
 
