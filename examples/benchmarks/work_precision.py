@@ -124,6 +124,12 @@ def print_ratios(diagram: Diagram) -> None:
         for method, row in table.items()
     ]
     print_table(columns, rows)
+    for place, tolerance in enumerate(TOLERANCES):
+        known = [(row[place], method) for method, row in table.items() if row[place] is not None]
+        if known:
+            ratio, method = min(known)
+            print(f"- Closest at {tolerance:.0e}, warm: {method}, {ratio:.2g} times hovi's time.")
+    print()
     won = [m for m, row in table.items() if any(x is not None and x < 1 for x in row)]
     if won:
         print(f"Faster than hovi somewhere, in bold: {', '.join(won)}.\n")
