@@ -89,6 +89,12 @@ def test_limits_hold_while_the_duration_is_found() -> None:
     assert solution.cost < min(costs)
 
 
+def test_a_search_that_is_cut_short_is_no_success() -> None:
+    solution = reach((0.5, 4.0), time_weight=WEIGHT, time_limit=1e-3)
+    assert not solution.success
+    assert solution.status is hovi.Status.TIME_LIMIT
+
+
 def test_bad_durations_are_refused() -> None:
     with pytest.raises(InputError, match="0 < lower < upper"):
         reach((2.0, 1.0))

@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.free_fall import free_fall_contradiction
+from hovi.errors import InputError
+from hovi.free_fall import falls_freely, free_fall_contradiction
 
 
 @cache
@@ -122,6 +123,23 @@ def test_a_redundant_goal_is_met() -> None:
     assert again.success, again.message
     assert again.cost == pytest.approx(free.cost, rel=1e-9)
     np.testing.assert_allclose(again.trajectory.q[-1], end, atol=1e-8)
+
+
+def test_friction_on_the_base_is_no_free_fall() -> None:
+    """One coefficient for every coordinate brakes the base as well; those of the arm do not."""
+    task = spacecraft()
+    robot, passive = task.scene.robot, task.scene.passive
+    everywhere = hovi.Scene(robot, [hovi.effects.ViscousFriction(0.1)], passive=passive)
+    assert not falls_freely(everywhere)
+    joints = dict.fromkeys(robot.joint_names[1:], 0.1)
+    assert falls_freely(hovi.Scene(robot, [hovi.effects.ViscousFriction(joints)], passive=passive))
+
+
+def test_parts_of_an_orientation_cannot_be_free_alone() -> None:
+    task = spacecraft()
+    goal = dataclasses.replace(task.goal, free=("root_joint[3]", "root_joint[4]"))
+    with pytest.raises(InputError, match="the place, one turn, all turns or everything"):
+        hovi.plan(task.scene, task.start, goal, 1.0)
 
 
 def test_a_base_with_thrusters_may_go_anywhere() -> None:

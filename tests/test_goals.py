@@ -38,8 +38,9 @@ def test_a_pose_goal_is_met_and_costs_no_more_than_its_joint_goal(
     error = pin.log6(placement(robot, frame, end).actInv(wanted)).vector
     assert np.linalg.norm(error) < 1e-9
     np.testing.assert_array_equal(solution.trajectory.v[-1], 0.0)
-    same = hovi.plan(task.scene, task.start, end, 2.5, limits=limits, guess=solution.trajectory)
     if limits == "none":
+        guess = solution.trajectory
+        same = hovi.plan(task.scene, task.start, end, 2.5, limits=limits, guess=guess)
         assert solution.cost <= same.cost * (1 + 1e-9)
 
 
@@ -124,6 +125,33 @@ def test_unreachable_goals_and_via_points_are_infeasible_with_the_reason() -> No
     solution = hovi.plan(task.scene, task.start, task.goal, 2.0, via=[via], limits="none")
     assert solution.status is hovi.Status.INFEASIBLE
     assert not solution.success
+
+
+def test_planning_again_to_a_turned_goal_turns_the_hand() -> None:
+    """Half a turn away the equations of the new goal hold where the old motion ends."""
+    task = hovi.load_task(hovi.example("ur5_reach"))
+    pose = at_goal(task, "tool0")
+    first = hovi.plan(
+        task.scene, task.start, hovi.FrameGoal("tool0", rotation=pose.rotation), 2.0, limits="none"
+    )
+    turned = pose.rotation @ np.diag([1.0, -1.0, -1.0])
+    again = first.replan(goal=hovi.FrameGoal("tool0", rotation=turned))
+    assert again.success, again.message
+    end = placement(task.scene.robot, "tool0", again.trajectory.q[-1])
+    assert np.linalg.norm(pin.log3(end.rotation.T @ turned)) < 1e-9
+    stuck = hovi.solve(again.problem, first.trajectory)
+    assert stuck.status is hovi.Status.INFEASIBLE
+    assert "turned over" in stuck.message
+
+
+def test_two_via_points_may_share_a_time(arm_scene: hovi.Scene) -> None:
+    vias = [
+        hovi.Via(0.5, hovi.State([-0.5, 0.0], free=["elbow"])),
+        hovi.Via(0.5, hovi.State([0.0, 0.4], free=["shoulder"])),
+    ]
+    solution = hovi.plan(arm_scene, [-1.5, 0.0], [0.3, 0.7], 1.0, via=vias, limits="none")
+    assert solution.success, solution.message
+    np.testing.assert_allclose(solution.trajectory.sample(0.5).q[0], [-0.5, 0.4], atol=1e-9)
 
 
 def test_bad_goals_and_via_points_are_refused() -> None:

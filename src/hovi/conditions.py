@@ -21,11 +21,18 @@ class Condition(ABC):
 
     @abstractmethod
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """c, shape (k,), in [m] or [rad], and its Jacobian with respect to (q, v), (k, 2, nv)."""
+        """c, shape (k,), and its Jacobian with respect to (q, v), shape (k, 2, nv).
+
+        Components of a position are in [m], of a turn or a joint in [rad], of a velocity per [s].
+        """
 
     @abstractmethod
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
         """sum_i weights_i d2 c_i, shape (2, nv, 2, nv)."""
+
+    def elsewhere(self, q: Array, v: Array) -> bool:
+        """Whether c vanishes although what is meant is not met."""
+        return False
 
     @abstractmethod
     def describe(self, q: Array, v: Array) -> str:

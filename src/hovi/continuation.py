@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from hovi.easing import HeavierRotors, WeakerGravity
 from hovi.effects import Effect
+from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
 from hovi.grid import Grid
@@ -106,7 +107,10 @@ def finer_grids(job: Job) -> list[Rung]:
         N = (N + 1) // 2
         grid = Grid.uniform(job.grid.duration, N, galerkin(2))
         if job.via:
-            grid = grid.with_nodes([via.time for via in job.via])
+            try:
+                grid = grid.with_nodes([via.time for via in job.via])
+            except InputError:  # too few nodes for the via points
+                break
         rungs.append(Rung(f"{N} intervals", dataclasses.replace(job, grid=grid)))
     return rungs[::-1]
 
@@ -125,7 +129,7 @@ def narrowing_limits(job: Job) -> list[Rung]:
 
 
 def _eased(scene: Scene, effect: Effect) -> Scene:
-    return Scene(scene.robot, [*scene.effects, effect], compile=scene.compile)
+    return dataclasses.replace(scene, effects=[*scene.effects, effect])
 
 
 def _without_torque_limits(job: Job) -> Job:

@@ -40,8 +40,8 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
     """Which end takes more than a torque limit at rest, as the end of a sentence, or ""."""
     q0, v0, q1, v1 = problem.boundary
     zero = np.zeros((1, problem.robot.nv))
-    for end, q, v in (("start", q0, v0), ("goal", q1, v1)):
-        if np.any(v != 0):
+    for i, (end, q, v) in enumerate((("start", q0, v0), ("goal", q1, v1))):
+        if np.any(v != 0) or problem.free_ends[i].any():
             continue
         tau = problem.scene.inverse_dynamics(q[None], zero, zero)[0]
         over = np.maximum(limits.lower[3] - tau, tau - limits.upper[3])

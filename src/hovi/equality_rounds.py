@@ -57,7 +57,8 @@ Result = TypeVar("Result", bound=Minimized)
 class Satisfied(Generic[Result]):
     """Where the rounds ended.
 
-    result: of the last round, solved with `multipliers`. reason: why the equations cannot be met,
+    result: of the last round. multipliers: those of that round, or the next ones where the number
+    of rounds ended it. reason: why the equations cannot be met,
     in a sentence without its end, or "".
     """
 
@@ -107,7 +108,9 @@ def satisfy(
         last = sizes
     reason = ""
     if result.stop is Stop.STATIONARY and not _met(residuals, CLOSE, CLOSE):
-        reason = _why(problem, path, residuals)
+        reason = unmet_sentence(problem, path, residuals)
+    elif result.stop is Stop.STATIONARY:
+        reason = _elsewhere(problem, path)
     return Satisfied(result, multipliers, residuals, reason)
 
 
@@ -174,7 +177,19 @@ def _stiffest(now: Multipliers, first: Multipliers, slow: list[bool]) -> bool:
     return any(each and size >= LARGEST for each, size in zip(slow, grown, strict=True))
 
 
-def _why(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
+def _elsewhere(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """Which condition is met by what it does not mean, or ""."""
+    for each in problem.conditions:
+        q, v = path.q[each.node], path.v[each.node]
+        if each.condition.elsewhere(q, v):
+            return (
+                f"the motion ends turned over at t = {problem.grid.t[each.node]:.4g} s: "
+                f"{each.condition.describe(q, v)}; plan again from another guess"
+            )
+    return ""
+
+
+def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
     """Which equation fails most."""
     if residuals.torque_share > CLOSE:
         joints = ", ".join(repr(joint) for joint in problem.scene.passive)
@@ -187,4 +202,7 @@ def _why(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -
         key=lambda pair: float(np.max(np.abs(pair[1]), initial=0.0)),
     )[0]
     missed = worst.condition.describe(path.q[worst.node], path.v[worst.node])
-    return f"what is asked at t = {problem.grid.t[worst.node]:.4g} s cannot be met: {missed}"
+    return (
+        f"what is asked at t = {problem.grid.t[worst.node]:.4g} s cannot be met: {missed}; ask for "
+        "less, or plan again from another guess"
+    )

@@ -21,6 +21,8 @@ from hovi.tangent import Symbols, hessian, jacobian
 
 Array = npt.NDArray[np.float64]
 
+HALF_TURN = 1e-6
+"""Angle in [rad] by which a frame may miss a goal whose equations hold: else it is turned over."""
 UNIT = 1e-6
 """How far a rotation matrix or a direction may be from orthonormal."""
 
@@ -51,11 +53,14 @@ class FrameGoal:
         if self.pose is not None:
             if self.position is not None or self.rotation is not None or self.axis is not None:
                 raise InputError("a frame goal takes a pose, or its parts, not both.")
-            matrix = np.asarray(getattr(self.pose, "homogeneous", self.pose), dtype=float)
+            matrix = _numbers("pose", getattr(self.pose, "homogeneous", self.pose))
             if matrix.shape != (4, 4):
                 raise InputError(f"a pose is a matrix of shape (4, 4), not {matrix.shape}.")
+            if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+                raise InputError(f"the last row of a pose is 0, 0, 0, 1, not {matrix[3]}.")
             object.__setattr__(self, "position", matrix[:3, 3])
             object.__setattr__(self, "rotation", matrix[:3, :3])
+            object.__setattr__(self, "pose", None)
         if self.position is None and self.rotation is None and self.axis is None:
             raise InputError("a frame goal needs a pose, a position, a rotation or an axis.")
         if self.rotation is not None and self.axis is not None:
@@ -65,7 +70,11 @@ class FrameGoal:
         if self.rotation is not None:
             object.__setattr__(self, "rotation", _rotation(self.rotation))
         if self.axis is not None:
+            if len(self.axis) != 2:
+                raise InputError("an axis is a pair: a direction in the frame, one in the world.")
             object.__setattr__(self, "axis", tuple(_direction(each) for each in self.axis))
+        if isinstance(self.free_velocity, str):
+            object.__setattr__(self, "free_velocity", (self.free_velocity,))
 
     def check(self, robot: Robot) -> None:
         """Raise InputError for a frame that the robot does not have."""
@@ -124,6 +133,10 @@ class FrameCondition(Condition):
             angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
         return distance, angle
 
+    def elsewhere(self, q: Array, v: Array) -> bool:
+        """Whether the frame is half a turn away from its goal."""
+        return self.missed(q)[1] > HALF_TURN
+
     def describe(self, q: Array, v: Array) -> str:
         """By how much the frame misses its goal."""
         distance, angle = self.missed(q)
@@ -175,8 +188,15 @@ class FrameCondition(Condition):
         return ca.Function("ddc", [symbols[0], weights], [H])
 
 
+def _numbers(name: str, value: Any) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"the {name} of a frame goal is numbers, not {value!r}.") from None
+
+
 def _vector(name: str, value: npt.ArrayLike) -> Array:
-    vector = np.asarray(value, dtype=np.float64)
+    vector = _numbers(name, value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InputError(f"the {name} of a frame goal is three finite numbers, not {value!r}.")
     return vector
@@ -191,7 +211,7 @@ def _direction(value: npt.ArrayLike) -> Array:
 
 
 def _rotation(value: npt.ArrayLike) -> Array:
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = _numbers("rotation", value)
     fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
     if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > UNIT:
         raise InputError(f"the rotation of a frame goal is an orthonormal (3, 3), not {value!r}.")

@@ -19,8 +19,8 @@ from hovi.errors import InputError
 from hovi.solver import Solution
 from hovi.trajectory import Trajectory
 
-SolveFor = Callable[[float, "Trajectory | None"], Solution]
-"""The solution for a duration in [s], from a guess or from the first one."""
+SolveFor = Callable[[float, Trajectory], Solution]
+"""The solution for a duration in [s], from a guess."""
 
 STRIDE = 1.3
 """Ratio of two durations while a bracket is looked for."""
@@ -83,51 +83,71 @@ class _Search:
     def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution) -> None:
         self.free = free
         self.solve = solve
-        self.last = first
+        self.best = first
         self.steps = first.nit
-        self.ending = "The best duration is"
+        self.ending = "The best duration is" if first.success else "The duration is"
 
     def run(self) -> Solution:
-        """The motion at the best duration, or the last one where a solve failed."""
-        T = self.last.trajectory.duration
-        slope = self.slope(self.last)
-        while self.last.success and slope != 0.0:
+        """The motion at the best duration, or the last minimum where a solve failed."""
+        T = self.best.trajectory.duration
+        slope = self.slope(self.best)
+        while self.best.success and slope != 0.0:
             bound = self.free.lower if slope > 0 else self.free.upper
             if bound == T:
                 self.ending = "The duration is kept at its bound,"
-                return self.last
+                break
             further = T / STRIDE if slope > 0 else T * STRIDE
             further = float(np.clip(further, self.free.lower, self.free.upper))
-            before, origin = slope, self.last
-            slope = self.at(further)
-            if not self.last.success:
-                self.ending = f"No minimum was found for {further:.6g} s; the duration is"
-                return dataclasses.replace(origin, nit=self.steps)
-            if np.sign(slope) != np.sign(before):
-                return self.between(T, further)
-            T = further
-        return self.last
+            try:
+                next_slope = self.at(further)
+                if np.sign(next_slope) != np.sign(slope):
+                    self.between({T: slope, further: next_slope})
+                    break
+            except _FailedError as failed:
+                return self.unfinished(failed.solution)
+            T, slope = further, next_slope
+        return self.best
 
-    def between(self, a: float, b: float) -> Solution:
-        """Brent's method on a bracket; the motion where J' + w vanishes."""
-        known = {b: self.slope(self.last)}
+    def between(self, known: dict[float, float]) -> None:
+        """Brent's method on a bracket, of which both slopes are known, to where J' + w vanishes."""
 
         def slope_at(T: float) -> float:
             if T not in known:
                 known[T] = self.at(T)
             return known[T]
 
-        root = brentq(slope_at, a, b, xtol=PRECISION * min(a, b), rtol=4 * np.finfo(float).eps)
-        if self.last.trajectory.duration != root:
-            self.at(float(root))
-        return self.last
+        a, b = known
+        xtol, rtol = PRECISION * min(a, b), 4 * np.finfo(float).eps
+        root = float(brentq(slope_at, a, b, xtol=xtol, rtol=rtol, disp=False))
+        if self.best.trajectory.duration != root:
+            self.at(root)
 
     def at(self, T: float) -> float:
-        """Solve for a duration from the last motion; J' + w there."""
-        self.last = self.solve(T, self.last.trajectory)
-        self.steps += self.last.nit
-        return self.slope(self.last)
+        """Solve for a duration from the best motion so far; J' + w there.
+
+        Raises _FailedError where that is no minimum.
+        """
+        solution = self.solve(T, self.best.trajectory)
+        self.steps += solution.nit
+        if not solution.success:
+            raise _FailedError(T, solution)
+        self.best = solution
+        return self.slope(solution)
 
     def slope(self, solution: Solution) -> float:
         """J' + w, in cost per [s]."""
         return solution.duration_derivative + self.free.weight
+
+    def unfinished(self, failed: Solution) -> Solution:
+        """The last minimum, with the reason why the search went no further."""
+        T = failed.trajectory.duration
+        self.ending = f"For {T:.6g} s none was found ({failed.status}); the last duration is"
+        return dataclasses.replace(self.best, success=False, status=failed.status)
+
+
+class _FailedError(Exception):
+    """A duration for which no minimum was found."""
+
+    def __init__(self, duration: float, solution: Solution) -> None:
+        super().__init__(duration)
+        self.solution = solution

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -18,8 +19,6 @@ from hovi.scene import Scene
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-EXTERNAL = frozenset({"wrench", "drag", "moving_base", "custom", "joint_springs"})
-"""Effects that may act on the base from outside."""
 CLOSE = 1e-6
 """Relative difference up to which a goal agrees with what is kept."""
 
@@ -35,10 +34,14 @@ class Kept:
 
 def falls_freely(scene: Scene) -> bool:
     """Whether the first joint is a free base without torque on which nothing acts but gravity."""
-    joint = scene.robot.model.joints[1]
-    floats = joint.shortname() == "JointModelFreeFlyer"
-    passive = scene.robot.joint_names[0] in scene.passive
-    return floats and passive and not EXTERNAL & {effect.key for effect in scene.effects}
+    model, symbols = scene.robot.model, scene.symbols
+    floats = model.joints[1].shortname() == "JointModelFreeFlyer"
+    alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
+    if not (floats and alone and scene.robot.joint_names[0] in scene.passive):
+        return False
+    added = scene.added_torque(symbols)
+    untouched = added is None or ca.SX(added)[:6].is_zero()
+    return untouched and symbols.base is None and not scene.model.armature[:6].any()
 
 
 def kept(scene: Scene, q: Array, v: Array) -> Kept:
@@ -76,14 +79,15 @@ def free_fall_contradiction(
                 f"center of mass: it would have to end {gap:.4g} m from where free fall takes it; "
                 f"leave the goal's base position free"
             )
-    if not free[1, 0, 3:].any():
+    if not free[1, 0, 3:].any() or _rests(v1, free):
         return _momentum(scene, q1, v1, free[1, 1], expected, base)
     return ""
 
 
-def without_redundancy(scene: Scene, free: Mask) -> Mask:
+def without_redundancy(scene: Scene, v1: Array, free: Mask) -> Mask:
     """Which components of both ends are free, with those freed that follow from what is kept.
 
+    v1: velocity at the goal, shape (nv,). free: as above, shape (2, 2, nv).
     The base's place follows where all else of the goal's configuration is fixed, and its velocity
     where all joint rates are. Equations that repeat others would have no unique multipliers.
     """
@@ -92,9 +96,15 @@ def without_redundancy(scene: Scene, free: Mask) -> Mask:
     freed = free.copy()
     if not free[1, 0].any():
         freed[1, 0, :3] = True
-    if not free[1, 0, 3:].any() and not free[1, 1, 6:].any():
+    known = not free[1, 0, 3:].any() or _rests(v1, free)
+    if known and not free[1, 1, 6:].any():
         freed[1, 1, :6] = True
     return freed
+
+
+def _rests(v1: Array, free: Mask) -> bool:
+    """Whether the goal has no momentum, however the robot stands there."""
+    return not v1.any() and not free[1, 1].any()
 
 
 def _momentum(scene: Scene, q: Array, v: Array, free: Mask, expected: Kept, base: str) -> str:

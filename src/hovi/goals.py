@@ -26,6 +26,7 @@ class Via:
 
     time: when, in [s]. goal: a State, whose velocity is free where none is given, or a FrameGoal,
     which leaves all velocities free.
+    Raises InputError for a time that is not positive, or what is no goal.
     """
 
     time: float
@@ -36,6 +37,8 @@ class Via:
             raise InputError(f"a via point is a State or a FrameGoal, not {self.goal!r}.")
         if not (np.isfinite(self.time) and self.time > 0):
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
+        if isinstance(self.goal, State) and self.goal.turns:
+            raise InputError("a via point takes no turns: they belong to the goal.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,7 @@ def met(
 
     name: what the goal is called in an error. near: where the search starts, shape (nq,).
     limits: those on q are kept.
+    Raises InputError for what is no goal, or a frame that the robot does not have.
     """
     if isinstance(goal, State):
         return Met(goal)

@@ -104,7 +104,7 @@ class Grid:
         Raises InputError where the grid has too few nodes for it.
         """
         nodes = self.t
-        fixed = [0]
+        fixed, times = [0], list(dict.fromkeys(times))
         for time in times:
             k = int(np.clip(np.argmin(np.abs(nodes - time)), fixed[-1] + 1, self.intervals))
             if not 0 < time < self.duration or k >= self.intervals:

@@ -19,16 +19,16 @@ ENOUGH = 4
 """Seeds that may meet the goal before the nearest is taken."""
 ITERATIONS = 100
 """Steps from one seed."""
-MET = 1e-10
-"""Largest component of a condition that counts as met, in [m] or [rad]."""
+CONVERGED = 1e-13
+"""Largest component of a condition at which the steps end, in [m] or [rad]."""
 LONGEST = 0.5
 """Longest step of a joint, in [rad] or [m]."""
 IDLE = 0.98
 """Share of the residual that a step may leave before it counts as idle."""
 PATIENCE = 8
 """Idle steps in a row that end a seed."""
-HALF_TURN = 1e-6
-"""Largest angle by which a met condition may miss the goal: half a turn away it is met too."""
+MET = 1e-6
+"""Largest distance and angle, together, of a configuration that meets the goal."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,17 +60,20 @@ def inverse_kinematics(
     found: list[Array] = []
     best, least = near, np.inf
     for seed in _seeds(robot, near, lower, upper):
-        q = _newton(robot, condition, seed, near, lower, upper)
+        q = _newton(robot, condition, _inside(robot, seed, lower, upper), near, lower, upper)
         missed = sum(condition.missed(q))
         if missed < least:
             best, least = q, missed
-        if missed <= HALF_TURN:
+        if missed <= MET:
             found.append(q)
         if len(found) == ENOUGH:
             break
     if not found:
         nearest = condition.describe(best, np.zeros(n))
-        reason = f"no configuration that reaches the goal was found: at the nearest, {nearest}"
+        reason = (
+            f"no configuration that reaches the goal was found: at the nearest, {nearest}; move "
+            "the goal nearer, or hand in its guess"
+        )
         return Reached(best, reason)
     return Reached(min(found, key=lambda q: float(np.linalg.norm(robot.difference(near, q)))))
 
@@ -96,7 +99,7 @@ def _newton(
     c, J = condition.evaluate(q, v)
     damping, idle = 1e-2, 0
     for _ in range(ITERATIONS):
-        if np.max(np.abs(c)) <= MET * 1e-3:
+        if np.max(np.abs(c)) <= CONVERGED:
             break
         A = J[:, 0]
         step = -A.T @ np.linalg.solve(A @ A.T + damping * np.eye(len(c)), c)
@@ -114,4 +117,7 @@ def _newton(
 
 
 def _inside(robot: Robot, q: Array, lower: Array, upper: Array) -> Array:
-    return np.clip(q, lower, upper) if robot.vector_joints else q
+    places, rates = robot.space.plain
+    inside = q.copy()
+    inside[places] = np.clip(q[places], lower[rates], upper[rates])
+    return inside

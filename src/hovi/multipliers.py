@@ -27,7 +27,8 @@ class Residuals:
     """By how much the equations fail.
 
     torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
-    nodes: c of every condition. largest_torque: of any joint at any point, in [N m].
+    nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, and at
+        least a little of what moving takes at all, in [N m].
     """
 
     torque: list[Array]

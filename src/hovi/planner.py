@@ -193,13 +193,13 @@ class _Search:
         first = guess_path(job.problem(), guess)
         search = explore(pool, first, starts, seed, self.progress)
         found = self._climbed(job, search.minima, guess)
-        if self.tolerance is not None and not search.interrupted:
+        if search.interrupted:
+            if job is not self.fine or self.tolerance is not None or self.free is not None:
+                found = _interrupted(found[:1])
+        elif self.tolerance is not None:
             found = self._refine_to(self.tolerance, found)
         elif job is not self.fine:
-            if search.interrupted:
-                found = _on_coarse_grid(found[:1])
-            else:
-                found = self._climbed(self.fine, self._refine(found), guess)
+            found = self._climbed(self.fine, self._refine(found), guess)
         if not search.interrupted:
             found = [self._in_charts(found[0]), *found[1:]]
         if self.free is not None and not search.interrupted:
@@ -251,7 +251,10 @@ class _Search:
             return self.fine
         coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2))
         if self.fine.via:
-            coarse = coarse.with_nodes([each.time for each in self.fine.via])
+            try:
+                coarse = coarse.with_nodes([each.time for each in self.fine.via])
+            except InputError:  # too few nodes for the via points
+                return self.fine
         return dataclasses.replace(self.fine, grid=coarse)
 
     def _refine(self, found: list[Solution]) -> list[Solution]:
@@ -290,16 +293,19 @@ class _Search:
     def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
         """Every motion with the duration that is best for it, the cheapest first."""
 
-        def solve_for(T: float, guess: Trajectory | None) -> Solution:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
             steps = self.fine.grid.steps * (T / self.fine.grid.duration)
             grid = Grid(steps, self.fine.grid.schemes)
             problem = dataclasses.replace(self.fine, grid=grid).problem()
             left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
             iterations = self.fine.max_iterations
-            return solve(problem, guess or "cubic", max_iterations=iterations, time_limit=left)
+            return solve(problem, guess, max_iterations=iterations, time_limit=left)
 
-        freed = []
+        freed: list[Solution] = []
         for i, solution in enumerate(found):
+            late = self.deadline is not None and time.monotonic() > self.deadline
+            if freed and (late or freed[-1].status is Status.INTERRUPTED):
+                break
             self.progress(f"best duration of {i + 1} of {len(found)} motions", 0.9)
             first = solve_for(free.first, solution.trajectory)
             freed.append(solve_duration(free, solve_for, first))
@@ -338,12 +344,12 @@ def _on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryPro
     return problem if same else problem.on(grid)
 
 
-def _on_coarse_grid(found: list[Solution]) -> list[Solution]:
-    """The best so far when a person ends the search before the grid that was asked for."""
+def _interrupted(found: list[Solution]) -> list[Solution]:
+    """The best so far when a person ends the search before what was asked for was reached."""
     (best,) = found
     message = (
-        "interrupted before the grid that was asked for was reached; the motion is the best so "
-        f"far, on {best.trajectory.grid.intervals} intervals: {best.message}"
+        "interrupted before the grid or the duration that was asked for was reached; the motion is "
+        f"the best so far, on {best.trajectory.grid.intervals} intervals: {best.message}"
     )
     status = Status.INTERRUPTED
     return [dataclasses.replace(best, success=False, status=status, message=message)]

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from hovi.action_structure import ActionStructure
 from hovi.clearance import Clearance
@@ -87,7 +88,9 @@ class TrajectoryProblem:
             self.scene, self.boundary, self.free_ends, self.grid.duration
         )
         object.__setattr__(self, "unreachable", unreachable)
-        object.__setattr__(self, "free_ends", without_redundancy(self.scene, self.free_ends))
+        object.__setattr__(
+            self, "free_ends", without_redundancy(self.scene, goal[1], self.free_ends)
+        )
         object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
         _ = self.distances  # shapes that are missing speak before any work is done
 
@@ -128,6 +131,13 @@ class TrajectoryProblem:
         )
         v = np.where(free[:, 1], v, np.stack([v0, v1]))
         return q[0], v[0], q[1], v[1]
+
+    @cached_property
+    def inertial_torque(self) -> float:
+        """The largest inertia of a joint at the start, over T^2: one [rad/s^2] or [m/s^2] T^2."""
+        model = self.scene.model
+        mass = pin.crba(model, model.createData(), self.boundary[0])
+        return float(np.max(np.diag(mass))) / self.grid.duration**2
 
     @property
     def passive(self) -> npt.NDArray[np.intp]:

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from hovi.blas_threads import one_blas_thread
 from hovi.budget import TimeLeft
 from hovi.carried_momenta import carried_momenta
-from hovi.equality_rounds import polished, satisfy
+from hovi.equality_rounds import polished, satisfy, unmet_sentence
 from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
@@ -108,7 +108,7 @@ class Solution:
     def replan(
         self,
         start: State | npt.ArrayLike | str | None = None,
-        goal: State | npt.ArrayLike | str | None = None,
+        goal: State | FrameGoal | npt.ArrayLike | str | None = None,
         guess: Solution | None = None,
         **options: Any,
     ) -> Solution:
@@ -117,7 +117,8 @@ class Solution:
         Everything that was built is used again, so that this can run in a loop. The guess is
         where the earlier motion goes to first order, which counts as one of the steps, corrected
         by a few gradients, which do not: see hovi.predictor.
-        start, goal: a State, a configuration at rest or the name of a pose; as before when None.
+        start, goal: a State, a configuration at rest or the name of a pose; the goal may be a
+            FrameGoal; as before when None.
         guess: an earlier answer on the same grid; this one when None.
         options: as for `solve`.
         Raises InputError when this solution does not know its problem.
@@ -131,13 +132,15 @@ class Solution:
         )
         origin = self if guess is None else guess
         path = origin.trajectory.path
-        if problem.limited:
+        if isinstance(goal, FrameGoal):  # from where it is met: half a turn away it seems to be
+            path = moved(path, problem.grid, problem.boundary, problem.robot)
+        if problem.limited or not problem.plain:
             return solve(problem, path, **options)
         solution = solve(problem, follow(path, problem, CORRECTIONS), **options)
         return dataclasses.replace(solution, nit=solution.nit + 1)
 
 
-def _as_goal(goal: State | FrameGoal | npt.ArrayLike, robot: Robot) -> State | FrameGoal:
+def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> State | FrameGoal:
     return goal if isinstance(goal, FrameGoal) else as_state(goal, robot)
 
 
@@ -264,6 +267,9 @@ def _with_equations(
     status, message = _verdict(problem, outcome, n_neg)
     if rounds.reason:
         status, message = Status.INFEASIBLE, f"{rounds.reason}."
+    elif status is not Status.MINIMUM and not rounds.met:
+        unmet = unmet_sentence(problem, outcome.x, rounds.residuals).partition(";")[0]
+        message = f"{message} Until then, {unmet}."
     polish = POLISHES if status is Status.MINIMUM else 0
     outcome.x, known = polished(problem, outcome.x, rounds.multipliers, polish)
     forces, value = known.forces, problem.ld.action(outcome.x)

@@ -38,6 +38,11 @@ class State:
     free_velocity: Sequence[str] = ()
     turns: Mapping[str, int | Sequence[int]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        for key in ("free", "free_velocity"):
+            if isinstance(getattr(self, key), str):
+                object.__setattr__(self, key, (getattr(self, key),))
+
     def on(self, robot: Robot, name: str) -> tuple[Array, Array]:
         """q and v as arrays that fit the robot.
 
@@ -51,12 +56,15 @@ class State:
     def free_on(self, robot: Robot, name: str) -> Mask:
         """Which components of q (in the tangent space) and of v are free, shape (2, nv).
 
-        Raises InputError for a joint that the robot does not have.
+        Raises InputError for a joint that the robot does not have, or for parts of a joint's
+        configuration that cannot be free alone.
         """
         rows = [
             _places(robot, name, key, joints)
             for key, joints in (("free", self.free), ("free_velocity", self.free_velocity))
         ]
+        for factor in robot.space.factors:
+            _check_part(robot, name, factor.v.start, rows[0][factor.v], factor.group.angular)
         return np.stack(rows)
 
     def turns_on(self, robot: Robot, name: str) -> Array:
@@ -76,6 +84,20 @@ class State:
         return full
 
 
+def _check_part(robot: Robot, state: str, first: int, free: Mask, angular: Sequence[int]) -> None:
+    """Refuse free parts of a configuration that would not stay parts when it moves.
+
+    Places can be free, one turn, all turns, or all: others bend into what is held.
+    """
+    turns = free[list(angular)]
+    places = np.delete(free, list(angular))
+    if turns.any() and not free.all() and (places.any() or 1 < turns.sum() < len(turns)):
+        raise InputError(
+            f"{state}.free: of joint {robot.joint_at(first)!r} the place, one turn, all turns or "
+            "everything can be free, not other parts."
+        )
+
+
 def _turning_places(robot: Robot, state: str, joint: str) -> list[int]:
     """Places in v of the rotation of a joint that can make full turns."""
     turning = {}
@@ -93,7 +115,7 @@ def _turning_places(robot: Robot, state: str, joint: str) -> list[int]:
 
 def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
     chosen = np.zeros(robot.nv, dtype=bool)
-    for joint in (joints,) if isinstance(joints, str) else joints:
+    for joint in joints:
         if joint == ALL:
             return np.ones(robot.nv, dtype=bool)
         if joint in robot.coordinate_names:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian, Expansion, Jet
+from hovi.errors import InputError
 from hovi.grid import DiscretePath
 from hovi.guess import with_ends_of_nodes
 from hovi.lagrangian import EffortLagrangian, PointTerms
@@ -28,6 +29,8 @@ LinearAlgebra = Literal["band", "tree"]
 
 CHART_END = 1.4 * np.pi
 """Turn of an orientation within an interval, in [rad], at which no motion is looked for."""
+LEAST_TORQUE = 1e-4
+"""Torque beside which others are small, as a share of M / T^2, where a motion takes none."""
 BAND_INTERVALS = 1000
 """Up to this many intervals the nodal band matrix, whose condition grows like N^4, is factored."""
 
@@ -56,6 +59,8 @@ class ActionObjective(Objective[DiscretePath]):
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= BAND_INTERVALS
         tree = problem.plain and problem.ld.chart is None and not small
+        if algebra == "tree" and not problem.plain:
+            raise InputError("the tree is for fixed ends without conditions; use the band.")
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
@@ -118,6 +123,7 @@ class ActionObjective(Objective[DiscretePath]):
         """By how much the equations fail."""
         torques = self.torques(x)
         largest = max(float(np.max(np.abs(tau))) for tau in torques)
+        largest = max(largest, LEAST_TORQUE * self.problem.inertial_torque)
         passive = [tau[:, self.problem.passive] for tau in torques]
         return Residuals(passive, node_residuals(self.problem, x), largest)
 
