@@ -131,11 +131,10 @@ def test_planning_again_to_a_turned_goal_turns_the_hand() -> None:
     """Half a turn away the equations of the new goal hold where the old motion ends."""
     task = hovi.load_task(hovi.example("ur5_reach"))
     pose = at_goal(task, "tool0")
-    first = hovi.plan(
-        task.scene, task.start, hovi.FrameGoal("tool0", rotation=pose.rotation), 2.0, limits="none"
-    )
-    turned = pose.rotation @ np.diag([1.0, -1.0, -1.0])
-    again = first.replan(goal=hovi.FrameGoal("tool0", rotation=turned))
+    goal = hovi.FrameGoal("tool0", pose)
+    first = hovi.plan(task.scene, task.start, goal, 2.5, limits="none")
+    turned = pose.rotation @ np.diag([-1.0, -1.0, 1.0])
+    again = first.replan(goal=hovi.FrameGoal("tool0", position=pose.translation, rotation=turned))
     assert again.success, again.message
     end = placement(task.scene.robot, "tool0", again.trajectory.q[-1])
     assert np.linalg.norm(pin.log3(end.rotation.T @ turned)) < 1e-9

@@ -34,14 +34,13 @@ class Kept:
 
 def falls_freely(scene: Scene) -> bool:
     """Whether the first joint is a free base without torque on which nothing acts but gravity."""
-    model, symbols = scene.robot.model, scene.symbols
+    model, terms = scene.robot.model, scene.terms
     floats = model.joints[1].shortname() == "JointModelFreeFlyer"
     alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
     if not (floats and alone and scene.robot.joint_names[0] in scene.passive):
         return False
-    added = scene.added_torque(symbols)
-    untouched = added is None or ca.SX(added)[:6].is_zero()
-    return untouched and symbols.base is None and not scene.model.armature[:6].any()
+    untouched = terms.torque is None or ca.SX(terms.torque)[:6].is_zero()
+    return untouched and terms.symbols.base is None and not scene.model.armature[:6].any()
 
 
 def kept(scene: Scene, q: Array, v: Array) -> Kept:
