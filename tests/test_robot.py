@@ -449,6 +449,15 @@ def test_the_description_names_what_a_scene_leaves_out() -> None:
     assert "takes (cos, sin) of its angle" in load_robot("kinova").describe()
 
 
+def test_the_description_says_on_what_nothing_can_be_planned(tmp_path: Path, models: Path) -> None:
+    text = (models / "two_link.urdf").read_text()
+    path = tmp_path / "light.urdf"
+    path.write_text(re.sub(r'(<mass value=|i[xyz]{2}=)"[^"]*"', r'\1"0"', text))
+    words = load_robot(path).describe()
+    assert "Nothing can be planned on it as it is: the mass matrix" in words
+    assert "'shoulder'" in words
+
+
 def test_every_robot_can_be_described(two_link: Robot) -> None:
     for robot in (two_link, load_robot(pin.Model()), load_robot("tiago_dual")):
         assert robot.name in robot.describe()

@@ -272,7 +272,12 @@ class Robot:
         """What the robot is, for a terminal: joints, limits, mass, and what a scene must name."""
         text = describe(self.name, self.model, self.source, self.tip_frame)
         names = ", ".join(repr(name) for name in self.poses)
-        return f"{text}\n\nPoses that its SRDF names: {names}." if names else text
+        text += f"\n\nPoses that its SRDF names: {names}." if names else ""
+        try:
+            self.check_mass_matrix()
+        except ModelError as singular:
+            text += f"\n\nNothing can be planned on it as it is: {singular}"
+        return text
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-able dictionary that holds the URDF and no path of this machine."""

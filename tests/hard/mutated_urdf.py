@@ -119,7 +119,7 @@ def _mass_matrix_objection(robot: Robot) -> str:
         M = np.array(columns).reshape(model.nv, model.nv)
         scale = 1 / np.sqrt(np.clip(np.diagonal(M), 1e-300, None))
         values = np.linalg.eigvalsh(scale[:, None] * (M + M.T) / 2 * scale)
-        if not (np.isfinite(M).all() and (model.nv == 0 or values[0] > -1e-12)):
+        if not (np.isfinite(M).all() and (model.nv == 0 or values[0] > 0.0)):
             return f"its mass matrix is not positive definite: {values[0]}"
     return ""
 
