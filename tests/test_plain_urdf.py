@@ -42,10 +42,11 @@ def test_an_axis_is_read_as_it_is_written(axis: str, tmp_path: Path) -> None:
         ("<robot", "<?other program?><robot"),
         ('encoding="utf-8"', 'encoding="klingon"'),
         ("</robot>", '<gazebo><mass value="heavy"/></gazebo></robot>'),
+        (AXIS, AXIS + "<dynamics/>"),
         (AXIS, '<axis xyz="0 -1 0"><mass value="heavy"/></axis>'),
         ("<robot", '<robot xmlns="http://www.ros.org"'),
     ],
-    ids=["instruction", "encoding", "extension", "inside an axis", "namespace"],
+    ids=["instruction", "encoding", "extension", "no dynamics", "inside an axis", "namespace"],
 )
 def test_what_is_not_for_the_model_does_no_harm(change: tuple[str, str], tmp_path: Path) -> None:
     text = ARM.replace('<?xml version="1.0"?>', '<?xml version="1.0" encoding="utf-8"?>')

@@ -27,6 +27,7 @@ SCRIPTS = (
     "limits",
     "effects",
     "random_reaches",
+    "fuzz",
     "hard_cases",
     "underactuated",
     "growth",

@@ -28,9 +28,14 @@ def plain_urdf(text: str, name: str = "robot.urdf") -> str:
     for element in robot:
         if element.tag in _PARTS:
             copy = ElementTree.SubElement(plain, element.tag, dict(element.attrib))
-            copy.extend(part for part in element if part.tag in _PARTS[element.tag])
+            copy.extend(part for part in element if part.tag in _PARTS[element.tag] and _says(part))
     write_numbers_plainly(plain)
     return ElementTree.tostring(plain, encoding="unicode")
+
+
+def _says(part: ElementTree.Element) -> bool:
+    """Whether it says anything: <dynamics/> does not, and Pinocchio's parser stops at it."""
+    return part.tag != "dynamics" or not {"damping", "friction"}.isdisjoint(part.attrib)
 
 
 def write_numbers_plainly(robot: ElementTree.Element) -> None:
