@@ -2,7 +2,7 @@
 
     python fuzz_coverage.py urdf|scene|trajectory SECONDS
 
-It starts from mutated inputs of tests/hard, and stops at the first fault, which it leaves in a file.
+It starts from mutated inputs of tests/hard and stops at the first fault, which it leaves in a file.
 """
 
 from __future__ import annotations

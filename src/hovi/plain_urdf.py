@@ -28,18 +28,20 @@ def plain_urdf(text: str, name: str = "robot.urdf") -> str:
     for element in robot:
         if element.tag in _PARTS:
             copy = ElementTree.SubElement(plain, element.tag, dict(element.attrib))
-            copy.extend(part for part in element if part.tag in _PARTS[element.tag] and _says(part))
-    write_numbers_plainly(plain)
+            copy.extend(part for part in element if part.tag in _PARTS[element.tag])
+    make_plain(plain)
     return ElementTree.tostring(plain, encoding="unicode")
 
 
-def _says(part: ElementTree.Element) -> bool:
-    """Whether it says anything: <dynamics/> does not, and Pinocchio's parser stops at it."""
-    return part.tag != "dynamics" or not {"damping", "friction"}.isdisjoint(part.attrib)
+def make_plain(robot: ElementTree.Element) -> None:
+    """Every number of a checked URDF with all its digits and single spaces between, in place.
 
-
-def write_numbers_plainly(robot: ElementTree.Element) -> None:
-    """Every number of a checked URDF with all its digits and single spaces between, in place."""
+    A <dynamics/> that says nothing goes, since Pinocchio's parser stops at it.
+    """
+    for joint in robot.iterfind("joint"):
+        for dynamics in joint.findall("dynamics"):
+            if {"damping", "friction"}.isdisjoint(dynamics.attrib):
+                joint.remove(dynamics)
     for _, element in elements_in_use(robot):
         for attribute in NUMBERS.get(element.tag, {}):
             if (text := element.get(attribute)) is not None:

@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.example_robots import example_robot
-from hovi.plain_urdf import write_numbers_plainly
+from hovi.plain_urdf import make_plain
 from hovi.robot_model import build_full_model, reduce_with_geometry
 from hovi.robot_source import RobotSource
 from hovi.urdf_check import checked_urdf
@@ -119,7 +119,7 @@ def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     for material in robot.iterfind("material"):
         if _find_files(material, source):
             robot.remove(material)
-    write_numbers_plainly(robot)
+    make_plain(robot)
     return ElementTree.tostring(robot, encoding="unicode"), problems
 
 
