@@ -381,6 +381,20 @@ def test_a_header_that_unpacks_to_too_much_is_refused(
         Trajectory.load(saved)
 
 
+def test_a_small_file_that_unpacks_to_a_large_one_is_refused(saved: Path) -> None:
+    replace_entry(saved, "q.npy", b"\0" * 50_000_000)
+    with pytest.raises(TrajectoryFileError, match="would unpack to 500"):
+        Trajectory.load(saved)
+
+
+def test_a_header_of_millions_of_lists_is_refused_unread(saved: Path) -> None:
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, np.frombuffer(b"[],[" * 10**6, np.uint8), version=(1, 0))
+    replace_entry(saved, "header.npy", stream.getvalue())
+    with pytest.raises(TrajectoryFileError, match="more than 2,000,000 parts"):
+        Trajectory.load(saved)
+
+
 def test_a_header_with_an_infinite_number_is_refused(saved: Path) -> None:
     text = b'{"format": "hovi-trajectory", "version": 1, "cost": 1e999}'
     stream = io.BytesIO()

@@ -30,7 +30,10 @@ FORMAT = "hovi-trajectory"
 VERSION = 1
 MAX_BYTES = 2**30
 MAX_HEADER_BYTES = 2**26
-"""As Python objects a header may take twenty times its size."""
+MAX_HEADER_PARTS = 2_000_000
+"""Lists, tables and their entries: as Python objects they take thirty times their size."""
+MAX_EXPANSION = 50
+"""How much larger an unpacked file may be; doubles that mean something shrink by less."""
 _MARGIN = 2**16  # what zip and npy put around the data
 _HEADER = "header"
 _DOUBLES = np.dtype("<f8")
@@ -90,7 +93,10 @@ def read_arrays(
             wanted = [_HEADER, *names]
             wanted += [name for name in optional if f"{name}.npy" in members]
             _check_members(members, wanted, label)
+            _check_expansion(members, wanted, Path(path).stat().st_size, label)
             raw = {name: archive.read(members[f"{name}.npy"]) for name in wanted}
+    except TrajectoryFileError:
+        raise
     except FileNotFoundError as error:
         raise TrajectoryFileError(f"there is no {label}.") from error
     except OSError as error:
@@ -117,6 +123,16 @@ def _check_members(members: Mapping[str, zipfile.ZipInfo], names: list[str], lab
         )
 
 
+def _check_expansion(
+    members: Mapping[str, zipfile.ZipInfo], names: list[str], packed: int, label: str
+) -> None:
+    size = sum(members[f"{name}.npy"].file_size for name in names)
+    if size > MAX_EXPANSION * packed + 10_000_000:
+        raise TrajectoryFileError(
+            f"{label} has {packed} bytes and would unpack to {size}: no motion shrinks like that."
+        )
+
+
 def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
     marked = {"format": FORMAT, "version": VERSION, **header}
     try:
@@ -127,8 +143,13 @@ def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
 
 
 def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
+    text = data.tobytes()
+    if sum(map(text.count, (b"[", b"{", b","))) > MAX_HEADER_PARTS:
+        raise TrajectoryFileError(
+            f"{label} has a header of more than {MAX_HEADER_PARTS:,} parts, the most accepted."
+        )
     try:
-        header = json.loads(data.tobytes(), parse_float=_finite, parse_constant=_finite)
+        header = json.loads(text, parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
         raise TrajectoryFileError(f"{label} has a header that is not JSON: {error}.") from error
     if not isinstance(header, dict) or header.get("format") != FORMAT:
@@ -160,7 +181,7 @@ def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[A
         raise TrajectoryFileError(f"{label}: not a readable array: {error}.") from error
     if found != dtype or fortran:
         raise TrajectoryFileError(f"{label}: expected {dtype} in C order, the file has {found}.")
-    data = raw[stream.tell() :]
+    data = memoryview(raw)[stream.tell() :]
     if min(shape, default=0) < 0 or len(data) != math.prod(shape) * dtype.itemsize:
         raise TrajectoryFileError(f"{label}: shape {shape} does not fit its {len(data)} bytes.")
     return np.frombuffer(data, dtype).reshape(shape)
