@@ -52,6 +52,9 @@ def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
     expected = x + 0.3 * random.uniform(-1, 1, x.shape)
     np.testing.assert_allclose(space.difference_near(q0, q1, expected), x, atol=1e-12)
     assert np.abs(space.difference(q0, q1) - x).max() > 1.0
+    still = np.zeros((1, space.nv))
+    still[0, 1] = 8 * np.pi
+    np.testing.assert_allclose(space.difference_near(q0[:1], q0[:1], still), still, atol=1e-12)
 
 
 @pytest.mark.parametrize("parts", [(0,), (-1,), ("SO(4)",), (1.5,), (True,)])

@@ -17,6 +17,8 @@ Array = npt.NDArray[np.float64]
 
 SERIES_BELOW = 1.0
 """Angles squared below which coefficients are summed as series."""
+NO_TURN = 1e-9
+"""Turn, in [rad], below which its axis says nothing."""
 _TERMS = 10
 
 
@@ -50,7 +52,10 @@ class Group:
         """As `difference`, with the full turns that come nearest to an expected answer."""
         w, wanted = self._turn(g0, g1), expected[..., list(self.angular)]
         size = np.sqrt(np.sum(w * w, axis=-1, keepdims=True))
-        axis = w / np.where(size > 0, size, 1.0)
+        reach = np.sqrt(np.sum(wanted * wanted, axis=-1, keepdims=True))
+        # where nothing turns, full turns are about the axis that is expected
+        still = wanted / np.where(reach > 0, reach, 1.0)
+        axis = np.where(size > NO_TURN, w / np.where(size > 0, size, 1.0), still)
         turns = np.round((np.sum(axis * wanted, axis=-1, keepdims=True) - size) / (2 * np.pi))
         return self._log(g0, g1, w + 2 * np.pi * turns * axis)
 
