@@ -100,6 +100,7 @@ FLOORS = [
         "highlights",
         "nodal_hamiltonian",
         "dynamics_replay",
+        "distance_panel",
     },
     {"trajectory_objective"},
     {"limited_action", "equality_rounds", "predictor"},

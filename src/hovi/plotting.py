@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from hovi.distance_panel import draw_distances, kept_distances
 from hovi.errors import DisplayError
 from hovi.figure_file import write_figure
 from hovi.limit_bands import Curve, draw_limits, legend_entries
@@ -96,15 +97,19 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     """Positions, velocities and efforts over time, one line per coordinate, nodes as marks.
 
     Limits that the motion was planned under are bands, where they are near enough to be seen
-    beside the curves; a curve is wider where it leans on one.
+    beside the curves; a curve is wider where it leans on one. Where it was planned to keep away
+    from something, a fourth panel has the distances of the pairs that come nearest.
     """
-    curve = _sampled(trajectory)
-    figure = Figure(figsize=(8.0, 7.5), layout="constrained")
-    axes = figure.subplots(3, sharex=True)
+    curve, kept = _sampled(trajectory), kept_distances(trajectory)
+    panels = 3 if kept is None else 4
+    figure = Figure(figsize=(8.0, 2.5 * panels), layout="constrained")
+    axes = figure.subplots(panels, sharex=True)
     q = _coordinates(trajectory, curve.motion.q)
     values = (q, curve.motion.v, curve.motion.tau)
-    for ax, panel, y in zip(axes, (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
+    for ax, panel, y in zip(axes[:3], (_POSITION, _VELOCITY, _EFFORT), values, strict=True):
         _draw(ax, trajectory, panel, curve, y)
+    if kept is not None:
+        draw_distances(axes[3], trajectory, *kept)
     axes[-1].set_xlabel("time [s]")
     _legend(figure, axes[0])
     return figure

@@ -16,6 +16,7 @@ from hovi.certificate import Certificate
 from hovi.cli.accuracy_report import accuracy_json, scheme_in_words, steps_in_words
 from hovi.cli.certificate_report import certificate_json, certificate_lines
 from hovi.cli.closeness import Closeness, closeness
+from hovi.cli.nearest_approach import least_distance
 from hovi.cli.peaks import Peaks, peaks
 from hovi.json_numbers import finite
 from hovi.solver import Solution
@@ -46,6 +47,7 @@ def as_json(
         "peaks": _peaks_json(peaks(trajectory)),
         "limits": None if room is None else room.by_kind(),
         "excess": None if room is None else room.excess,
+        "least_distance": least_distance(trajectory),
         "out": None if out is None else str(out),
         **accuracy_json(solution, task),
         "certificate": None if certificate is None else certificate_json(certificate),
@@ -68,6 +70,10 @@ def print_report(
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
+    distance = least_distance(solution.trajectory)
+    if distance is not None:
+        kept = task.clearance.margin
+        print(f"distance {distance:.4g} m at the nearest approach, the margin is {kept:g} m")
     if certificate is not None:
         for label, text in certificate_lines(certificate):
             print(f"{label:9s}{text}")
