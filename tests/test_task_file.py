@@ -180,6 +180,7 @@ def test_an_unknown_example_robot_gets_the_nearest_name(folder: Path) -> None:
         (b"\xff\xfe\x00", "UTF-8"),
         (b"a = " + b"[" * 100_000, "nested"),
         (b"a = 1" + b"0" * 5000, ""),
+        (b"a." * 500_000 + b"b = 1", "line 1: more than 1,000 dots"),
         (b"a = 0x" + b"f" * 5000, "unknown key `a`"),
         (b"robot = 0x" + b"f" * 5000, "a number of too many digits"),
         (b"robot = 1 # " + b" " * 500_000 + b"\n", "`robot` must be"),

@@ -26,6 +26,8 @@ from hovi.tolerance import Tolerance
 from hovi.whole_file import reason
 
 MAXIMUM_BYTES = 2_000_000
+MAXIMUM_DOTS = 1_000
+"""Of one line: the time for a dotted key grows with the square of its parts."""
 
 
 def load_task(path: str | Path) -> Task:
@@ -87,6 +89,9 @@ def _read_text(path: Path) -> TomlText:
 
 
 def _validated(toml: TomlText) -> TaskTable:
+    for number, line in enumerate(toml.text.splitlines(), start=1):
+        if line.count(".") > MAXIMUM_DOTS:
+            raise SceneError(f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots.")
     try:
         data = tomllib.loads(toml.text)
     except RecursionError:
