@@ -164,7 +164,6 @@ class _Search:
         """
         options, self.kept_clear = self.options, None
         path = self._without_distances(path)
-        self.guess = path
         approach = approach_along(self._trajectory(path), wanted.distances, wanted.least)
         depth = wanted.least - float(approach.distance.min())
         stages = int(np.clip(np.ceil(depth / STAGE), 1, MOST_STAGES))
