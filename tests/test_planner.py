@@ -257,7 +257,10 @@ def test_an_interrupt_before_the_grid_that_was_asked_for_is_no_success(arm_scene
     N = 2 * COARSE_INTERVALS + 10
     found = swing_up(arm_scene, starts=1000, intervals=N, progress=interrupt)
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
-    assert "interrupted before the grid or the duration that was asked for was reached" in found.message
+    assert (
+        "interrupted before the grid or the duration that was asked for was reached"
+        in found.message
+    )
 
 
 # Refusals

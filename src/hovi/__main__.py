@@ -17,6 +17,11 @@ def run() -> None:
         code = main()
     except KeyboardInterrupt:
         code = INTERRUPTED
+    except RuntimeError as error:
+        # Python 3.11 wraps what is raised while a class names its descriptors.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        code = INTERRUPTED
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to leave
     # Python remembers an interrupt inside `exec`, which dataclasses use, until the next `exec`,
     # and would end by that signal although it was handled.

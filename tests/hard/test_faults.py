@@ -232,3 +232,19 @@ def test_without_a_browser_the_address_is_printed(motion: Path) -> None:
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "")
+
+
+def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
+    """Raised while a class names its cached properties it arrives as a RuntimeError."""
+    program = (
+        "import hovi.cli\n"
+        "class Naming:\n"
+        "    def __set_name__(self, owner, name): raise KeyboardInterrupt\n"
+        "def main(): type('Owner', (), {'each': Naming()})\n"
+        "hovi.cli.main = main\n"
+        "from hovi.__main__ import run\n"
+        "run()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
+    assert done.returncode == 130
+    assert b"Traceback" not in done.stderr
