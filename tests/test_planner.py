@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,15 @@ from hovi import plan as public_plan
 from hovi.effects import Gravity
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.grid import Grid
+from hovi.model_files import example
 from hovi.planner import COARSE_INTERVALS, REFINED, plan
-from hovi.robot import load_robot
+from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name, galerkin
 from hovi.solver import Solution, Status, solve
 from hovi.state import State
+from hovi.task_file import load_task
+from hovi.task_plan import plan_task
 from hovi.trajectory_objective import ActionObjective
 from manifold_robots import mimicking
 from paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
@@ -311,3 +315,33 @@ def test_a_robot_that_cannot_be_planned_on_is_refused_before_any_work() -> None:
     robot = load_robot(mimicking())
     with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimic"):
         plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0)
+
+
+def test_limits_that_are_far_do_not_limit_the_accuracy(two_link: Robot) -> None:
+    scene = Scene(two_link, [Gravity(9.8)])
+    ends = [-np.pi / 2, 0.0], [np.pi / 2, 0.0]
+    near = plan(scene, *ends, 2.0, tolerance=1e-6)
+    assert near.accuracy.reached, near.message
+    assert near.error_estimate < 1e-6
+    free = plan(scene, *ends, 2.0, tolerance=1e-6, limits="none")
+    assert near.cost == pytest.approx(free.cost, rel=1e-6)
+    assert near.problem.limits is not None
+
+
+def test_what_is_no_scene_or_no_via_point_is_refused(two_link: Robot) -> None:
+    with pytest.raises(InputError, match=r"plan takes a hovi\.Scene"):
+        plan(two_link, [0.0, 0.0], [1.0, 0.0], 1.0)
+    with pytest.raises(InputError, match=r"via is a list of hovi\.Via"):
+        plan(Scene(two_link), [0.0, 0.0], [1.0, 0.0], 2.0, via=[(1.0, [1.0, 1.0])])
+    for wrong in (Gravity(9.8), [Gravity], ["gravity"]):
+        with pytest.raises(SceneError, match="effects is a list such as"):
+            Scene(two_link, wrong)
+
+
+def test_a_task_is_planned_with_all_that_it_says() -> None:
+    task = load_task(example("ur5_around_sphere"))
+    solution = plan_task(
+        dataclasses.replace(task, intervals=8), max_iterations=2, continuation=False
+    )
+    assert [each.name for each in solution.problem.clearance.obstacles] == ["ball"]
+    assert solution.problem.clearance.margin == task.clearance.margin

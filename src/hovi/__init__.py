@@ -64,6 +64,7 @@ if TYPE_CHECKING:
     from hovi.symmetry import base_translation as base_translation
     from hovi.task_file import Task as Task
     from hovi.task_file import load_task as load_task
+    from hovi.task_plan import plan_task as plan_task
     from hovi.tolerance import Accuracy as Accuracy
     from hovi.tolerance import Tolerance as Tolerance
     from hovi.tracking import Tracking as Tracking
@@ -126,6 +127,7 @@ _PLACES = {
     "mechanics": "hovi.lagrangians",
     "plan": "hovi.planner",
     "play": "hovi.tracking",
+    "plan_task": "hovi.task_plan",
     "plot": "hovi.plotting",
     "regularity": "hovi.euler_lagrange",
     "replay": "hovi.playback",

@@ -13,11 +13,11 @@ import numpy.typing as npt
 from hovi.effect_candidates import effect_candidates
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
-from hovi.planner import plan
 from hovi.scene import Scene
 from hovi.scene_account import seconds_per_point
 from hovi.solver import Solution
 from hovi.task_file import Task
+from hovi.task_plan import plan_task
 from hovi.tracking import play
 from hovi.trajectory import Trajectory
 
@@ -146,24 +146,7 @@ def _trial(
 
 
 def _plan(task: Task, scene: Scene, guess: str | Trajectory, starts: int) -> Solution:
-    return plan(
-        scene,
-        task.start,
-        task.goal,
-        task.duration,
-        time_weight=task.time_weight,
-        via=task.via,
-        scheme=task.scheme,
-        intervals=task.intervals,
-        tolerance=task.tolerance,
-        limits=task.limits,
-        obstacles=task.clearance.obstacles,
-        margin=task.clearance.margin,
-        self_collision=task.clearance.self_collision,
-        starts=starts,
-        seed=task.seed,
-        guess=guess,
-    )
+    return plan_task(dataclasses.replace(task, scene=scene), starts=starts, guess=guess)
 
 
 def _torque_change(scene: Scene, own: Trajectory) -> float:

@@ -106,8 +106,13 @@ class Grid:
         nodes = self.t
         fixed, times = [0], list(dict.fromkeys(times))
         for time in times:
+            if not 0 < time < self.duration:
+                raise InputError(
+                    f"a via point at {time:g} s is not inside the motion of {self.duration:g} s: "
+                    "choose a time within it."
+                )
             k = int(np.clip(np.argmin(np.abs(nodes - time)), fixed[-1] + 1, self.intervals))
-            if not 0 < time < self.duration or k >= self.intervals:
+            if k >= self.intervals:
                 raise InputError(
                     f"a via point at {time:g} s does not fit between its neighbors on "
                     f"{self.intervals} intervals of {self.duration:g} s; use more intervals."

@@ -20,6 +20,7 @@ from hovi.frame_goal import FrameGoal
 from hovi.free_duration import FreeDuration, solve_duration
 from hovi.goals import Via
 from hovi.grid import Grid
+from hovi.inactive_limits import far_from_limits, with_limits_again, without_limits
 from hovi.ladder import climb, may_help
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
@@ -102,6 +103,7 @@ def plan(
     Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
     """
     began = time.perf_counter()
+    _check_kinds(scene, via)
     starts, seed = _count("starts", starts, 1), _count("seed", seed, 0)
     max_iterations = _count("max_iterations", max_iterations, 1)
     if processes is not None:
@@ -272,15 +274,20 @@ class _Search:
                 break
             which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
             known = dataclasses.replace(solution, problem=_on_grid_of(problem, solution))
-            refined.append(
-                refine_to_tolerance(
-                    known,
-                    tolerance,
-                    max_iterations=self.fine.max_iterations,
-                    time_limit=None if self.deadline is None else self._left(self.deadline),
-                    told=partial(self._tell, which),
-                )
+            refine = partial(
+                refine_to_tolerance,
+                tolerance=tolerance,
+                max_iterations=self.fine.max_iterations,
+                told=partial(self._tell, which),
             )
+            left = None if self.deadline is None else self._left(self.deadline)
+            better = None
+            if far_from_limits(known):
+                better = with_limits_again(refine(without_limits(known), time_limit=left), known)
+            if better is None:
+                left = None if self.deadline is None else self._left(self.deadline)
+                better = refine(known, time_limit=left)
+            refined.append(better)
         return distinct(refined)
 
     def _tell(self, which: str, done: Round) -> None:
@@ -310,6 +317,14 @@ class _Search:
             first = solve_for(free.first, solution.trajectory)
             freed.append(solve_duration(free, solve_for, first))
         return distinct(freed)
+
+
+def _check_kinds(scene: Any, via: Any) -> None:
+    """Raise InputError for what is no scene, or no list of via points."""
+    if not isinstance(scene, Scene):
+        raise InputError(f"plan takes a hovi.Scene, as in hovi.Scene(robot, [...]), not {scene!r}.")
+    if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
+        raise InputError(f"via is a list of hovi.Via(time, goal), not {via!r}.")
 
 
 def _free(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -51,7 +51,7 @@ class Scene:
     model: pin.Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        effects = tuple(self.effects)
+        effects = _as_effects(self.effects)
         keys = [effect.key for effect in effects]
         for key in set(keys):
             if keys.count(key) > 1:
@@ -258,6 +258,14 @@ def require_known_joints(robot: Robot) -> None:
             f"robot {robot.name!r} cannot be planned on: {joints} mimic other joints; lock them "
             "with load_robot(..., locked=[...])."
         )
+
+
+def _as_effects(given: object) -> tuple[Effect, ...]:
+    """Effects as a tuple. Raises SceneError for what is no effect, or stands without a list."""
+    effects = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
+    if not isinstance(effects, tuple) or not all(isinstance(each, Effect) for each in effects):
+        raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")
+    return effects
 
 
 def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:

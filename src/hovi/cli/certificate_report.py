@@ -13,6 +13,10 @@ from hovi.dynamics_replay import DynamicsReplay
 NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
 
 
+COARSE = 0.01
+"""Relative difference of two integrals beyond which a grid is too coarse to be believed."""
+
+
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """Every statement, null where it could not be made, and why it could not."""
     errors, energy = certificate.errors, certificate.hamiltonian
@@ -41,6 +45,14 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             f"{certificate.integral:.10g}",
         ),
     ]
+    gap = abs(certificate.integral - certificate.action)
+    if gap > COARSE * abs(certificate.integral):
+        lines.append(
+            (
+                "! coarse",
+                "the two differ by more than 1 %: plan to a tolerance, or use more intervals",
+            )
+        )
     if energy is not None:
         lines.append(("energy", f"Pontryagin's H = {energy.mean:.6g}, spread {energy.spread:.1e}"))
     if certificate.residual is not None:

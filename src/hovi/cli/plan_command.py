@@ -124,29 +124,10 @@ def _plan(
     from hovi.cli.progress import progress
     from hovi.cli.report import as_json, print_report
     from hovi.errors import TrajectoryFileError
-    from hovi.planner import plan as plan_motion
+    from hovi.task_plan import plan_task
 
     with progress(quiet=json) as report:
-        solution = plan_motion(
-            task.scene,
-            task.start,
-            task.goal,
-            task.duration,
-            time_weight=task.time_weight,
-            via=task.via,
-            scheme=task.scheme,
-            intervals=task.intervals,
-            tolerance=task.tolerance,
-            limits=task.limits,
-            obstacles=task.clearance.obstacles,
-            margin=task.clearance.margin,
-            self_collision=task.clearance.self_collision,
-            starts=task.starts,
-            seed=task.seed,
-            guess=guess,
-            time_limit=time_limit,
-            progress=report,
-        )
+        solution = plan_task(task, guess=guess, time_limit=time_limit, progress=report)
     written, refused = out if solution.trajectory is not None else None, None
     if written is not None:
         try:

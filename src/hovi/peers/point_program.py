@@ -135,5 +135,6 @@ def dm(matrix: sparse.spmatrix) -> ca.DM:
     columns = sparse.csc_matrix(matrix)
     columns.sum_duplicates()
     columns.sort_indices()
-    pattern = ca.Sparsity(*columns.shape, columns.indptr.tolist(), columns.indices.tolist())
+    rows, width = (int(size) for size in columns.shape)
+    pattern = ca.Sparsity(rows, width, columns.indptr.tolist(), columns.indices.tolist())
     return ca.DM(pattern, columns.data)
