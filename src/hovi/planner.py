@@ -280,12 +280,12 @@ class _Search:
                 max_iterations=self.fine.max_iterations,
                 told=partial(self._tell, which),
             )
-            left = None if self.deadline is None else self._left(self.deadline)
+            left = self._left()
             better = None
             if far_from_limits(known):
                 better = with_limits_again(refine(without_limits(known), time_limit=left), known)
             if better is None:
-                left = None if self.deadline is None else self._left(self.deadline)
+                left = self._left()
                 better = refine(known, time_limit=left)
             refined.append(better)
         return distinct(refined)
@@ -294,8 +294,9 @@ class _Search:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
         self.progress(text, 0.9)
 
-    def _left(self, deadline: float) -> float:
-        return max(deadline - time.monotonic(), 0.0)
+    def _left(self) -> float | None:
+        """Seconds left of the time limit; None where there is none."""
+        return None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
 
     def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
         """Every motion with the duration that is best for it, the cheapest first."""
@@ -304,7 +305,7 @@ class _Search:
             steps = self.fine.grid.steps * (T / self.fine.grid.duration)
             grid = Grid(steps, self.fine.grid.schemes)
             problem = dataclasses.replace(self.fine, grid=grid).problem()
-            left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+            left = self._left()
             iterations = self.fine.max_iterations
             return solve(problem, guess, max_iterations=iterations, time_limit=left)
 
