@@ -57,6 +57,12 @@ def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
     np.testing.assert_allclose(space.difference_near(q0[:1], q0[:1], still), still, atol=1e-12)
 
 
+def test_numbers_of_a_configuration_are_named_by_what_they_are() -> None:
+    robot = load_robot(with_arm("free-flyer"))
+    base, arm = ("x", "y", "z", "qx", "qy", "qz", "qw"), ("j1", "j2[cos]", "j2[sin]", "j3")
+    assert robot.space.names(robot.coordinate_names) == (*(f"j0[{part}]" for part in base), *arm)
+
+
 @pytest.mark.parametrize("parts", [(0,), (-1,), ("SO(4)",), (1.5,), (True,)])
 def test_what_is_no_part_is_refused(parts: tuple) -> None:  # type: ignore[type-arg]
     with pytest.raises(InputError, match="a part of a configuration space"):

@@ -13,9 +13,11 @@ from typer.testing import CliRunner
 
 from hovi.certificate import certify
 from hovi.cli import app
+from hovi.cli.peaks import peaks
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
+from hovi.export import write_csv
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import regularised, with_ends_of_nodes
 from hovi.joint_condition import JointCondition
@@ -30,6 +32,7 @@ from hovi.schemes import galerkin
 from hovi.solver import Solution, guess_path, solve
 from hovi.state import State
 from hovi.task_file import load_task
+from hovi.task_plan import plan_task
 from hovi.trajectory import Trajectory
 from hovi.unwrapped import unwrapped
 from manifold_robots import configurations, with_arm
@@ -246,3 +249,26 @@ def test_a_wrong_length_says_which_joints_take_more() -> None:
     with pytest.raises(InputError, match="j0 takes 4: a unit quaternion"):
         State(np.zeros(6)).on(load_robot(with_arm("spherical")), "goal")
     assert pin.isNormalized(robot.model, robot.neutral())
+
+
+def test_tables_and_reports_tell_angles_of_continuous_joints(kinova: Robot, tmp_path: Path) -> None:
+    start, goal = kinova.neutral(), kinova.neutral()
+    goal[:2] = np.cos(1.2), np.sin(1.2)
+    motion = plan(Scene(kinova, [Armature(0.1)]), start, goal, 2.0, intervals=8).trajectory
+    found = peaks(motion)
+    assert found.q_high[0] == pytest.approx(1.2, abs=1e-2)
+    assert np.isfinite([found.q_low, found.q_high]).all()
+    write_csv(motion, tmp_path / "motion.csv", rate=10)
+    header = (tmp_path / "motion.csv").read_text().splitlines()[0].split(",")
+    assert header[1:4] == [f"q_{kinova.joint_names[0]}[{part}]" for part in ("cos", "sin")] + [
+        f"q_{kinova.joint_names[1]}"
+    ]
+
+
+def test_torques_of_a_base_without_motors_get_no_scale_of_their_own(models: Path) -> None:
+    axes = motion_figure(plan_task(load_task(models / "spacecraft_reorients.toml")).trajectory).axes
+    torque, force = (
+        next(ax for ax in axes if ax.get_ylabel() == label)
+        for label in ("torque [N m]", "force [N]")
+    )
+    assert torque.get_ylim() == force.get_ylim()

@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from hovi.certificate import certify
 from hovi.cli import main
 from hovi.controllers import FEEDBACKS, Controller, OpenLoop, controller
 from hovi.effects import Gravity, Payload, ViscousFriction
@@ -20,6 +21,8 @@ from hovi.robot import Robot
 from hovi.scene import Scene
 from hovi.simulator import simulate
 from hovi.state import State
+from hovi.task_file import load_task
+from hovi.task_plan import plan_task
 from hovi.tracking import Tracking, play
 from hovi.trajectory import Trajectory
 
@@ -91,7 +94,7 @@ def test_feedback_holds_what_open_loop_loses(rich: Scene, planned: Trajectory) -
 def test_the_slope_of_a_feedback_is_its_derivative(
     simple: Scene, planned: Trajectory, feedback: str
 ) -> None:
-    drive = controller(planned, feedback, simple.robot, 7.0)
+    drive = controller(planned, feedback, simple, 7.0)
     random = np.random.default_rng(1)
     q, v = random.normal(size=(2, 5, 2))
     t = random.uniform(0, 1, 5)
@@ -108,7 +111,7 @@ def test_the_slope_of_a_feedback_is_its_derivative(
 
 def test_computed_torque_decays_at_its_bandwidth(simple: Scene, planned: Trajectory) -> None:
     w, off = 8.0, np.array([0.02, -0.03])
-    drive = controller(planned, "computed-torque", simple.robot, w)
+    drive = controller(planned, "computed-torque", simple, w)
     moved = State(planned.q[0] + off, planned.v[0])
     motion = simulate(simple, moved, 1.0, drive, intervals=200)
     error = motion.q - planned.sample(motion.t).q
@@ -233,3 +236,25 @@ def test_open_loop_is_a_controller(planned: Trajectory) -> None:
     np.testing.assert_array_equal(u[:2], planned.sample(t[:2]).tau)
     np.testing.assert_array_equal(u[2], planned.sample(1.0).tau[0])
     assert not slope.any()
+
+
+def test_joints_without_a_motor_get_no_torque(models: Path) -> None:
+    task = load_task(models / "cart_pole_swing_up.toml")
+    plan = plan_task(task).trajectory
+    drive = controller(plan, "pd", task.scene, 10.0)
+    far = plan.q + 0.3
+    u, slope = drive.evaluate(far, plan.v, plan.t)
+    slide, hinge = (task.scene.robot.coordinate_names.index(name) for name in ("slide", "hinge"))
+    assert not u[:, hinge].any()
+    assert not slope[:, hinge].any()
+    assert np.abs(u[:, slide] - plan.sample(plan.t).tau[:, slide]).min() > 0.1
+    with pytest.raises(InputError, match="a motor at every joint, and hinge has none"):
+        play(task.scene, plan, "computed-torque")
+
+
+def test_a_solution_is_no_trajectory(simple: Scene) -> None:
+    solution = plan(simple, START, GOAL, 1.0)
+    with pytest.raises(InputError, match="expected a Trajectory, got a Solution; give the traj"):
+        play(simple, solution)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="expected a Solution, got a Trajectory; give what"):
+        certify(solution.trajectory)  # type: ignore[arg-type]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.error_estimate import estimate_error
-from hovi.errors import InputError
+from hovi.errors import InputError, expect
 from hovi.motion_error import MotionError, relative_difference
 from hovi.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
 from hovi.problem import TrajectoryProblem
@@ -80,6 +80,7 @@ def certify(solution: Solution, frame: str | None = None, *, estimate: bool = Tr
         estimated where the solution does not bring them along, at the price of a solve.
     Raises InputError when the solution does not know its problem, or for an unknown frame.
     """
+    expect(solution, Solution, "what `plan` returned")
     problem, trajectory = solution.problem, solution.trajectory
     if problem is None:
         raise InputError("this solution does not know its problem; plan again instead.")

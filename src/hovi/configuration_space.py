@@ -83,6 +83,19 @@ class ConfigurationSpace:
         """The continuous joints."""
         return tuple(factor for factor in self.factors if factor.group is SO2)
 
+    def names(self, coordinates: Sequence[str]) -> tuple[str, ...]:
+        """Names of the numbers of a configuration, (nq,), from those of its coordinates, (nv,).
+
+        A group's numbers add a part to the name of its joint: wrist[cos], base[x].
+        """
+        named = [""] * self.nq
+        for iq, iv in zip(*self.plain, strict=True):
+            named[iq] = coordinates[iv]
+        for factor in self.factors:
+            joint = coordinates[factor.v.start].removesuffix("[0]")
+            named[factor.q] = [f"{joint}[{part}]" for part in factor.group.parts]
+        return tuple(named)
+
     @property
     def vector(self) -> bool:
         """Whether configurations add like vectors."""

@@ -100,15 +100,38 @@ class ComputedTorque(Controller):
         return u, slope
 
 
+@dataclass(frozen=True, eq=False)
+class WithoutMotors(Controller):
+    """The torques of a controller, and none at joints that carry none.
+
+    driver: whose torques they are. passive: places of those joints in v.
+    """
+
+    driver: Controller
+    passive: npt.NDArray[np.intp]
+
+    def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
+        """As the driver's, with zeros."""
+        u, slope = (np.array(x) for x in self.driver.evaluate(q, v, t))
+        u[:, self.passive], slope[:, self.passive] = 0.0, 0.0
+        return u, slope
+
+
 FEEDBACKS = ("none", "pd", "computed-torque")
 
 
-def controller(plan: Trajectory, feedback: str, robot: Robot, bandwidth: float) -> Controller:
+def controller(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> Controller:
     """The controller of a name.
 
-    feedback: "none", "pd" or "computed-torque". robot: whose masses scale the gains.
+    feedback: "none", "pd" or "computed-torque". scene: what is driven; its robot's masses scale
+    the gains, and its passive joints get no torque.
     bandwidth: of the feedback, in [rad/s]. Raises InputError.
     """
+    driver = _driver(plan, feedback, scene, bandwidth)
+    return WithoutMotors(plan, driver, scene.passive_coordinates) if scene.passive else driver
+
+
+def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> Controller:
     if feedback not in FEEDBACKS:
         raise InputError(f"there is no feedback {feedback!r}: {nearest(feedback, FEEDBACKS)}")
     if feedback == "none":
@@ -116,7 +139,12 @@ def controller(plan: Trajectory, feedback: str, robot: Robot, bandwidth: float) 
     if not 0 < bandwidth < np.inf:
         raise InputError(f"the bandwidth must be positive and finite, got {bandwidth} rad/s.")
     if feedback == "pd":
-        return ProportionalDerivative.of_bandwidth(plan, robot, bandwidth)
+        return ProportionalDerivative.of_bandwidth(plan, scene.robot, bandwidth)
+    if scene.passive:
+        raise InputError(
+            f"computed torques need a motor at every joint, and {', '.join(scene.passive)} has "
+            "none; choose the feedback 'pd'."
+        )
     if plan.scene is None:
         raise InputError(
             "computed torques need the plan's scene, which a robot given as a pinocchio.Model does "

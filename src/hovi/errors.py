@@ -57,6 +57,12 @@ class DisplayError(HoviError):
     """A picture, a page or a viewer cannot be made."""
 
 
+def expect(value: object, kind: type, hint: str) -> None:
+    """Raise InputError for a value of another class; hint: what to give instead."""
+    if not isinstance(value, kind):
+        raise InputError(f"expected a {kind.__name__}, got a {type(value).__name__}; give {hint}.")
+
+
 def nearest(name: str, valid: Iterable[str]) -> str:
     """The end of a sentence about an unknown name: the nearest valid names, or all of them.
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import DisplayError, InputError
+from hovi.errors import DisplayError, InputError, expect
 from hovi.trajectory import Sample, Trajectory
 from hovi.whole_file import reason, whole_file
 
@@ -22,14 +22,15 @@ _BATCH = 10_000
 def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
     """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
 
-    The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name (an
-    index for q where nq != nv). Rows are 1/rate apart; the last is at exactly T, where the
+    The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name; a
+    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. Rows are 1/rate apart; the last is at exactly T, where the
     limits from the left are taken (from the right elsewhere).
 
     path: the file, written whole or not at all.
     rate: samples per second, positive.
     Raises InputError for a bad rate, DisplayError when the file cannot be written.
     """
+    expect(trajectory, Trajectory, "the trajectory of a solution")
     times = _times(trajectory.duration, rate)
     try:
         with whole_file(path) as stream:
@@ -56,8 +57,7 @@ def _times(duration: float, rate: float) -> Array:
 
 def _columns(trajectory: Trajectory) -> list[str]:
     names = [name.replace(",", "_").replace('"', "_") for name in trajectory.coordinate_names]
-    nq = trajectory.q.shape[1]
-    places = names if nq == len(names) else [str(i) for i in range(nq)]
+    places = names if trajectory.space is None else trajectory.space.names(names)
     columns = ["t", *(f"q_{name}" for name in places)]
     return columns + [f"{letter}_{name}" for letter in ("v", "a", "tau") for name in names]
 

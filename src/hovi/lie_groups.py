@@ -29,6 +29,7 @@ class Group:
     name: as files name it. nq: numbers of an element. nv: of a tangent vector.
     angular: places of the rotation in a tangent vector.
     unit: places in an element of what has unit norm.
+    parts: names of an element's numbers.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Group:
     nv: int
     angular: tuple[int, ...]
     unit: tuple[int, ...]
+    parts: tuple[str, ...]
     _compose: Callable[[Array, Array], Array]
     _turn: Callable[[Array, Array], Array]
     _log: Callable[[Array, Array, Array], Array]
@@ -219,8 +221,21 @@ _COTANGENT = (
     77683 / 14101100039391805440000,
 )
 
-SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), _so2_compose, _so2_turn, _turn_alone)
-SE2 = Group("SE(2)", 4, 3, (2,), (2, 3), _se2_compose, _se2_turn, _se2_log)
-SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _so3_compose, _so3_turn, _turn_alone)
-SE3 = Group("SE(3)", 7, 6, (3, 4, 5), (3, 4, 5, 6), _se3_compose, _se3_turn, _se3_log)
+_TURN = ("qx", "qy", "qz", "qw")
+SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), ("cos", "sin"), _so2_compose, _so2_turn, _turn_alone)
+SE2 = Group(
+    "SE(2)", 4, 3, (2,), (2, 3), ("x", "y", "cos", "sin"), _se2_compose, _se2_turn, _se2_log
+)
+SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _TURN, _so3_compose, _so3_turn, _turn_alone)
+SE3 = Group(
+    "SE(3)",
+    7,
+    6,
+    (3, 4, 5),
+    (3, 4, 5, 6),
+    ("x", "y", "z", *_TURN),
+    _se3_compose,
+    _se3_turn,
+    _se3_log,
+)
 GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}

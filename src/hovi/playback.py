@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import DisplayError
+from hovi.errors import DisplayError, expect
 from hovi.highlights import AT_LIMIT_NOTE, Highlights, node_name
 from hovi.imposed_clearance import with_obstacles
 from hovi.meshcat_page import Page
@@ -193,6 +193,7 @@ def write_html(
 
 
 def _robot(trajectory: Trajectory) -> Robot:
+    expect(trajectory, Trajectory, "the trajectory of a solution")
     if trajectory.robot is None:
         raise DisplayError(
             "this motion was saved without its robot, which was a bare Pinocchio model: there is "

@@ -24,10 +24,11 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
 from hovi.distance_panel import draw_distances, kept_distances
-from hovi.errors import DisplayError
+from hovi.errors import DisplayError, expect
 from hovi.figure_file import write_figure
 from hovi.limit_bands import Curve, draw_limits, legend_entries
 from hovi.limits import KINDS, Limits
+from hovi.motion_error import sliding_coordinates
 from hovi.robot import Robot
 from hovi.robot_model import frame_id
 from hovi.saturation import at_limit, imposed_limits
@@ -100,6 +101,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     beside the curves; a curve is wider where it leans on one. Where it was planned to keep away
     from something, a fourth panel has the distances of the pairs that come nearest.
     """
+    expect(trajectory, Trajectory, "the trajectory of a solution")
     curve, kept = _sampled(trajectory), kept_distances(trajectory)
     panels = 3 if kept is None else 4
     figure = Figure(figsize=(8.0, 2.5 * panels), layout="constrained")
@@ -175,7 +177,7 @@ def is_planar_two_link(robot: Robot) -> bool:
     if (robot.nq, robot.nv) != (2, 2) or list(robot.model.parents)[2] != 1:
         return False
     first, second = _axes_in_world(robot).T
-    return bool(_is_angular(robot).all() and abs(first @ second) > 1 - 1e-9)
+    return bool(not sliding_coordinates(robot).any() and abs(first @ second) > 1 - 1e-9)
 
 
 def _robot(trajectory: Trajectory) -> Robot:
@@ -192,11 +194,6 @@ def _axes_in_world(robot: Robot) -> Array:
     data = robot.model.createData()
     axes: Array = pin.computeJointJacobians(robot.model, data, robot.neutral())[3:]
     return axes
-
-
-def _is_angular(robot: Robot) -> Mask:
-    angular: Mask = np.linalg.norm(_axes_in_world(robot), axis=0) > 0.5
-    return angular
 
 
 def _coordinates(trajectory: Trajectory, q: Array) -> Array:
@@ -239,7 +236,7 @@ def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion
         _lines(ax, trajectory, panel.kind, curve, y, 1.0, np.arange(y.shape[-1]))
         _dress(ax, label)
         return
-    angular, side = _is_angular(robot), ax
+    angular, side = ~sliding_coordinates(robot), ax
     for mask, (label, scale) in ((angular, panel.angular), (~angular, panel.linear)):
         if mask.any():
             side = ax.twinx() if side.lines else ax
@@ -247,6 +244,18 @@ def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion
             _dress(side, label)
             if side is not ax:
                 side.grid(False)
+    if panel is _EFFORT and side is not ax:
+        _share_scale(trajectory, (ax, angular), (side, ~angular))
+
+
+def _share_scale(trajectory: Trajectory, one: tuple[Axes, Mask], other: tuple[Axes, Mask]) -> None:
+    """Give an axis of passive joints alone the other's scale: its own would blow up errors."""
+    passive = np.zeros(len(one[1]), dtype=bool)
+    if trajectory.scene is not None:
+        passive[trajectory.scene.passive_coordinates] = True
+    for (ax, mask), (wider, _) in ((one, other), (other, one)):
+        if passive[mask].all():
+            ax.set_ylim(wider.get_ylim())
 
 
 def _lines(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.controllers import Controller, controller
-from hovi.errors import InputError
+from hovi.errors import InputError, expect
 from hovi.scene import Scene
 from hovi.simulator import Simulation, simulate
 from hovi.state import State
@@ -58,7 +58,9 @@ class Tracking:
     @property
     def feedback_torque(self) -> Array:
         """u less the planned torque, shape (N + 1, nv), in [N m] or [N]."""
-        return self.torque - self.controller.planned(self.t).tau
+        more = self.torque - self.controller.planned(self.t).tau
+        more[:, self.simulation.scene.passive_coordinates] = 0.0
+        return more
 
 
 def play(
@@ -80,13 +82,14 @@ def play(
     inner_modes: as `simulate`.
     Raises InputError when the plan is another robot's, or the steps are too long to be solved.
     """
+    expect(plan, Trajectory, "the trajectory of a solution")
     names = scene.robot.coordinate_names
     if plan.coordinate_names != names:
         raise InputError(
             f"the plan moves {', '.join(plan.coordinate_names)}, but the scene's robot "
             f"{scene.robot.name!r} has {', '.join(names)}; play it on a scene of its own robot."
         )
-    drive = controller(plan, feedback, scene.robot, bandwidth)
+    drive = controller(plan, feedback, scene, bandwidth)
     count = intervals or steps_on_nodes(plan)
     start = State(plan.q[0], plan.v[0])
     motion = simulate(scene, start, plan.duration, drive, intervals=count, inner_modes=inner_modes)

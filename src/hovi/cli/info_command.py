@@ -17,12 +17,20 @@ def info(
     ],
 ) -> None:
     """Describe a robot, or a scene and what it leaves out."""
+    from hovi.errors import InputError, nearest
+    from hovi.example_robots import example_names
     from hovi.model_files import example_scenes
 
-    if what.endswith(".toml") or what in example_scenes():
+    robots, scenes = example_names(), example_scenes()
+    if what.endswith(".toml") or what in scenes:
         print(_scene(what))
-    else:
+    elif what.endswith(".urdf") or what in robots:
         print(_robot(what))
+    else:
+        raise InputError(
+            f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
+            "(A path ends in .urdf or .toml.)"
+        )
 
 
 def _scene(scene: str) -> str:

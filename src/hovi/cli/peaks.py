@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.robot import Robot
 from hovi.trajectory import Trajectory
+from hovi.unwrapped import unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -18,10 +18,11 @@ MOST_SAMPLES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """Extremes over time, one per velocity coordinate; NaN where there is none.
+    """Extremes over time, one per velocity coordinate.
 
     names: of the coordinates.
-    q_low, q_high: range of q, in [rad] or [m]; NaN for joints with nq != nv.
+    q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as
+        `unwrapped` gives them.
     v, a, tau: largest |v|, |a| and |tau|.
     lower, upper, v_limit, tau_limit: what the URDF states; infinite where it states nothing.
     """
@@ -53,30 +54,18 @@ def peaks(trajectory: Trajectory) -> Peaks:
     per_interval = max(1, min(SAMPLES_PER_INTERVAL, MOST_SAMPLES // N))
     s = np.linspace(0.0, 1.0, per_interval + 1)
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
-    nv = motion.v.shape[1]
-    low, high = np.full(nv, np.nan), np.full(nv, np.nan)
+    nv, space = motion.v.shape[1], trajectory.space
+    q = motion.q if space is None else unwrapped(space, motion.q)
     lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
     robot = trajectory.robot
-    in_q, in_v = (np.arange(nv), np.arange(nv)) if robot is None else _plain_coordinates(robot)
-    low[in_v], high[in_v] = motion.q[:, in_q].min(axis=0), motion.q[:, in_q].max(axis=0)
     v_limit, tau_limit = np.full(nv, np.inf), np.full(nv, np.inf)
     if robot is not None:
+        in_q, in_v = robot.space.plain
         lower[in_v], upper[in_v] = -_stated(-robot.lower[in_q]), _stated(robot.upper[in_q])
         v_limit, tau_limit = _known(robot.velocity_limit), _known(robot.effort_limit)
     v, a, tau = (np.abs(x).max(axis=0) for x in (motion.v, motion.a, motion.tau))
     names = trajectory.coordinate_names
-    return Peaks(names, low, high, v, a, tau, lower, upper, v_limit, tau_limit)
-
-
-def _plain_coordinates(robot: Robot) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """Positions in q and in v of the coordinates of joints with nq = nv."""
-    in_q: list[int] = []
-    in_v: list[int] = []
-    for joint in list(robot.model.joints)[1:]:
-        if joint.nq == joint.nv:
-            in_q += range(joint.idx_q, joint.idx_q + joint.nq)
-            in_v += range(joint.idx_v, joint.idx_v + joint.nv)
-    return np.array(in_q, dtype=np.intp), np.array(in_v, dtype=np.intp)
+    return Peaks(names, q.min(axis=0), q.max(axis=0), v, a, tau, lower, upper, v_limit, tau_limit)
 
 
 def _stated(limit: Array) -> Array:

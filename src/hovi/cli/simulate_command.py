@@ -124,7 +124,10 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
 
 
 def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) -> dict[str, Any]:
+    from hovi.motion_error import sliding_coordinates
+
     joints, tip = abs(tracking.joint_deviation), tracking.tip_deviation
+    robot = tracking.simulation.scene.robot
     return {
         "plan": str(plan),
         "feedback": feedback,
@@ -133,6 +136,7 @@ def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) 
         "tip_deviation_max": float(tip.max()),
         "joint_deviation_end": joints[-1].tolist(),
         "joint_deviation_max": joints.max(axis=0).tolist(),
+        "joint_units": ["m" if slides else "rad" for slides in sliding_coordinates(robot)],
         "feedback_torque_max": abs(tracking.feedback_torque).max(axis=0).tolist(),
     }
 
@@ -161,13 +165,22 @@ def _print(report: dict[str, Any], json: bool) -> None:
 def _print_deviation(report: dict[str, Any]) -> None:
     held = "" if report["bandwidth"] is None else f" of {report['bandwidth']:g} rad/s"
     print(f"feedback: {report['feedback']}{held}", end="")
-    print(f", at most {_list(report['feedback_torque_max'])} N m")
+    units = report["joint_units"]
+    efforts = ["N" if unit == "m" else "N m" for unit in units]
+    print(f", at most {_measured(report['feedback_torque_max'], efforts)}")
     print(
         f"the tip is off by {1e3 * report['tip_deviation_end']:.4g} mm at the end, "
         f"by {1e3 * report['tip_deviation_max']:.4g} mm at most"
     )
-    print(f"joints at the end: {_list(report['joint_deviation_end'])} rad")
-    print(f"joints at most:    {_list(report['joint_deviation_max'])} rad")
+    print(f"joints at the end: {_measured(report['joint_deviation_end'], units)}")
+    print(f"joints at most:    {_measured(report['joint_deviation_max'], units)}")
+
+
+def _measured(values: list[float], units: list[str]) -> str:
+    """Values with their unit: once where all have the same."""
+    if len(set(units)) == 1:
+        return f"{_list(values)} {units[0]}"
+    return "[" + ", ".join(f"{x:.4g} {unit}" for x, unit in zip(values, units, strict=True)) + "]"
 
 
 def _list(values: list[float]) -> str:
