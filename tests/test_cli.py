@@ -389,7 +389,7 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "number": (["plan", "two_link_reach", "--intervals", "many"], ["--intervals"]),
     "no scene": (["plan"], ["SCENE"]),
     "no such robot": (["info", "pandaa"], ["'panda'"]),
-    "no such scene": (["info", "two_link_swingup"], ["'two_link_swing_up'"]),
+    "no such scene, to info": (["info", "two_link_swingup"], ["'two_link_swing_up'"]),
     "no such URDF": (["info", "nowhere.urdf"], ["nowhere.urdf"]),
     "no such motion": (["plot", "nowhere.npz"], ["nowhere.npz"]),
     "no format": (["export", "nowhere.npz"], ["--csv"]),

@@ -23,8 +23,9 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
 
     The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name; a
-    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. Rows are 1/rate apart; the last is at exactly T, where the
-    limits from the left are taken (from the right elsewhere).
+    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. Rows are
+    1/rate apart; the last is at exactly T, where the limits from the left are taken (from the
+    right elsewhere).
 
     path: the file, written whole or not at all.
     rate: samples per second, positive.
