@@ -164,7 +164,7 @@ def test_bad_goals_and_via_points_are_refused() -> None:
         hovi.plan(scene, start, goal, 1.0, via=[hovi.Via(1.5, goal)])
     with pytest.raises(InputError, match="must be positive"):
         hovi.Via(-1.0, goal)
-    with pytest.raises(InputError, match="a hovi.State.q. or a hovi.FrameGoal"):
+    with pytest.raises(InputError, match=r"a hovi.State.q. or a hovi.FrameGoal"):
         hovi.Via(1.0, [0.0] * 6)  # type: ignore[arg-type]
 
 
