@@ -19,8 +19,9 @@ from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.nearest_approach import least_distance
 from hovi.cli.peaks import Peaks, peaks
 from hovi.json_numbers import finite
-from hovi.solver import Solution, Status
+from hovi.solver import Solution
 from hovi.task_file import Task
+from hovi.verdict import Status
 
 
 def as_json(
