@@ -50,6 +50,24 @@ def mimicking() -> pin.Model:
     return pin.transformJointIntoMimic(model, 1, 2, 1.0, 0.0)
 
 
+def revolute(model: pin.Model) -> pin.Model:
+    """The model with a revolute joint about the same axis for each continuous one."""
+    twin = pin.Model()
+    twin.name = "revolute"
+    for i in range(1, model.njoints):
+        joint = model.joints[i]
+        if joint.nq != joint.nv:
+            data = joint.createData()
+            joint.calc(data, pin.neutral(model))
+            joint = pin.JointModelRevoluteUnaligned(np.array(data.S).ravel()[3:])
+        place, parent = model.jointPlacements[i], model.parents[i]
+        twin.addJoint(parent, joint, place, str(model.names[i]))
+        twin.appendBodyToJoint(i, model.inertias[i], pin.SE3.Identity())
+    twin.armature = np.array(model.armature)
+    twin.gravity = model.gravity
+    return twin
+
+
 def rigid_body(inertia: Sequence[float], joint: pin.JointModel | None = None) -> Robot:
     """A body that turns freely about its centre of mass, with given principal moments."""
     model = pin.Model()

@@ -23,8 +23,7 @@ from hovi.schemes import by_name, galerkin
 from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.trajectory import Trajectory
-from hovi.twin_kernel import twin_model
-from manifold_robots import configurations, rigid_body, with_arm
+from manifold_robots import configurations, revolute, rigid_body, with_arm
 
 Array = npt.NDArray[np.float64]
 
@@ -53,15 +52,13 @@ def solved(
 @pytest.mark.parametrize("turns", [0, 1, -3])
 def test_a_continuous_joint_moves_as_a_revolute_one(turns: int) -> None:
     robot = load_robot("kinova")
-    model = twin_model(robot.model)
-    model.name = "revolute"
-    revolute = load_robot(model)
+    twin = load_robot(revolute(robot.model))
     d = np.array([0.5, 0.3, -0.2, 2.0, 0.4, -1.0])
     start, goal = robot.neutral(), robot.integrate(robot.neutral(), d)
     name = "j2s6s200_joint_6"
     ends = np.zeros(6), d + 2 * np.pi * turns * np.eye(6)[5]
     continuous = solved(robot, State(start), State(goal, turns={name: turns}), effects=[Gravity()])
-    vector = solved(revolute, State(ends[0]), State(ends[1]), effects=[Gravity()])
+    vector = solved(twin, State(ends[0]), State(ends[1]), effects=[Gravity()])
     assert continuous.cost == pytest.approx(vector.cost, rel=1e-10)
     t = np.linspace(0.0, 1.0, 23)
     found, expected = continuous.trajectory.sample(t), vector.trajectory.sample(t)

@@ -10,10 +10,11 @@ import numpy.typing as npt
 import pytest
 
 from finite_differences import derivative_per_point
-from hovi.effects import Gravity
+from hovi.effects import Gravity, MovingBase
 from hovi.lagrangian import EffortLagrangian
+from hovi.moving_base_torque import inverse_dynamics
 from hovi.rigid_body import InverseDynamicsKernel, casadi_functions
-from hovi.robot import Robot
+from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 
@@ -81,6 +82,20 @@ def test_analytic_and_casadi_derivatives_agree(
         results = analytic.expand(q, v, a, t, R, curvature)
         for found, expected in zip(results, casadi.expand(q, v, a, t, R, curvature), strict=True):
             assert_close(found, expected)
+
+
+def test_continuous_joints_on_a_moving_base_have_casadis_derivatives_from_the_kernel() -> None:
+    moved = MovingBase((0.0, "0.1*t**2", "sin(t)"), ("0.3*sin(t)", "-0.2*t", 0.5))
+    scene = Scene(load_robot("kinova"), [Gravity(), moved])
+    assert scene.analytic
+    symbols, space = scene.terms.symbols, scene.robot.space
+    tau = inverse_dynamics(scene.model, symbols.base, *symbols.columns())
+    n = scene.robot.nv
+    d, v, a, t = jets(n)
+    jet = scene.robot.integrate(scene.robot.neutral(), d), v, a, t, np.arange(1.0, n + 1), None
+    expected = CasadiTorque(symbols.columns(), tau, space=space).expand(*jet)
+    for found, wanted in zip(scene.torques.expand(*jet), expected, strict=True):
+        assert_close(found, wanted)
 
 
 @pytest.mark.parametrize("added", [None, drag], ids=["RNEA alone", "with an added torque"])

@@ -1,4 +1,7 @@
-"""Time per quadrature point where configurations are no vectors, beside ordinary joints."""
+"""Time per quadrature point where configurations are no vectors, beside ordinary joints.
+
+Of RNEA's kernel alone, and of the discrete Lagrangian with the charts of its intervals.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,8 @@ import pinocchio as pin
 from measuring import alone, best_time, print_machine, print_table
 
 import hovi
+from hovi.rigid_body import InverseDynamicsKernel
 from hovi.solver import guess_path
-from hovi.twin_kernel import twin_model
 
 INTERVALS = (16, 256)
 
@@ -18,11 +21,19 @@ def robots(name: str) -> hovi.Robot:
     if name == "kinova":
         return hovi.load_robot("kinova")
     if name == "kinova, revolute":
-        model = twin_model(hovi.load_robot("kinova").model)
-        model.name = "revolute"
-        return hovi.load_robot(model)
+        return hovi.load_robot(_revolute(hovi.load_robot("kinova").model))
     base = [pin.JointModelFreeFlyer()] if name == "free-flyer, 3 joints" else []
     return hovi.load_robot(_chain([*base, *[pin.JointModelRX()] * (3 if base else 9)]))
+
+
+def _revolute(model: pin.Model) -> pin.Model:
+    twin = pin.Model()
+    twin.name = "revolute"
+    for i in range(1, model.njoints):
+        joint = pin.JointModelRZ() if model.joints[i].nq == 2 else model.joints[i]  # RUBZ in Kinova
+        twin.addJoint(model.parents[i], joint, model.jointPlacements[i], str(model.names[i]))
+        twin.appendBodyToJoint(i, model.inertias[i], pin.SE3.Identity())
+    return twin
 
 
 def _chain(joints: list[pin.JointModel]) -> pin.Model:
@@ -38,18 +49,26 @@ def _chain(joints: list[pin.JointModel]) -> pin.Model:
     return model
 
 
-def measure(name: str, intervals: int) -> tuple[float, float]:
-    """Microseconds per point of the expansion and of the action."""
+def measure(name: str, intervals: int) -> tuple[float, ...]:
+    """Microseconds per point of the kernel, of the action's expansion and of the action."""
     robot = robots(name)
-    lagrangian = hovi.Scene(robot, [hovi.effects.Gravity()]).effort_lagrangian()
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    lagrangian = scene.effort_lagrangian()
     grid = hovi.Grid.uniform(2.0, intervals, hovi.schemes.galerkin(2))
     ld = hovi.DiscreteLagrangian(lagrangian, grid)
     start = robot.neutral()
     goal = robot.integrate(start, np.full(robot.nv, 0.3))
     path = guess_path(hovi.TrajectoryProblem(ld, hovi.State(start), hovi.State(goal)), "cubic")
     points = 4 * intervals
-    expand, action = best_time(lambda: ld.expand(path)), best_time(lambda: ld.action(path))
-    return 1e6 * expand / points, 1e6 * action / points
+    kernel = InverseDynamicsKernel(scene.model)
+    d, v, a, curvature = np.random.default_rng(0).uniform(-1, 1, (4, points, robot.nv))
+    q, weight = robot.integrate(start, d), np.ones(robot.nv)
+    work = (
+        lambda: kernel.expand(q, v, a, weight, curvature),
+        lambda: ld.expand(path),
+        lambda: ld.action(path),
+    )
+    return tuple(1e6 * best_time(each) / points for each in work)
 
 
 def main() -> None:
@@ -59,9 +78,9 @@ def main() -> None:
     for N in INTERVALS:
         names = ("kinova, revolute", "kinova", "nine joints", "free-flyer, 3 joints")
         for name in names:
-            expand, action = alone(measure, name, N)
-            rows.append([name, N, f"{expand:.1f}", f"{action:.2f}"])
-    print_table(["robot", "N", "value, gradient, Hessian", "value"], rows)
+            kernel, expand, action = alone(measure, name, N)
+            rows.append([name, N, f"{kernel:.2f}", f"{expand:.1f}", f"{action:.2f}"])
+    print_table(["robot", "N", "kernel alone", "value, gradient, Hessian", "value"], rows)
     print_machine()
 
 

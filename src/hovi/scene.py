@@ -18,13 +18,12 @@ from hovi.effects import REGISTRY, Effect
 from hovi.effort_term import EffortTerm
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
-from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics
-from hovi.rigid_body import InverseDynamicsKernel
+from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
+from hovi.rigid_body import InverseDynamicsKernel, joints_without_kernel
 from hovi.robot import Robot
 from hovi.scene_account import SceneAccount, account
 from hovi.scene_terms import SceneTerms
 from hovi.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
-from hovi.twin_kernel import TwinKernel, joints_without_twin
 
 Array = npt.NDArray[np.float64]
 
@@ -73,15 +72,14 @@ class Scene:
         Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
         """
         symbols, added = self.terms.symbols, self.terms.torque
-        vector, space = self.robot.vector_joints, self._space
-        if not self.analytic or not (vector or symbols.base is None):
+        space = self._space
+        if not self.analytic:
             tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
             total = tau if added is None else tau + added
             return CasadiTorque(symbols.columns(), total, self.compile, space)
         main: TorqueModel
         if symbols.base is None:
-            kernel = InverseDynamicsKernel if vector else TwinKernel
-            main = AnalyticTorque(kernel(self.model))
+            main = AnalyticTorque(InverseDynamicsKernel(self.model))
         else:
             main = MovingBaseTorque(self.model, symbols.base, symbols.t, self.compile)
         if added is None:
@@ -103,7 +101,7 @@ class Scene:
     @property
     def analytic(self) -> bool:
         """Whether RNEA's derivatives are Pinocchio's analytic ones."""
-        return not joints_without_twin(self.model)
+        return not self._without_kernel
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
@@ -199,6 +197,11 @@ class Scene:
         return None if self.robot.vector_joints else self.robot.space
 
     @cached_property
+    def _without_kernel(self) -> tuple[str, ...]:
+        moves = self.terms.symbols.base is not None
+        return joints_without_kernel(on_base_joints(self.model) if moves else self.model)
+
+    @cached_property
     def _is_passive(self) -> npt.NDArray[np.bool_]:
         return np.isin(np.arange(self.robot.nv), self.passive_coordinates)
 
@@ -216,7 +219,7 @@ class Scene:
     def _derivatives(self) -> str:
         if self.analytic:
             return "derivatives: Pinocchio's analytic ones (C++), since every joint has them"
-        joints = ", ".join(repr(joint) for joint in joints_without_twin(self.model))
+        joints = ", ".join(map(repr, self._without_kernel))
         return f"derivatives: CasADi's, since there are no analytic second ones for {joints}"
 
     def _left_out(self) -> list[str]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hovi import tangent
 from hovi.configuration_space import ConfigurationSpace
 from hovi.point_function import PointFunction, default_threads
+from hovi.rigid_body import InverseDynamicsKernel
 from hovi.tangent import Symbols
 
 Array = npt.NDArray[np.float64]
@@ -124,34 +125,13 @@ class CasadiTorque:
         return tau, J, hessian
 
 
-class Kernel(Protocol):
-    """RNEA over batches of points: InverseDynamicsKernel, or TwinKernel."""
-
-    def torque(self, q: Array, v: Array, a: Array, threads: int = 1) -> Array:
-        """tau at P points, (P, nv)."""
-
-    def linearize(self, q: Array, v: Array, a: Array, threads: int = 1) -> tuple[Array, Array]:
-        """tau and d tau / d(q, v, a), (P, nv, 3 nv)."""
-
-    def expand(
-        self,
-        q: Array,
-        v: Array,
-        a: Array,
-        weight: Array,
-        curvature: Array | None = None,
-        threads: int = 1,
-    ) -> tuple[Array, Array, Array]:
-        """tau, J and J^T diag(weight) J + sum_i curvature_i d2 tau_i."""
-
-
 class AnalyticTorque:
     """RNEA with analytic derivatives in C++.
 
     kernel: RNEA of the scene's model.
     """
 
-    def __init__(self, kernel: Kernel) -> None:
+    def __init__(self, kernel: InverseDynamicsKernel) -> None:
         self.kernel = kernel
         self._threads = default_threads()
 

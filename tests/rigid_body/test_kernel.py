@@ -264,17 +264,6 @@ def test_strided_and_integer_arrays_are_accepted(load_model) -> None:
     np.testing.assert_array_equal(strided, plain)
 
 
-@pytest.mark.parametrize(
-    ("name", "free_flyer", "joint"),
-    [("anymal", True, "root_joint"), ("kinova", False, "j2s6s200_joint_1")],
-)
-def test_joints_that_live_on_a_manifold_are_refused_by_name(load_model, name, free_flyer, joint):
-    model = load_model(name, free_flyer=free_flyer)
-    assert joint in joints_without_kernel(model)
-    with pytest.raises(ModelError, match=f"'{joint}'.*casadi_functions"):
-        InverseDynamicsKernel(model)
-
-
 def test_joints_whose_axes_turn_with_themselves_are_refused() -> None:
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelSphericalZYX(), pin.SE3.Identity(), "wrist")

@@ -9,11 +9,11 @@
 namespace hovi {
 
 PinocchioCalls::PinocchioCalls(const pinocchio::Model& model_)
-    : model(model_), data(model), q(model.nv), v(model.nv), a(model.nv) {}
+    : model(model_), data(model), q(model.nq), v(model.nv), a(model.nv) {}
 
 void PinocchioCalls::read_point(const Points& points, std::size_t point) {
   const std::size_t n = model.nv;
-  std::copy_n(points.q + point * n, n, q.data());
+  std::copy_n(points.q + point * model.nq, model.nq, q.data());
   std::copy_n(points.v + point * n, n, v.data());
   std::copy_n(points.a + point * n, n, a.data());
 }

@@ -20,8 +20,9 @@ std::vector<JointSet> sets(const std::vector<std::vector<Run>>& lists) {
 
 }  // namespace
 
-JointTree::JointTree(std::vector<TreeJoint> joints, const double* gravity)
-    : joints_(std::move(joints)) {
+JointTree::JointTree(std::vector<TreeJoint> joints, int nq, const TreeBase& base,
+                     const double* gravity)
+    : joints_(std::move(joints)), nq_(nq), base_(base) {
   std::copy_n(gravity, 6, gravity_);
   for (auto& joint : joints_) joint.subtree_mass = joint.mass;
   for (std::size_t i = joints_.size(); i-- > 0;)
@@ -54,7 +55,9 @@ void JointTree::relate() {
 TreeView JointTree::view() const {
   TreeView view{};
   view.n = static_cast<int>(joints_.size());
+  view.nq = nq_;
   view.joints = joints_.data();
+  view.base = base_;
   std::copy_n(gravity_, 6, view.gravity);
   view.meeting = meeting_.data();
   view.related = related_.data();

@@ -1,4 +1,5 @@
-// A robot as a tree of joints that turn about and slide along their z axis: numbers only.
+// A robot as a tree of joints that turn about and slide along their z axis, with or without a base
+// that moves: numbers only.
 #pragma once
 
 #include <vector>
@@ -9,8 +10,8 @@ namespace hovi {
 
 class JointTree {
  public:
-  // gravity: the spatial acceleration of free fall, linear then angular part.
-  JointTree(std::vector<TreeJoint> joints, const double* gravity);
+  // nq, base, gravity: see TreeView.
+  JointTree(std::vector<TreeJoint> joints, int nq, const TreeBase& base, const double* gravity);
 
   JointTree(JointTree&&) = default;
   JointTree(const JointTree&) = delete;
@@ -23,6 +24,8 @@ class JointTree {
   void relate();
 
   std::vector<TreeJoint> joints_;
+  int nq_;
+  TreeBase base_;
   double gravity_[6];
   std::vector<int> meeting_;
   RunLists related_runs_, carrier_runs_;

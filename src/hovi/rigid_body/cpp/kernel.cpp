@@ -63,7 +63,9 @@ InverseDynamicsKernel::InverseDynamicsKernel(const std::string& archive, bool po
 
 InverseDynamicsKernel::~InverseDynamicsKernel() = default;
 
-std::size_t InverseDynamicsKernel::dof() const { return parts_->tree.view().n; }
+std::size_t InverseDynamicsKernel::nq() const { return parts_->tree.view().nq; }
+
+std::size_t InverseDynamicsKernel::n() const { return parts_->tree.view().n; }
 
 // The threads take contiguous chunks of whole packs.
 void InverseDynamicsKernel::expand(Points points, Multipliers multipliers, Expansion out,

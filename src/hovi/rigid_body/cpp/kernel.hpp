@@ -15,7 +15,8 @@ class InverseDynamicsKernel {
   explicit InverseDynamicsKernel(const std::string& archive, bool portable = false);
   ~InverseDynamicsKernel();
 
-  std::size_t dof() const;
+  std::size_t nq() const;  // numbers in a configuration
+  std::size_t n() const;   // degrees of freedom
 
   // Computes what is not null in `out`.
   void expand(Points points, Multipliers multipliers, Expansion out, int threads);

@@ -78,6 +78,8 @@ NB_MODULE(_core, m) {
 
   nb::class_<InverseDynamicsKernel>(m, "InverseDynamicsKernel")
       .def(nb::init<const std::string&, bool>(), "archive"_a, "portable"_a = false)
+      .def_prop_ro("nq", &InverseDynamicsKernel::nq)
+      .def_prop_ro("n", &InverseDynamicsKernel::n)
       .def("torque", &torque, "q"_a, "v"_a, "a"_a, "tau"_a, "threads"_a)
       .def("linearize", &linearize, "q"_a, "v"_a, "a"_a, "tau"_a, "jacobian"_a, "threads"_a)
       .def("expand", &expand, "q"_a, "v"_a, "a"_a, "weight"_a, "curvature"_a.none(), "tau"_a,

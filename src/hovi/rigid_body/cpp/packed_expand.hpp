@@ -12,7 +12,8 @@ inline std::size_t rounded(std::size_t bytes) {
   return (bytes + alignment - 1) / alignment * alignment;
 }
 
-inline std::size_t packs_of(std::size_t n) { return 6 * n + 6 * n * n + 9; }
+// A joint has at most two numbers in a configuration.
+inline std::size_t packs_of(std::size_t n) { return 7 * n + 6 * n * n + 9; }
 
 std::size_t workspace_size(std::size_t n) {
   return rounded(n * sizeof(Joint)) + packs_of(n) * sizeof(Pack);
@@ -21,9 +22,10 @@ std::size_t workspace_size(std::size_t n) {
 Workspace divide(void* memory, std::size_t n) {
   char* bytes = static_cast<char*>(memory);
   Pack* packs = reinterpret_cast<Pack*>(bytes + rounded(n * sizeof(Joint)));
-  Pack* J = packs + 6 * n;
-  return {reinterpret_cast<Joint*>(bytes), packs, packs + n, packs + 2 * n, packs + 3 * n,
-          packs + 4 * n, packs + 5 * n, J, J + 3 * n * n, J + 6 * n * n};
+  Pack* J = packs + 7 * n;
+  const Vec zero = zero_vec();
+  return {reinterpret_cast<Joint*>(bytes), packs, packs + 2 * n, packs + 3 * n, packs + 4 * n,
+          packs + 5 * n, packs + 6 * n, J, J + 3 * n * n, J + 6 * n * n, {zero, zero}};
 }
 
 void expand_pack(const TreeView& tree, Workspace& work, const Multipliers& multipliers,
@@ -50,7 +52,7 @@ void expand(const TreeView& tree, void* memory, const Points& points,
   Workspace work = divide(memory, n);
   for (; first < last; first += lanes) {
     const Lanes where = lanes_from(first, last);
-    gather(points.q, where, n, work.q);
+    gather(points.q, where, tree.nq, work.q);
     gather(points.v, where, n, work.v);
     gather(points.a, where, n, work.a);
     if (out.hessian) gather(multipliers.weight, where, n, work.weight);

@@ -41,7 +41,7 @@ __attribute__((noinline)) void jacobian(const TreeView& tree, Workspace& work) {
       Pack* upper = entry(work.J, n, j, i);
       Pack* lower = entry(work.J, n, i, j);
       lower[0] = dot(carrier.dS.w, joint.r) + dot(carrier.ddS, joint.c_a);
-      lower[1] = dot(carrier.S.w, joint.r) + 2.0 * dot(carrier.dS, joint.c_a);
+      lower[1] = dot(carrier.S.w, joint.r) + dot(carrier.T, joint.c_a);
       upper[0] = dot(carrier.S, joint.c_q);
       upper[1] = dot(carrier.S, joint.c_v);
       upper[2] = lower[2] = dot(carrier.S, joint.c_a);
@@ -66,7 +66,7 @@ inline void scatter_jacobian(const Workspace& work, int n, const Lanes& where, d
 // in a and quadratic in v: the blocks va and aa vanish.
 inline void curvature_block(const Joint& i, const Joint& j, Pack block[9]) {
   block[0] = dot(j.L, i.c_q) + dot(j.ddS, i.e) + dot(j.dS, i.h);  // qq
-  block[1] = dot(j.S, i.h) + 2.0 * dot(j.dS, i.e);                // q_i v_j
+  block[1] = dot(j.S, i.h) + dot(j.T, i.e);                       // q_i v_j
   block[2] = dot(j.S, i.e);                                       // q_i a_j
   block[3] = dot(j.L, i.c_v) + dot(j.dS, i.k);                    // v_i q_j
   block[4] = dot(j.S, i.k);                                       // vv
@@ -97,7 +97,10 @@ inline const Pack* hessian_block(const TreeView& tree, const Workspace& work, bo
   const int n = tree.n, meeting = tree.meeting[i * n + j];
   if (meeting < 0) return work.zeros;
   const bool carried = meeting == j;
-  if (carried && curved) curvature_block(work.joints[i], work.joints[j], block);
+  if (carried && curved) {
+    curvature_block(work.joints[i], work.joints[j], block);
+    if (moves_base(tree, i)) block[0] += bend(work, work.joints[i], work.joints[j]);
+  }
   const JointSet& rows = carried ? tree.related[i] : tree.carriers[meeting];
   const Pack* start = carried && curved ? block : work.zeros;
   gauss_newton_block(work, n, i, j, rows, start, block);

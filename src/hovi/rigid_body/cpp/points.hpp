@@ -5,7 +5,7 @@
 
 namespace hovi {
 
-// A batch of points; each array is row-major, shape (count, n).
+// A batch of points; row-major, q of shape (count, nq), v and a (count, n).
 struct Points {
   std::size_t count;
   const double* q;
@@ -13,8 +13,8 @@ struct Points {
   const double* a;
 };
 
-// Row-major: tau (count, n), jacobian (count, n, 3n), hessian (count, 3n, 3n).
-// What is null is not computed.
+// Row-major: tau (count, n), jacobian (count, n, 3n), hessian (count, 3n, 3n), derivatives in the
+// tangent space. What is null is not computed.
 struct Expansion {
   double* tau;
   double* jacobian = nullptr;

@@ -1,6 +1,7 @@
 #include "read_tree.hpp"
 
 #include <algorithm>
+#include <string>
 #include <vector>
 
 #include "archive.hpp"
@@ -48,10 +49,32 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> axes(const pinocchio::JointModel& joint
   return data.S().matrix();
 }
 
+bool continuous(const pinocchio::JointModel& joint) { return joint.nq() == 2 && joint.nv() == 1; }
+
+TreeBase read_base(const pinocchio::Model& model) {
+  const std::string kind = model.njoints > 1 ? model.joints[1].shortname() : "";
+  if (kind == "JointModelFreeFlyer") return {6, {0, 1, 2, 3, 4, 5}, 3, false};
+  if (kind == "JointModelSpherical") return {3, {3, 4, 5}, 0, false};
+  if (kind == "JointModelPlanar") return {3, {0, 1, 5}, 2, true};
+  return {};
+}
+
 struct Frame {
   int joint;   // in the tree
   Matrix3d Q;  // from its axes to those of Pinocchio's frame
 };
+
+// The components of a base's velocity; the last of them bears the body. Returns where that is.
+Frame add_base(const pinocchio::Model& model, int size, std::vector<TreeJoint>& joints) {
+  for (int k = 0; k < size; ++k) {
+    TreeJoint joint{};
+    joint.parent = k - 1;
+    joint.armature = model.armature[k];
+    if (k + 1 == size) set_body(model.inertias[1], Matrix3d::Identity(), joint);
+    joints.push_back(joint);
+  }
+  return {size - 1, Matrix3d::Identity()};
+}
 
 }  // namespace
 
@@ -60,7 +83,13 @@ JointTree read_tree(const std::string& archive) {
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(model.nq);
   std::vector<Frame> frames{{-1, Matrix3d::Identity()}};
   std::vector<TreeJoint> joints;
-  for (std::size_t i = 1; i < model.joints.size(); ++i) {
+  const TreeBase base = read_base(model);
+  pinocchio::Motion gravity = model.gravity;
+  if (base.size > 0) {
+    gravity = model.jointPlacements[1].actInv(gravity);
+    frames.push_back(add_base(model, base.size, joints));
+  }
+  for (std::size_t i = frames.size(); i < model.joints.size(); ++i) {
     Frame frame = frames[model.parents[i]];
     pinocchio::SE3 placement = model.jointPlacements[i];
     const auto S = axes(model.joints[i], q);
@@ -68,6 +97,8 @@ JointTree read_tree(const std::string& archive) {
       const Vector3d linear = S.col(k).head<3>(), angular = S.col(k).tail<3>();
       TreeJoint joint{};
       joint.parent = frame.joint;
+      joint.q = model.joints[i].idx_q() + static_cast<int>(k);
+      joint.continuous = continuous(model.joints[i]);
       joint.turn = angular.isZero() ? 0 : 1;
       const Matrix3d Q = frame_along((joint.turn ? angular : linear).normalized());
       joint.slide = Q.col(2).dot(linear);
@@ -81,7 +112,7 @@ JointTree read_tree(const std::string& archive) {
     }
     frames.push_back(frame);
   }
-  return {joints, model.gravity.toVector().data()};
+  return {joints, model.nq, base, gravity.toVector().data()};
 }
 
 }  // namespace hovi

@@ -7,7 +7,8 @@
 
 namespace hovi {
 
-// Every joint's axes must be fixed in its frame; a joint of several coordinates becomes as many.
+// Every joint's axes must be fixed in its frame; a joint of several coordinates becomes as many. A
+// first joint that moves on SE(3), SO(3) or SE(2) is a base, which must carry all others.
 JointTree read_tree(const std::string& archive);
 
 }  // namespace hovi

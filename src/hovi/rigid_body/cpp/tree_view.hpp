@@ -5,7 +5,9 @@ namespace hovi {
 
 // The frame of a joint has the joint's axis as its z axis.
 struct TreeJoint {
-  int parent;             // -1: the base
+  int parent;             // -1: the world
+  int q;                  // where its coordinate stands in a configuration
+  bool continuous;        // instead of the angle, (cos, sin) stand there
   double rotation[9];     // of this frame in the parent's, at q = 0, by columns
   double translation[3];  // [m]
   double turn;            // angle about z per unit of q: 1, or 0 for a sliding joint
@@ -28,10 +30,22 @@ struct JointSet {
   int count;
 };
 
+// A base that moves on SE(3), SO(3) or SE(2). The components of its velocity, in its own frame, are
+// the first joints of the tree, each carrying the next.
+struct TreeBase {
+  int size;       // how many; 0: there is no such base
+  int places[6];  // of each in a twist: linear x y z, angular x y z
+  int q;          // where its quaternion (x, y, z, w) stands in a configuration
+  bool planar;    // instead of a quaternion, (cos, sin) of the angle about z stand there
+};
+
 struct TreeView {
   int n;
+  int nq;  // numbers in a configuration
   const TreeJoint* joints;
-  double gravity[6];         // spatial acceleration of free fall: linear, angular
+  TreeBase base;
+  double gravity[6];         // spatial acceleration of free fall: linear, angular. Where a base
+                             // moves, in the axes that it has at the neutral configuration.
   const int* meeting;        // (n, n): the last joint that carries both, or -1
   const JointSet* related;   // (n,): the joints that carry i, i, and those that i carries
   const JointSet* carriers;  // (n,): the joints that carry i, and i
