@@ -10,9 +10,10 @@ import numpy.typing as npt
 import pytest
 
 from finite_differences import derivative
-from hovi.discrete_lagrangian import CHUNK, DiscreteLagrangian
+from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity, JointLimitPotential
 from hovi.grid import DiscretePath, Grid
+from hovi.interval_batch import CHUNK
 from hovi.lagrangian import CasadiLagrangian, Lagrangian
 from hovi.robot import Robot
 from hovi.scene import Scene

@@ -164,7 +164,7 @@ def test_bad_goals_and_via_points_are_refused() -> None:
         hovi.plan(scene, start, goal, 1.0, via=[hovi.Via(1.5, goal)])
     with pytest.raises(InputError, match="must be positive"):
         hovi.Via(-1.0, goal)
-    with pytest.raises(InputError, match="a State or a FrameGoal"):
+    with pytest.raises(InputError, match=r"a hovi.State.q. or a hovi.FrameGoal"):
         hovi.Via(1.0, [0.0] * 6)  # type: ignore[arg-type]
 
 
@@ -194,3 +194,20 @@ free = ["wrist_3_joint"]
         assert each.goal.free_velocity == ("wrist_3_joint",)
         assert each.via[0].goal.free == ("wrist_3_joint",)
         assert each.via[0].time == 0.7
+
+
+def test_a_bad_via_point_is_named_by_its_number_and_line(tmp_path, models) -> None:
+    head = (models / "ur5_reach.toml").read_text()
+    via = "\n[[via]]\ntime = 0.3\nq = [0, 0, 0, 0, 0, 0]\n\n[[via]]\ntime = 0.6\nq = {}\n"
+    line = len((head + via).splitlines())
+    for q, sentence in (
+        ("[0, 0, 0]", "via[1].q has shape (3,)"),
+        ('["x", 0, 0, 0, 0, 0]', "`via[1].q[0]` must be a finite number"),
+        ('"home"', "home"),
+        ("{elbow_joint = 1.0}", "`via[1].q` leaves out joint"),
+    ):
+        (tmp_path / "scene.toml").write_text(head + via.format(q))
+        with pytest.raises(hovi.errors.SceneError) as refused:
+            hovi.load_task(tmp_path / "scene.toml")
+        assert f"line {line}: " in str(refused.value)
+        assert sentence in str(refused.value)

@@ -52,6 +52,7 @@ FLOORS = [
         "figure_file",
     },
     {
+        "interval_batch",
         "plain_urdf",
         "stored_torque",
         "trajectory_file",
@@ -104,6 +105,7 @@ FLOORS = [
     {"trajectory_objective"},
     {"limited_action", "equality_rounds", "predictor"},
     {"limited_solver"},
+    {"verdict"},
     {"solver", "task_file", "simulator", "controllers"},
     {"finer_solution", "multistart", "free_duration", "tracking", "easing"},
     {"error_estimate", "continuation"},

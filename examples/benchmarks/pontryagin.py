@@ -13,34 +13,35 @@ from scipy.integrate import solve_bvp
 
 import hovi
 
-TOLERANCES = 1e-4, 1e-3
+TOLERANCES = 1e-5, 1e-4, 1e-3
 MOST_NODES = 20_000
+SMALLEST = 1e-9
+"""Size below which a component is not scaled up."""
 
 
 def extremal_cost(trajectory: hovi.Trajectory) -> float | None:
     """Least 1/2 integral |tau|^2 near a motion of a scene with gravity; None where SciPy fails."""
     scene = trajectory.scene
     assert scene is not None
-    rates = _Rates(scene.model)
-    T, n = trajectory.duration, scene.model.nv
-    # s = t/T and (q, T v, T^3 p, T^2 p~, T^3 J), so that all numbers are of one size
-    scale = np.repeat([1.0, T, T**3, T**2, T**3], [n, n, n, n, 1])[:, None]
-    ends = trajectory.q[[0, -1]], T * trajectory.v[[0, -1]]
+    rates, n, T = _Rates(scene.model), scene.model.nv, trajectory.duration
+    p, pt = np.moveaxis(trajectory.momenta, 1, 0)
+    cost = trajectory.t[:, None]  # any increasing guess
+    y = np.concatenate([trajectory.q, trajectory.v, p, pt, cost], axis=1).T
+    size = np.maximum(np.abs(y).max(axis=1, keepdims=True), SMALLEST)
+    ends = trajectory.q[[0, -1]] / size[:n, 0], trajectory.v[[0, -1]] / size[n : 2 * n, 0]
 
     def rhs(s: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return T * scale * rates((y / scale)[: 4 * n])
+        return T * rates((y * size)[: 4 * n]) / size
 
     def boundary(y0: np.ndarray, y1: np.ndarray) -> np.ndarray:
         first = [y0[:n] - ends[0][0], y0[n : 2 * n] - ends[1][0], y0[4 * n :]]
         return np.concatenate([*first, y1[:n] - ends[0][1], y1[n : 2 * n] - ends[1][1]])
 
-    p, pt = np.moveaxis(trajectory.momenta, 1, 0)
-    zeros = np.zeros((len(p), 1))
-    y = np.concatenate([trajectory.q, trajectory.v, p, pt, zeros], axis=1).T * scale
     for tolerance in TOLERANCES:
-        found = solve_bvp(rhs, boundary, trajectory.t / T, y, tol=tolerance, max_nodes=MOST_NODES)
+        s = trajectory.t / T
+        found = solve_bvp(rhs, boundary, s, y / size, tol=tolerance, max_nodes=MOST_NODES)
         if found.success:
-            return float(found.y[-1, -1] / T**3)
+            return float(found.y[-1, -1] * size[-1, 0])
     return None
 
 

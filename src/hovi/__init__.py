@@ -54,7 +54,6 @@ if TYPE_CHECKING:
     from hovi.simulator import Simulation as Simulation
     from hovi.simulator import simulate as simulate
     from hovi.solver import Solution as Solution
-    from hovi.solver import Status as Status
     from hovi.solver import solve as solve
     from hovi.state import State as State
     from hovi.stepper import Flow as Flow
@@ -71,6 +70,7 @@ if TYPE_CHECKING:
     from hovi.tracking import play as play
     from hovi.trajectory import Trajectory as Trajectory
     from hovi.variational_error import variational_order as variational_order
+    from hovi.verdict import Status as Status
 
     __version__: str
 
@@ -97,7 +97,7 @@ _PLACES = {
     "Solution": "hovi.solver",
     "Sphere": "hovi.obstacles",
     "State": "hovi.state",
-    "Status": "hovi.solver",
+    "Status": "hovi.verdict",
     "Symmetry": "hovi.symmetry",
     "Task": "hovi.task_file",
     "Tolerance": "hovi.tolerance",

@@ -15,8 +15,9 @@ from hovi.errors import InputError, expect
 from hovi.motion_error import MotionError, relative_difference
 from hovi.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
 from hovi.problem import TrajectoryProblem
-from hovi.solver import Solution, Status
+from hovi.solver import Solution
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")

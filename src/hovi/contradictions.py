@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.clearance_check import in_words
+from hovi.joint_condition import JointCondition
 from hovi.limits import KINDS, NAMES, Limits, unit_of
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
@@ -33,7 +34,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
             sentence = _outside(problem.robot, end, row, state[row], limits, held)
             if sentence:
                 return sentence
-    return _too_near(problem) or _too_short(problem, limits, names)
+    return _via_outside(problem, limits) or _too_near(problem) or _too_short(problem, limits, names)
 
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
@@ -64,11 +65,26 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, he
         return ""
     kind, name = KINDS[row], robot.coordinate_names[i]
     return (
-        f"the {end}'s {NAMES[kind]} of joint {name!r} is {values[i]:.6g} "
+        f"the {NAMES[kind]} of joint {name!r} at the {end} is {values[i]:.6g} "
         f"{unit_of(robot, kind, i)}, "
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
         f"{end} or widen them"
     )
+
+
+def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
+    """Which via point is outside the limits; "" where none is."""
+    space, t = problem.robot.space, problem.grid.t
+    for each in problem.conditions:
+        passed = each.condition
+        if not isinstance(passed, JointCondition):
+            continue
+        end = f"via point at {t[each.node]:g} s"
+        for row, values in enumerate((space.coordinates(passed.target), passed.velocity)):
+            sentence = _outside(problem.robot, end, row, values, limits, passed.held[row])
+            if sentence:
+                return sentence
+    return ""
 
 
 def _too_near(problem: TrajectoryProblem) -> str:

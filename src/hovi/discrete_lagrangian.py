@@ -6,10 +6,8 @@ differentiated or compiled again when the scheme, the step or the number of inte
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,19 +16,12 @@ from hovi.chart import Chart
 from hovi.chart_expansion import IntervalCharts
 from hovi.configuration_space import ConfigurationSpace
 from hovi.grid import DiscretePath, Grid
+from hovi.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
 from hovi.optimize.contraction import contract
-from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-Jet = tuple[Array, Array, Array]
-"""(q, v, a) at points, each of shape (P, n)."""
-Coordinates = Literal["nodal", "regular"]
-COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
-
-CHUNK = 4096
-"""Intervals that are evaluated at a time, so that memory stays bounded."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,37 +50,6 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False)
-class _Batch:
-    """Intervals of one scheme, evaluated together."""
-
-    scheme: Scheme
-    index: Index | slice
-    h: Array  # (B,)
-    t: Array  # (B * Q,)
-
-    @cached_property
-    def point_weights(self) -> Array:
-        """h w_j / (1, h, h^2) per point and derivative, (B, Q, 3)."""
-        powers = self.h[:, None] ** -np.arange(3)  # (B, 3)
-        return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
-
-    @cached_property
-    def minus_powers(self) -> Array:
-        """(1, h^-1, h^-2) of every interval, (B, 1, 3, 1)."""
-        powers = self.h[:, None] ** -np.arange(3.0)
-        return np.asarray(powers[:, None, :, None])
-
-    @cached_property
-    def jet_table(self) -> Array:
-        """(x, x', x'') at the points over (v0, z, c / h^2), (3, B or 1, Q, 3 + r)."""
-        h = self.h[:1] if np.ptp(self.h) == 0 else self.h
-        table = self.scheme.table.transpose(1, 0, 2)  # (3, Q, 3 + r)
-        columns = h[:, None] ** np.where(np.arange(table.shape[2]) == 0, 1, 2)  # (B or 1, 3 + r)
-        rows = h ** -np.arange(3.0)[:, None]  # (3, B or 1)
-        return np.asarray(table[:, None] * columns[:, None] * rows[..., None, None])
-
-
-@dataclass(frozen=True, eq=False)
 class DiscreteLagrangian:
     """L_d = h sum_j w_j L(q_j, v_j, a_j) on every interval of a grid.
 
@@ -115,14 +75,12 @@ class DiscreteLagrangian:
         """
         values = np.empty(self.grid.intervals)
         for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
-            point_values = self.lagrangian.value(*jet, t=batch.t)
-            weights = batch.h[:, None] * batch.scheme.weights
-            values[batch.index] = np.sum(point_values.reshape(weights.shape) * weights, axis=1)
+            values[batch.index] = batch.sums(self.lagrangian.value(*jet, t=batch.t))
         return values
 
     def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
-        return float(np.sum(self.values(path, jets)))
+        return float(self.values(path, jets).sum())
 
     def expand(
         self,
@@ -152,7 +110,7 @@ class DiscreteLagrangian:
                 gradient, hessian = charts[i].expand(point_gradient, point_hessian)
                 parts.append(Expansion(value, gradient, hessian, torque, [charts[i]]))
                 continue
-            table = _table(batch.scheme, coordinates)
+            table = batch.tables[coordinates]
             gradient, hessian = contract(
                 table, batch.scheme.weights, batch.h, point_gradient, point_hessian
             )
@@ -174,7 +132,7 @@ class DiscreteLagrangian:
         for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
             point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
             if self.chart is None:
-                part = _contract_gradient(batch, _table(batch.scheme, coordinates), point_gradient)
+                part = batch.contracted(point_gradient, coordinates)
             else:
                 part = _charts(self.chart, batch, path).nodal_gradient(point_gradient)
             gradient[batch.index, : part.shape[1]] = part
@@ -220,17 +178,12 @@ class DiscreteLagrangian:
         """
         steps = []
         for i, batch in enumerate(self._batches):
+            columns = step[batch.index, : 4 + batch.scheme.inner_modes]
             if expansion.charts is not None:
-                m = 4 + batch.scheme.inner_modes
-                moved = expansion.charts[i].point_steps(step[batch.index, :m])
-                jet = moved * batch.minus_powers
-                steps.append(jet.reshape(len(batch.t), -1))
-                continue
-            table = _table(batch.scheme, coordinates)
-            Q, _, m = table.shape
-            points = np.matmul(table.reshape(Q * 3, m), step[batch.index, :m])  # (B, 3 Q, n)
-            jet = points.reshape(len(batch.h), Q, 3, -1) * batch.minus_powers
-            steps.append(jet.reshape(len(batch.t), -1))
+                moved = expansion.charts[i].point_steps(columns) * batch.minus_powers
+            else:
+                moved = np.matmul(batch.step_tables[coordinates], columns)  # (B, 3 Q, n)
+            steps.append(moved.reshape(len(batch.t), -1))
         return steps
 
     def jets(self, path: DiscretePath) -> list[Jet]:
@@ -250,7 +203,7 @@ class DiscreteLagrangian:
     @cached_property
     def point_weights(self) -> list[Array]:
         """h w_j of every quadrature point, shape (P,), per batch."""
-        return [(batch.h[:, None] * batch.scheme.weights).ravel() for batch in self._batches]
+        return [batch.weights.ravel() for batch in self._batches]
 
     @cached_property
     def point_times(self) -> list[Array]:
@@ -287,7 +240,7 @@ class DiscreteLagrangian:
             if self.chart is not None:
                 g[batch.index] = _charts(self.chart, batch, path).end_gradient(gradient)
                 continue
-            regular = _contract_gradient(batch, _table(batch.scheme, "regular"), gradient)
+            regular = batch.contracted(gradient, "regular")
             g[batch.index] = regular[:, :4]
         h = self.grid.steps[:, None]
         d1, d2, d3, d4 = g[:, 0], g[:, 1], g[:, 2], g[:, 3]
@@ -324,10 +277,10 @@ class DiscreteLagrangian:
         total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
         return total / self.grid.duration
 
-    def _jet(self, batch: _Batch, path: DiscretePath) -> Jet:
+    def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
         """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""
         space = self.lagrangian.space
-        return _jet(batch, path) if space is None else _jet_on(space, batch, path)
+        return batch.jet(path) if space is None else _jet_on(space, batch, path)
 
     def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
         if self.chart is None:
@@ -335,14 +288,13 @@ class DiscreteLagrangian:
         return [_charts(self.chart, batch, path) for batch in self._batches]
 
     @cached_property
-    def _batches(self) -> list[_Batch]:
-        return list(_split(self.grid))
+    def _batches(self) -> list[IntervalBatch]:
+        return list(interval_batches(self.grid))
 
     def _evaluate(
-        self, batch: _Batch, jet: Jet, multiplier: Array | None, terms: PointTerms | None
+        self, batch: IntervalBatch, jet: Jet, multiplier: Array | None, terms: PointTerms | None
     ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
         """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
-        weights = batch.h[:, None] * batch.scheme.weights
         if isinstance(self.lagrangian, EffortLagrangian):
             value, gradient, hessian, tau, J = self.lagrangian.expand(
                 *jet, t=batch.t, multiplier=multiplier, terms=terms
@@ -351,38 +303,10 @@ class DiscreteLagrangian:
         else:
             value, gradient, hessian = self.lagrangian.evaluate(*jet, t=batch.t)
             torque = []
-        action = np.sum(value.reshape(weights.shape) * weights, axis=1)
-        return action, gradient, hessian, torque
+        return batch.sums(value), gradient, hessian, torque
 
 
-def _split(grid: Grid) -> Iterator[_Batch]:
-    """Batches of at most CHUNK intervals, each of one scheme."""
-    t0 = grid.t
-    for scheme, index in grid.groups:
-        for first in range(0, len(index), CHUNK):
-            chosen: Index | slice = index[first : first + CHUNK]
-            if len(grid.groups) == 1:
-                chosen = slice(first, min(first + CHUNK, len(index)))
-            h = grid.steps[chosen]
-            t = t0[:-1][chosen][:, None] + h[:, None] * scheme.points
-            yield _Batch(scheme, chosen, h, t.ravel())
-
-
-def _jet(batch: _Batch, path: DiscretePath) -> Jet:
-    """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n).
-
-    The chart of an interval is the identity: q = q0 + x.
-    """
-    n = path.v.shape[1]
-    v0, inner = path.v[:-1][batch.index], path.inner[batch.index, : batch.scheme.inner_modes]
-    local = np.concatenate([v0[:, None], path.z[batch.index], inner], axis=1)
-    jet = np.matmul(batch.jet_table, local)  # (3, B, Q, n)
-    jet[0] += path.q[:-1][batch.index][:, None]
-    q, v, a = jet.reshape(3, -1, n)
-    return q, v, a
-
-
-def _points(batch: _Batch, path: DiscretePath) -> Array:
+def _points(batch: IntervalBatch, path: DiscretePath) -> Array:
     """(x, h x', h^2 x'') of q0 (+) x at the quadrature points, shape (B, Q, 3, n)."""
     h = batch.h[:, None]
     r = batch.scheme.inner_modes
@@ -394,7 +318,7 @@ def _points(batch: _Batch, path: DiscretePath) -> Array:
     return np.asarray(np.matmul(table.reshape(-1, 3 + r), local).reshape(N, -1, 3, n))
 
 
-def _jet_on(space: ConfigurationSpace, batch: _Batch, path: DiscretePath) -> Jet:
+def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
     """As `_jet`, in the charts q = q0 (+) x."""
     n = path.v.shape[1]
     x, dx, ddx = np.moveaxis((_points(batch, path) * batch.minus_powers).reshape(-1, 3, n), 1, 0)
@@ -402,20 +326,9 @@ def _jet_on(space: ConfigurationSpace, batch: _Batch, path: DiscretePath) -> Jet
     return Chart(space).jet(q0, x, dx, ddx)
 
 
-def _charts(chart: Chart, batch: _Batch, path: DiscretePath) -> IntervalCharts:
+def _charts(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
     """The charts of a batch's intervals."""
     h = batch.h[:, None, None]
     v0, z = path.v[:-1][batch.index], path.z[batch.index]
     ends = h * v0[:, None] + h**2 * z
     return IntervalCharts(chart, batch.scheme, batch.h, _points(batch, path), ends)
-
-
-def _table(scheme: Scheme, coordinates: Coordinates) -> Array:
-    return scheme.nodal_table if coordinates == "nodal" else scheme.regular_table
-
-
-def _contract_gradient(batch: _Batch, table: Array, gradient: Array) -> Array:
-    """Gradient of L_d in the columns of the table, shape (B, m, n)."""
-    B, (Q, _, m) = len(batch.h), table.shape
-    weighted = gradient.reshape(B, Q, 3, -1) * batch.point_weights[..., None]
-    return np.asarray(np.matmul(table.reshape(Q * 3, m).T, weighted.reshape(B, Q * 3, -1)))

@@ -34,7 +34,9 @@ class Via:
 
     def __post_init__(self) -> None:
         if not isinstance(self.goal, State | FrameGoal):
-            raise InputError(f"a via point is a State or a FrameGoal, not {self.goal!r}.")
+            raise InputError(
+                f"a via point is a hovi.State(q) or a hovi.FrameGoal, not {self.goal!r}."
+            )
         if not (np.isfinite(self.time) and self.time > 0):
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
         if isinstance(self.goal, State) and self.goal.turns:

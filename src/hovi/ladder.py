@@ -17,8 +17,9 @@ from hovi.continuation import (
 )
 from hovi.errors import HoviError
 from hovi.multistart import Job, Progress
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 WAYS: dict[str, Way] = {
     "inertia": lighter_rotors,

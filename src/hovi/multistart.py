@@ -30,9 +30,10 @@ from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 from hovi.scene import Scene
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 Array = npt.NDArray[np.float64]
 

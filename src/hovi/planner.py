@@ -28,10 +28,11 @@ from hovi.obstacles import Obstacle
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
-from hovi.solver import Solution, Status, guess_path, solve
+from hovi.solver import Solution, guess_path, solve
 from hovi.state import State, as_state
 from hovi.tolerance import Round, Tolerance
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 COARSE_INTERVALS = 60
 """Grids with more than twice as many intervals are first solved on a grid of this many."""

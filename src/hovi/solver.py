@@ -6,7 +6,6 @@ import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
@@ -22,10 +21,9 @@ from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
 from hovi.guess import check_path, moved, named_curve, stretched, with_turns
 from hovi.lagrangian import PointTerms
-from hovi.limited_solver import LimitedOutcome, solve_limited
+from hovi.limited_solver import solve_limited
 from hovi.limits import no_limits
 from hovi.multipliers import Multipliers
-from hovi.non_finite import non_finite_sentence
 from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
 from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
@@ -34,6 +32,7 @@ from hovi.state import State, as_state
 from hovi.tolerance import Accuracy
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status, chart_sentence, limited_verdict, verdict
 
 Report = Callable[[int, float], None]
 """What is told the number of each step and the least cost so far."""
@@ -41,23 +40,11 @@ Report = Callable[[int, float], None]
 CORRECTIONS = 6
 """Quasi-Newton steps that may correct the guess of a motion between other states."""
 DECREASE = 1e-9
-"""Relative decrease that the last step but one may predict; the last has the exact Hessian."""
+"""Relative decrease that the last step but one may predict, at most."""
 
 
 POLISHES = 8
 """Newton steps after the last round of equations, until only rounding is left."""
-
-
-class Status(StrEnum):
-    """What a solve ended in."""
-
-    MINIMUM = "minimum"
-    SADDLE = "saddle"
-    INFEASIBLE = "infeasible"
-    ITERATION_LIMIT = "iteration_limit"
-    TIME_LIMIT = "time_limit"
-    INTERRUPTED = "interrupted"
-    DIVERGED = "diverged"
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,10 +219,11 @@ def _without_limits(
     if problem.constrained:
         return _with_equations(problem, path, options, report)
     objective = ActionObjective(problem, structure=problem.structure)
+    options = dataclasses.replace(options, exact=True)
     outcome = minimize(objective, path, options, report)
-    n_neg, outcome = _certify(objective, outcome)
-    status, message = _verdict(problem, outcome, n_neg)
-    message += _chart_sentence(problem, outcome.x)
+    n_neg = 0 if outcome.convex else _inertia(objective, outcome)
+    status, message = verdict(problem, outcome, n_neg)
+    message += chart_sentence(problem, outcome.x)
     nit, history = outcome.iterations, outcome.history
     return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None)
 
@@ -260,11 +248,11 @@ def _with_equations(
         return outcome
 
     rounds = satisfy(problem, path, round_)
-    objective = ActionObjective(problem, multipliers=rounds.multipliers)
-    n_neg, outcome = _certify(objective, rounds.result)
+    outcome = rounds.result
+    n_neg = _inertia(ActionObjective(problem, multipliers=rounds.multipliers), outcome)
     nit = len(history)
     outcome.value, outcome.iterations = problem.ld.action(outcome.x), nit
-    status, message = _verdict(problem, outcome, n_neg)
+    status, message = verdict(problem, outcome, n_neg)
     if rounds.reason:
         status, message = Status.INFEASIBLE, f"{rounds.reason}."
     elif status is not Status.MINIMUM and not rounds.met:
@@ -289,7 +277,7 @@ def _with_limits(
     """By an interior point."""
     limits = problem.limits or no_limits(problem.robot)
     outcome = solve_limited(problem, limits, path, options, report)
-    status, message = _limited_verdict(outcome)
+    status, message = limited_verdict(outcome)
     return _Answer(
         outcome.problem,
         outcome.x,
@@ -300,50 +288,6 @@ def _with_limits(
         outcome.n_neg,
         outcome.history,
         outcome.forces,
-    )
-
-
-def _chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
-    """What to say where an orientation turns by more than half a turn in an interval, or ""."""
-    turns = problem.ld.turns(path)
-    k = int(np.argmax(turns))
-    if turns[k] <= np.pi:
-        return ""
-    return (
-        f" An orientation turns by {turns[k]:.3g} rad in the interval at t = "
-        f"{problem.grid.t[k]:.3g} s, more than half a turn: take more intervals."
-    )
-
-
-_UNFINISHED = {
-    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
-    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
-    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
-    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
-}
-
-
-def _limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
-    """Status and sentence of an outcome under limits."""
-    if outcome.reason:
-        return Status.INFEASIBLE, f"no motion within the limits was found: {outcome.reason}."
-    if outcome.stop is not Stop.STATIONARY:
-        status, reason = _UNFINISHED[outcome.stop]
-        return status, (
-            f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
-            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}."
-        )
-    share = f" to {outcome.excess:.1e} of their ranges" if outcome.excess > 0 else ""
-    held = f"limits hold everywhere{share}, on {outcome.problem.grid.intervals} intervals"
-    if outcome.n_neg == 0:
-        return (
-            Status.MINIMUM,
-            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps; {held}.",
-        )
-    return (
-        Status.SADDLE,
-        f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} directions of negative "
-        "curvature; solve again with another guess.",
     )
 
 
@@ -365,51 +309,9 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
     return problem.path(stretched(guess, grid.duration))
 
 
-def _certify(
-    objective: ActionObjective, outcome: Outcome[DiscretePath]
-) -> tuple[int, Outcome[DiscretePath]]:
-    """n_neg from the exact Hessian, and one more Newton step where a minimum was found."""
+def _inertia(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
+    """n_neg from the exact Hessian, -1 where there is none."""
     if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
-        return -1, outcome
-    model = objective.model(outcome.x, None, None)
-    factor = model.factor(0.0)
-    if factor is None:
-        return objective.negative_eigenvalues(outcome.x), outcome
-    if outcome.stop is Stop.STATIONARY:
-        path = objective.retract(outcome.x, factor.solve(-model.gradient), model)
-        value = objective.value(path)
-        if value <= outcome.value + 1e-12 * abs(outcome.value):
-            outcome.x, outcome.value = path, value
-    return 0, outcome
-
-
-def _verdict(
-    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
-) -> tuple[Status, str]:
-    """Status and sentence of an outcome."""
-    if outcome.stop is Stop.DIVERGED:
-        reason = non_finite_sentence(problem, outcome.x)
-        if reason:
-            return Status.DIVERGED, (
-                f"{reason}, after {outcome.iterations} steps; hand in another guess."
-            )
-    left = "".join(
-        f" A saddle of cost {cost:.10g} was left along negative curvature."
-        for cost in outcome.saddles_left
-    )
-    if outcome.stop is Stop.STATIONARY and n_neg == 0:
-        return (
-            Status.MINIMUM,
-            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps.{left}",
-        )
-    if outcome.stop is Stop.STATIONARY:
-        return (
-            Status.SADDLE,
-            f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
-            "solve again with escape_saddles=True or another guess.",
-        )
-    status, reason = _UNFINISHED[outcome.stop]
-    return status, (
-        f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
-        f"best so far, of cost {outcome.value:.10g}.{left}"
-    )
+        return -1
+    definite = objective.model(outcome.x, None, None).factor(0.0) is not None
+    return 0 if definite else objective.negative_eigenvalues(outcome.x)

@@ -12,10 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.action_structure import ActionStructure
-from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian, Expansion, Jet
+from hovi.discrete_lagrangian import DiscreteLagrangian, Expansion
 from hovi.errors import InputError
 from hovi.grid import DiscretePath
 from hovi.guess import with_ends_of_nodes
+from hovi.interval_batch import Coordinates, Jet
 from hovi.lagrangian import EffortLagrangian, PointTerms
 from hovi.multipliers import Multipliers, Residuals, node_residuals
 from hovi.optimize.band import BandModel
@@ -212,40 +213,25 @@ class ActionObjective(Objective[DiscretePath]):
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
-        h = self._h
         local = model.gather(step)  # (N, m, n)
-        band = self.algebra == "band"
-        end = local[-1:, 2:4] if band else np.zeros((1, 2, local.shape[2]))
-        dq = np.concatenate([local[:, 0], end[:, 0]])
-        dv = np.concatenate([local[:, 1] / h, end[:, 1] / h[-1]])
-        dZ = local[:, 2:4]
-        if band:
-            dZ = dZ - local[:, :2]
-            dZ[:, 0] -= local[:, 1]
-        q = self.problem.robot.integrate(x.q, dq)
-        hh = h[:, None] ** 2
-        path = DiscretePath(q, x.v + dv, x.z + dZ / hh, x.inner + local[:, 4:] / hh)
+        change = np.matmul(self.structure.changes[self.coordinates], local)
+        nodes = np.zeros((len(x.q), 2, local.shape[2]))
+        nodes[:-1] = change[:, :2]
+        if self.algebra == "band":
+            nodes[-1] = local[-1, 2:4]
+            nodes[-1, 1] /= self.problem.grid.steps[-1]
+        q = self.problem.robot.integrate(x.q, nodes[:, 0])
+        path = DiscretePath(q, x.v + nodes[:, 1], x.z + change[:, 2:4], x.inner + change[:, 4:])
         if self.ld.chart is None:
             return path
         return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
 
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
         """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
-        local = model.gather(step)
-        T = self.problem.grid.duration
-        size = max(1.0, float(np.max(np.abs(x.q))), T * float(np.max(np.abs(x.v))))
-        changes = [local[:, 0], local[:, 4:]]
-        speeds = [local[:, 1] / self._h]
-        if not self.problem.plain:
-            changes.append(local[-1, 2])
-            speeds.append(local[-1, 3] / self._h[-1])
-        dq = max(float(np.max(np.abs(change), initial=0.0)) for change in changes)
-        dv = max(float(np.max(np.abs(speed))) for speed in speeds)
-        return max(dq, T * dv) / size
-
-    @property
-    def _h(self) -> Array:
-        return self.problem.grid.steps[:, None]
+        changes = self.structure.sizes[self.coordinates] * model.gather(step)
+        T = self.structure.duration
+        size = max(1.0, np.abs(x.q).max(), T * np.abs(x.v).max())
+        return float(np.abs(changes).max() / size)
 
 
 def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:

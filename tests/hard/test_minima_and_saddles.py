@@ -26,8 +26,9 @@ from scenes import (
 )
 
 from hovi.action_structure import ActionStructure
-from hovi.discrete_lagrangian import Coordinates, DiscreteLagrangian
+from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import DiscretePath, Grid
+from hovi.interval_batch import Coordinates
 from hovi.lagrangian import CasadiLagrangian
 from hovi.model_files import example
 from hovi.optimize.merge_tree import MergeTreeModel

@@ -183,6 +183,41 @@ def test_the_history_tells_every_step_and_the_value_never_rises() -> None:
     assert [step.value for step in outcome.history] == problem.values[1:]
 
 
+@dataclass
+class Remembering(Smooth):
+    """Like Smooth; tells which of its models were asked for without an earlier one."""
+
+    exact: list[bool] = field(default_factory=list)
+
+    def model(
+        self, x: Array, previous: QuadraticModel | None, step: Array | None
+    ) -> QuadraticModel:
+        self.exact.append(previous is None)
+        return super().model(x, previous, step)
+
+
+@pytest.mark.parametrize("f", [rosenbrock, himmelblau, beale])
+def test_the_last_step_is_that_of_an_exact_model_and_leaves_nothing_but_rounding(
+    f: Callable[[ca.SX], ca.SX],
+) -> None:
+    x = ca.SX.sym("x", 2)
+    problem = Remembering(x, f(x) + 1)
+    outcome = minimize(problem, np.array([0.6, 0.2]), Options(decrease=1e-9, exact=True))
+    assert outcome.stop is Stop.STATIONARY
+    assert outcome.convex
+    assert problem.exact[0]
+    assert problem.exact[-1]
+    assert not any(problem.exact[1:4])
+    gradient, hessian = (each.full() for each in problem.second(outcome.x))
+    assert np.abs(np.linalg.solve(hessian, gradient)).max() < 1e-12
+
+
+def test_only_a_minimum_is_told_to_be_convex() -> None:
+    options = Options(exact=True, escape_saddles=False)
+    assert not minimize(objective(2, two_wells), np.zeros(2), options).convex
+    assert minimize(objective(2, two_wells), np.array([0.1, 1.0]), options).convex
+
+
 # Saddles
 
 

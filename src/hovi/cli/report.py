@@ -21,6 +21,7 @@ from hovi.cli.peaks import Peaks, peaks
 from hovi.json_numbers import finite
 from hovi.solver import Solution
 from hovi.task_file import Task
+from hovi.verdict import Status
 
 
 def as_json(
@@ -78,7 +79,7 @@ def print_report(
         for label, text in certificate_lines(certificate):
             print(f"{label:9s}{text}")
     if out is not None:
-        print(f"wrote {out}")
+        print(f"wrote {out}" + ("" if solution.success else ", which is no minimum"))
 
 
 def _estimate(solution: Solution, certificate: Certificate | None) -> float | None:
@@ -93,8 +94,8 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
     rows = [
         ("status", str(solution.status)),
         ("message", solution.message),
-        ("cost", f"{solution.cost:.10g}"),
-        ("n_neg", f"{solution.n_neg}"),
+        ("cost", f"{solution.cost:.10g}{_caveat(solution)}"),
+        ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
         ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
@@ -104,6 +105,12 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
         rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
     return rows
+
+
+def _caveat(solution: Solution) -> str:
+    """What the cost of an infeasible answer belongs to."""
+    unfit = solution.status == Status.INFEASIBLE
+    return " of the motion below, which is no answer" if unfit else ""
 
 
 def _intervals(solution: Solution, task: Task) -> str:

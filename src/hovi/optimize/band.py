@@ -7,6 +7,7 @@ Cholesky factorisation gives the step and decides definiteness at once.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ Index = npt.NDArray[np.intp]
 
 PANEL: int = _packed.panel_columns
 """Columns of the band that are factored together."""
+_FIXED = np.zeros(1)
+"""How columns change that are fixed: what index -1 finds behind a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +92,11 @@ class BandLayout:
         runs = Runs.of(entries, positions, products)
         return cls(unknowns, size, rows, runs, scales)
 
+    @cached_property
+    def slots(self) -> Index:
+        """1 + the unknown of every column of an interval, flat; 0 where it is fixed."""
+        return self.unknowns.ravel() + 1
+
     def assemble(self, hessian: Array) -> Array:
         """The band of a sum over intervals, a column of the lower triangle in every row.
 
@@ -142,13 +150,12 @@ class BandModel(QuadraticModel):
         """Sum of the intervals' covectors per unknown, shape (size,)."""
         if self.layout.scales is not None:
             local = local * self.layout.scales[..., None]
-        index = self.layout.unknowns.ravel()
-        sums = np.bincount(index + 1, local.ravel(), minlength=self.layout.size + 1)
+        sums = np.bincount(self.layout.slots, local.ravel(), minlength=self.layout.size + 1)
         return np.asarray(sums[1:], dtype=np.float64)
 
     def gather(self, s: Array) -> Array:
         """Columns of every interval, zero where they are fixed."""
-        local = np.append(s, 0.0)[self.layout.unknowns]
+        local = np.concatenate([s, _FIXED])[self.layout.unknowns]
         scales = self.layout.scales
         return local if scales is None else np.asarray(local * scales[..., None])
 

@@ -25,6 +25,10 @@ X = TypeVar("X")
 
 MOST_FACTORS = 30
 """Factorisations that one subproblem may take."""
+NEAR = 1e-5
+"""Relative decrease in a Newton step after which models are exact, where the last one shall be."""
+LEFT = 1e-24
+"""Relative decrease that is nothing but rounding: steps are like its square root."""
 
 
 class Stop(StrEnum):
@@ -46,7 +50,7 @@ class Objective(ABC, Generic[X]):
 
     @abstractmethod
     def model(self, x: X, previous: QuadraticModel | None, step: Array | None) -> QuadraticModel:
-        """The quadratic model at x; `step` led here from the `previous` model, where given."""
+        """The quadratic model at x, exact without a `previous` one, from which `step` led here."""
 
     @abstractmethod
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
@@ -67,6 +71,8 @@ class Options:
     max_iterations: steps, rejected ones included. time_limit: in [s]; none when None.
     radius: first radius of the trust region, in the metric's norm.
     escape_saddles: leave a saddle along negative curvature; False stops there.
+    exact: stop only after the step of an exact model, one that no earlier model had a part in, that
+        leaves nothing but rounding or comes after one that predicted less than `decrease`.
     """
 
     decrease: float = 1e-11
@@ -75,6 +81,7 @@ class Options:
     time_limit: float | None = None
     radius: float = 10.0
     escape_saddles: bool = True
+    exact: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,6 +105,7 @@ class Outcome(Generic[X]):
 
     value: the objective at x. iterations: steps tried, each with an entry in history.
     saddles_left: values of the saddles that were left along negative curvature.
+    convex: whether the last step was that of an exact model, whose Hessian is positive definite.
     """
 
     x: X
@@ -106,6 +114,7 @@ class Outcome(Generic[X]):
     iterations: int
     history: list[Iteration] = field(default_factory=list)
     saddles_left: list[float] = field(default_factory=list)
+    convex: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +146,7 @@ def minimize(
     """Minimise from x; a KeyboardInterrupt ends it with the best point so far."""
     value = objective.value(x)
     outcome = Outcome(x, value, Stop.ITERATION_LIMIT, 0)
-    if not np.isfinite(value):
+    if not math.isfinite(value):
         outcome.stop = Stop.DIVERGED
         return outcome
     try:
@@ -157,7 +166,7 @@ def _iterate(
 ) -> None:
     started = time.monotonic()
     radius, shift = options.radius, 0.0
-    model = objective.model(outcome.x, None, None)
+    model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
         if options.time_limit is not None and time.monotonic() - started > options.time_limit:
             outcome.stop = Stop.TIME_LIMIT
@@ -167,6 +176,8 @@ def _iterate(
         if stationary and trial.along_negative_curvature and not options.escape_saddles:
             outcome.stop = Stop.STATIONARY
             return
+        settled = stationary and trial.newton
+        last = settled and _is_last(outcome, trial, exact, before, options)
         candidate = objective.retract(outcome.x, trial.step, model)
         value = objective.value(candidate)
         noise = 1e-14 * abs(outcome.value)
@@ -176,17 +187,20 @@ def _iterate(
         if report is not None:
             report(outcome.iterations, min(value, outcome.value))
         radius = next_radius(radius, trial.norm, ratio)
-        accepted = ratio > 1e-4
+        accepted = ratio > 1e-4 or (settled and value <= outcome.value + 100 * noise)
         if accepted:
             if trial.along_negative_curvature and stationary:
                 outcome.saddles_left.append(outcome.value)
             outcome.x, outcome.value = candidate, value
-        if stationary and trial.newton:
-            outcome.stop = Stop.STATIONARY
+        if last or (settled and not accepted):
+            outcome.stop, outcome.convex = Stop.STATIONARY, exact
             return
         shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
-            model = objective.model(outcome.x, model, trial.step)
+            before = trial.decrease if trial.newton else math.inf
+            exact = options.exact and (settled or before <= NEAR * abs(value))
+            known = (None, None) if exact else (model, trial.step)
+            model = objective.model(outcome.x, *known)
         elif radius < 1e-14 * options.radius:
             outcome.stop = Stop.DIVERGED
             return
@@ -209,9 +223,25 @@ def _is_stationary(
     return objective.relative_size(outcome.x, trial.step, model) <= options.step
 
 
+def _is_last(
+    outcome: Outcome[X], trial: Trial, exact: bool, before: float, options: Options
+) -> bool:
+    """Whether the Newton step from a stationary point may be the last: see Options.exact.
+
+    What it leaves to decrease is decrease^3 / before^2, since convergence is quadratic.
+    exact: whether the model is. before: the decrease that the Newton step before it predicted.
+    """
+    size, decrease = abs(outcome.value), trial.decrease
+    if not options.exact or not exact:
+        return not options.exact
+    if before <= options.decrease * size or decrease > options.decrease * size:
+        return True
+    return decrease * (decrease / before) ** 2 <= LEFT * size
+
+
 def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
     """Actual over predicted decrease; 1 where both drown in rounding, -1 where not finite."""
-    if not np.isfinite(actual):
+    if not math.isfinite(actual):
         return -1.0
     if abs(actual) <= noise and abs(predicted) <= 10 * noise:
         return 1.0
@@ -241,8 +271,6 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
 
     guess: the shift of the last subproblem, a first value for this one.
     """
-    if not np.isfinite(model.gradient).all():
-        raise ArithmeticError("the model has numbers that are not finite")
     search = _ShiftSearch(model, radius, guess)
     shift = guess
     last: tuple[Factor, Trial] | None = None
@@ -273,7 +301,7 @@ class _ShiftSearch:
         self.model = model
         self.radius = radius
         self.low = 0.0
-        self.high = np.inf
+        self.high = math.inf
         self.indefinite = False
         self.reached = guess > 0.0
 
@@ -281,7 +309,7 @@ class _ShiftSearch:
         """The next shift where H + shift D is not positive definite."""
         self.indefinite = True
         self.low = max(self.low, shift)
-        if np.isfinite(self.high):
+        if math.isfinite(self.high):
             return max(math.sqrt(self.low * self.high), 0.1 * self.high)
         return max(4.0 * shift, (1e-5 if self.reached else 0.03) * self._scale())
 
@@ -292,9 +320,9 @@ class _ShiftSearch:
         Ds = self.model.metric_product(s)
         norm2 = max(float(np.vdot(s, Ds)), 0.0)
         decrease = -0.5 * float(np.vdot(g, s)) + 0.5 * shift * norm2
-        if not np.isfinite(decrease) or (decrease == 0.0 and g.any()):
+        if not math.isfinite(decrease) or (decrease == 0.0 and g.any()):
             raise ArithmeticError("the model has numbers that are not finite")
-        trial = Trial(s, decrease, shift, float(np.sqrt(norm2)))
+        trial = Trial(s, decrease, shift, math.sqrt(norm2))
         if self.fits(trial):
             return trial, 0.0
         return trial, float(np.vdot(Ds, factor.solve(Ds)))
@@ -312,13 +340,13 @@ class _ShiftSearch:
             return newton
         if trial.norm < self.radius and not self.indefinite and self.low == 0.0:
             return 0.0
-        if not np.isfinite(self.high):
+        if not math.isfinite(self.high):
             return max(10 * shift, 1e-6 * self._scale())
         return max(math.sqrt(self.low * self.high), 1e-3 * self.high)
 
     def _scale(self) -> float:
         scale = self.model.curvature_scale()
-        if not np.isfinite(scale):
+        if not math.isfinite(scale):
             raise ArithmeticError("the model has numbers that are not finite")
         return scale or float(np.max(np.abs(self.model.gradient))) / self.radius
 

@@ -14,7 +14,7 @@ from hovi.robot import Robot
 from hovi.state import State
 from hovi.task_file.joint_tables import read_configuration, read_velocity
 from hovi.task_file.schema import EndTable, GoalTable, ViaTable
-from hovi.task_file.sentences import Keys, TomlText
+from hovi.task_file.sentences import Keys, TomlText, spelled
 
 _OF_FRAMES = ("position", "rpy", "axis")
 
@@ -44,11 +44,11 @@ def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> Stat
 
 def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State:
     """The state of [start], [goal] or [[via]]."""
-    name = str(keys[0])
+    name = spelled(keys)
     if end.q is None:
         raise toml.error(keys, f"`{name}` needs q, or a frame and where it is to be")
-    q = read_configuration(end.q, name, robot, toml)
-    v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, name, robot, toml)
+    q = read_configuration(end.q, keys, robot, toml)
+    v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, keys, robot, toml)
     free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
     turns: dict[str, Any] = dict(getattr(end, "turns", {}))
     state = State(q, v, tuple(free), tuple(free_velocity), turns)
@@ -67,7 +67,8 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
 
 def read_via(tables: list[ViaTable], robot: Robot, toml: TomlText) -> tuple[Via, ...]:
     """What the motion passes through."""
-    return tuple(Via(each.time, read_goal(each, ("via",), robot, toml)) for each in tables)
+    goals = [read_goal(each, ("via", i), robot, toml) for i, each in enumerate(tables)]
+    return tuple(Via(each.time, goal) for each, goal in zip(tables, goals, strict=True))
 
 
 def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:

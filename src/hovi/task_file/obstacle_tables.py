@@ -30,4 +30,4 @@ def _obstacle(table: dict[str, Any], number: int, toml: TomlText) -> Obstacle:
         return obstacle_from_dict(table)
     except HoviError as wrong:
         name = table.get("name") or f"number {number + 1}"
-        raise toml.error(("obstacles",), f"obstacle {name!r}: {wrong}") from None
+        raise toml.error(("obstacles", number), f"obstacle {name!r}: {wrong}") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from hovi.errors import SceneError, nearest
 
 Keys = tuple[str | int, ...]
 
-_HEADER = re.compile(r"\[\[?([^\]]+)\]\]?\s*(#.*)?$")
+_HEADER = re.compile(r"(\[\[?)([^\]]+)\]\]?\s*(#.*)?$")
 _ELEMENTS = {
     "finite_number": "a finite number",
     "float_type": "a finite number",
@@ -41,18 +42,21 @@ class TomlText:
 
     def line(self, keys: Keys) -> int | None:
         """The line, from 1, of the longest leading part of `keys` that the text spells out."""
-        wanted = tuple(str(key) for key in keys if isinstance(key, str))
+        wanted = tuple(keys)
         best, where = 0, None
-        table: tuple[str, ...] = ()
+        table: Keys = ()
+        tables: Counter[Keys] = Counter()
         for number, padded in enumerate(self.text.splitlines(), start=1):
             line, here = padded.strip(), table
             if header := _HEADER.match(line):
-                here = table = _split(header[1])
+                name: Keys = _split(header[2])
+                here = table = name if header[1] == "[" else (*name, tables[name])
+                tables[name] += 1
             elif entry := _ENTRY.match(line):
                 here = table + _split(entry[1])
             else:
                 continue
-            if len(here) > best and wanted[: len(here)] == here:
+            if len(here) > best and (wanted[: len(here)] == here or here == (*wanted, 0)):
                 best, where = len(here), number
         return where
 
