@@ -184,3 +184,16 @@ def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
     solution = plan(scene, start, [-1.0, 0.5, -0.5, -0.5, 0.5, -2.0], 3.0)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
+
+
+@pytest.mark.parametrize("intervals", [16, 32])
+def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: int) -> None:
+    """The straight way asks for 1.22 times the shoulder's torque, held still."""
+    robot = hovi.load_robot("talos_arm", locked=["gripper_left_joint"])
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    start = [0.499, 0.422, -0.098, 1.096, 1.342, 0.104]
+    goal = [2.832, 1.647, -0.522, 1.966, 0.367, -0.201]
+    options = {"intervals": intervals, "continuation": False}
+    solution = plan(scene, start, goal, 1.9125, **options)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6

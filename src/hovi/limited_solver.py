@@ -109,9 +109,7 @@ def solve_limited(
         return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason=reason)
     deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
     search = _Search(problem, limits, options, deadline, report, path)
-    outcome = search.first(path)
-    if not outcome.feasible and outcome.stop is Stop.DIVERGED:
-        outcome, reason = search.restored(outcome)
+    outcome, reason = search.found(path)
     reason = reason or search.unmet
     if reason or outcome.stop is not Stop.STATIONARY:
         return search.finished(outcome, reason, 0.0)
@@ -151,11 +149,14 @@ class _Search:
         pairs = 0 if self.kept_clear is None else self.kept_clear.size
         return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
 
-    def first(self, path: DiscretePath) -> BoundedOutcome[DiscretePath]:
-        """The interior point from a guess, at the quadrature points."""
+    def found(self, path: DiscretePath) -> tuple[BoundedOutcome[DiscretePath], str]:
+        """What a guess leads to at the quadrature points, and why there is no motion, or ""."""
         if self.kept_clear is not None:
             path = self._eased(path, self.kept_clear)
-        return self._interior_point(path)
+        outcome = self._interior_point(path)
+        if outcome.feasible or outcome.stop is not Stop.DIVERGED:
+            return outcome, ""
+        return self._restored(outcome)
 
     def _eased(self, path: DiscretePath, wanted: ClearanceOutputs) -> DiscretePath:
         """A guess: the least action without obstacles, moved out of them little by little.
@@ -221,7 +222,7 @@ class _Search:
             self.problem, self.limits, self.margins, multipliers=known, more=self.kept_clear
         )
 
-    def restored(
+    def _restored(
         self, outcome: BoundedOutcome[DiscretePath]
     ) -> tuple[BoundedOutcome[DiscretePath], str]:
         """More tries, from motions that violate little, or the reason why there is none."""
@@ -270,7 +271,7 @@ class _Search:
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
-        tightened, tolerance = 0, self.limits.tolerance
+        tightened, tolerance, reason = 0, self.limits.tolerance, ""
         for rounds in range(ROUNDS + 1):
             sides = self._sides(outcome.x)
             excess = float(sides.max())
@@ -281,14 +282,13 @@ class _Search:
             again = None if coarse else self._again(outcome, sides)
             lost = again is None or not (_solved(again) or again.stop in ENDED)
             if lost and self.halvings < HALVINGS:
-                again, tightened = self._halved(sides), 0
+                (again, reason), tightened = self._halved(sides), 0
             if again is None:
                 break
             outcome = again
             if not _solved(again):
                 break
-        reason = ""
-        if excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
+        if not reason and excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
             reason = (
                 f"{self._why(outcome.x)}, between the points where limits are imposed; use more "
                 "intervals"
@@ -331,7 +331,7 @@ class _Search:
         action = self._objective(self.multipliers).action
         return self.multipliers.updated(action.residuals(path), self.problem.passive)
 
-    def _halved(self, sides: Array) -> BoundedOutcome[DiscretePath]:
+    def _halved(self, sides: Array) -> tuple[BoundedOutcome[DiscretePath], str]:
         """Solve again with the intervals halved in which a limit is exceeded, and their neighbours.
 
         From the first guess: a motion that far exceeds a limit between the points lives in the
@@ -350,7 +350,7 @@ class _Search:
         self.problem = problem
         self.multipliers = None
         self.margins = self._no_margins()
-        return self.first(self.guess)
+        return self.found(self.guess)
 
     def _again(
         self, outcome: BoundedOutcome[DiscretePath], sides: Array

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import signal
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from multiprocessing.resource_tracker import ensure_running
 from typing import Any
 
 import numpy as np
@@ -99,11 +101,25 @@ class Pool:
             return _solve_chunk(self.job, guesses, left)
         chunks = [guesses[i::count] for i in range(count)]
         with parallel_config(backend="loky", inner_max_num_threads=1):
+            _start_workers(count)
             parts = Parallel(n_jobs=count)(delayed(_solve_chunk)(self.job, c, left) for c in chunks)
         solutions: list[Solution | None] = [None] * len(guesses)
         for i, part in enumerate(parts):
             solutions[i : i + count * len(part) : count] = part
         return [solution for solution in solutions if solution is not None]
+
+
+def _start_workers(count: int) -> None:
+    """Processes that do not hear Ctrl-C, which this one answers: it ends them.
+
+    A terminal sends it to all of them, and one that still imports would complain.
+    """
+    ensure_running()  # which Python would do later, and unblock Ctrl-C
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        Parallel(n_jobs=count)(delayed(abs)(i) for i in range(count))
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
 
 
 def _solve_chunk(

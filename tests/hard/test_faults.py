@@ -64,6 +64,7 @@ def start(
     """One command as a person starts it; files may grow to `file_size` bytes."""
 
     def limit() -> None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background jobs do not hear it
         if file_size is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_size, file_size))
 

@@ -64,6 +64,9 @@ double time_pinocchio_calls(const std::string& archive, const Input& q, const In
 }  // namespace
 
 NB_MODULE(_core, m) {
+  // What is alive as an interrupted program ends is no leak.
+  nb::set_leak_warnings(false);
+
   m.attr("pinocchio_version") = PINOCCHIO_VERSION;
   m.attr("casadi_version") = CASADI_VERSION_STRING;
 
