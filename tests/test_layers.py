@@ -25,6 +25,7 @@ FLOORS = [
         "skeleton",
         "meshcat_page",
         "json_numbers",
+        "rebuilt_model",
     },
     {
         "obstacles",
@@ -36,6 +37,7 @@ FLOORS = [
         "truncated",
         "urdf_rules",
         "robot_source",
+        "coupled_model",
         "srdf",
         "example_robots",
     },
@@ -61,6 +63,8 @@ FLOORS = [
         "tangent",
         "chart_functions",
         "unwrapped",
+        "mimic_joints",
+        "mimic_kernel",
     },
     {"chain_urdf", "robot_model", "robot_report", "torque_model", "chart"},
     {
