@@ -9,21 +9,22 @@ one. On the way the Hessian of the first step tells what each interval would gai
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete_lagrangian import Expansion
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
 from hovi.motion_error import places
-from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.nearby_minimum import nearby_minimum
 from hovi.problem import TrajectoryProblem
+from hovi.relaxed_modes import relaxed
 from hovi.schemes import galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
-from hovi.solver import solve
+from hovi.solver import Solution, solve
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
 
@@ -32,16 +33,6 @@ Array = npt.NDArray[np.float64]
 MORE_MODES = 2
 """Inner modes that the finer solution has more: with one more the costs of both may be off by as
 much to the same side, and their difference would say nothing."""
-NEWTON_STEPS = 4
-"""Hessians that may be factored on the way before the optimiser is called."""
-CORRECTIONS = 3
-"""Steps with one Hessian."""
-CONTRACTION = 0.3
-"""Ratio of the lengths of successive steps above which the Hessian is renewed."""
-NEGLIGIBLE = 0.02
-"""Length of a step, as a share of the whole way, that makes it the last."""
-ROUNDING = 1e-15
-"""Length of a step, relative to the data, below which nothing is left to gain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +40,12 @@ class FinerSolution:
     """A solution of a problem on a finer grid.
 
     problem: on the finer grid; its intervals may be fewer or more where limits split them.
-    path: its solution. cost: its discrete action. known: that of the coarser solution.
+    path: its solution, up to a small share of its distance from the coarser one. cost: its
+        discrete action. known: that of the coarser solution.
     gains: L_d of every interval of the coarser solution less what it would be with the finer
         interval's modes between the same end data, shape (N,). Their sum is the difference of
         costs to first order: what an interval contributes to the error.
+    finish: gives the finer solution in full; None where that fails.
     """
 
     problem: TrajectoryProblem
@@ -60,6 +53,7 @@ class FinerSolution:
     cost: float
     known: float
     gains: Array
+    finish: Callable[[], Solution | None]
 
     @property
     def trajectory(self) -> Trajectory:
@@ -74,22 +68,20 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
         curve = stretched(motion(problem, path), problem.grid.duration)
         return _solved(halves, halves.path(curve), problem, path)
     fine = problem.on(finer_grid(problem.grid))
-    start = prolonged(path, fine.grid)
+    longer = prolonged(path, fine.grid)
     if problem.constrained:
-        return _solved(fine, start, problem, path)
-    objective = ActionObjective(fine)
-    first = objective.model(start, None, None)
+        return _solved(fine, longer, problem, path)
+    start = relaxed(fine.ld, longer)
     values = problem.ld.values(path)
-    gains, known = _gains(objective.expansion, values), float(np.sum(values))
-    found = _newton(objective, start, first)
+    gains, known = values - start.values, float(np.sum(values))
+    found = nearby_minimum(ActionObjective(fine), start.path)
     if found is not None:
-        value = objective.value(found)
-        if np.isfinite(value):
-            return FinerSolution(fine, found, value, known, gains)
-    solution = solve(fine, start)
+        return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
+    solution = solve(fine, longer)
     if not solution.success:
         return None
-    return FinerSolution(fine, solution.trajectory.path, solution.cost, known, gains)
+    path, cost = solution.trajectory.path, solution.cost
+    return FinerSolution(fine, path, cost, known, gains, lambda: solution)
 
 
 def _solved(
@@ -107,44 +99,14 @@ def _solved(
     t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, coarse.duration)
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
-    cost = problem.ld.action(path)
-    return FinerSolution(solution.problem, finer.path, solution.cost, cost, gains)
+    known, cost = problem.ld.action(path), solution.cost
+    return FinerSolution(solution.problem, finer.path, cost, known, gains, lambda: solution)
 
 
 def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
     """A path as a trajectory, without its momenta, for sampling."""
     momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
     return Trajectory(problem.grid, path, momenta, problem.scene)
-
-
-def _newton(
-    objective: ActionObjective, x: DiscretePath, model: QuadraticModel
-) -> DiscretePath | None:
-    """Newton's method with Hessians that are kept while they serve; None where it fails.
-
-    Lengths are those of changes of q and T v: in a flat valley a change of the action says little
-    of them.
-    """
-    whole = 0.0
-    for _ in range(NEWTON_STEPS):
-        factor = model.factor(0.0)
-        if factor is None:
-            return None
-        gradient, length = model.gradient, np.inf
-        for _ in range(CORRECTIONS):
-            step = factor.solve(-gradient)
-            last, length = length, objective.relative_size(x, step, model)
-            if not length <= last:
-                return None
-            x = objective.retract(x, step, model)
-            whole = max(whole, length)
-            if length <= max(NEGLIGIBLE * whole, ROUNDING) and last < np.inf:
-                return x
-            if length > CONTRACTION * last and last < np.inf:
-                break
-            gradient = model.scatter(objective.ld.gradient(x, objective.coordinates))
-        model = objective.model(x, None, None)
-    return None
 
 
 def finer_grid(grid: Grid) -> Grid:
@@ -166,16 +128,3 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     inner = np.zeros((N, fine.inner_modes, n))
     inner[:, :r] = path.inner
     return DiscretePath(path.q, path.v, path.z, inner)
-
-
-def _gains(expansion: Expansion, values: Array) -> Array:
-    """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
-    N, m, n = expansion.gradient.shape
-    modes = m - 4
-    g = expansion.gradient[:, 4:].reshape(N, modes * n)
-    H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, modes * n, modes * n)
-    # modes that an interval does not have are rows of zeros
-    absent = np.asarray(~H.any(axis=2))
-    H = H + absent[:, :, None] * np.eye(modes * n)
-    drop = 0.5 * np.einsum("ki,ki->k", g, np.linalg.solve(H, g[:, :, None])[:, :, 0])
-    return np.asarray(values - expansion.values + drop)

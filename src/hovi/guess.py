@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Protocol
 
@@ -274,14 +275,19 @@ def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
         r = scheme.inner_modes
         if r == 0:
             continue
-        x, w = np.polynomial.legendre.leggauss(r + 2)
-        s = (x + 1) / 2
+        s, projection = _projection(r)
         t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
         q, v, a = curve(t.ravel())
         if not robot.space.flat:
             local = robot.difference(np.repeat(nodes[:-1][index], len(s), axis=0), q)
             a = robot.chart.rates(local, v, a)[1]
-        basis = interval_rows(s, r)[:, 2, 3:]  # (Q, r)
-        a = a.reshape(len(index), len(s), n)
-        inner[index, :r] = np.einsum("kqn,qj,q->kjn", a, basis, w / 2)
+        inner[index, :r] = np.matmul(projection, a.reshape(len(index), len(s), n))
     return inner
+
+
+@functools.cache
+def _projection(inner_modes: int) -> tuple[Array, Array]:
+    """Gauss points of [0, 1], (Q,), and what projects values there on the inner modes, (r, Q)."""
+    x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
+    s = (x + 1) / 2
+    return s, np.ascontiguousarray((interval_rows(s, inner_modes)[:, 2, 3:] * (w / 2)[:, None]).T)

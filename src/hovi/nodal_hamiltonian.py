@@ -19,9 +19,6 @@ from hovi.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 
-_SHARES = (0.137, 0.389, 0.631, 0.929)
-"""Of the duration: where it is asked whether a cost depends on time."""
-
 
 @dataclass(frozen=True, eq=False)
 class NodalHamiltonian:
@@ -54,10 +51,9 @@ def nodal_hamiltonian(problem: TrajectoryProblem, trajectory: Trajectory) -> Nod
         raise InputError("under limits a does not follow from p~ alone")
     if problem.constrained:
         raise InputError("where equations are met a does not follow from p~ alone")
-    lagrangian = problem.ld.lagrangian
-    if depends_on_time(lagrangian, trajectory):
+    if problem.scene.terms.timed:
         raise InputError("the cost or the torques depend on time, and so does H")
-    p = trajectory.momenta
+    lagrangian, p = problem.ld.lagrangian, trajectory.momenta
     a = _accelerations(lagrangian, trajectory)
     L = lagrangian.value(trajectory.q, trajectory.v, a)
     pv, pa = np.vecdot(p[:, 0], trajectory.v), np.vecdot(p[:, 1], a)
@@ -76,11 +72,3 @@ def _accelerations(lagrangian: Lagrangian, trajectory: Trajectory) -> Array:
     if not found.all():
         raise InputError("the cost does not determine a from p~ at every node")
     return a
-
-
-def depends_on_time(lagrangian: Lagrangian, trajectory: Trajectory) -> bool:
-    """Whether L~ at a few points of a motion is another at other times."""
-    t = trajectory.duration * np.array(_SHARES)
-    jet = trajectory.jet(t)
-    here, there = (lagrangian.value(*jet, t=times) for times in (t, t[::-1]))
-    return bool(np.max(np.abs(here - there)) > 1e-12 * np.max(np.abs(here)))

@@ -12,7 +12,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from hovi.adaptive import refine_to_tolerance
+from hovi.adaptive import first_grid, refine_to_tolerance
 from hovi.blas_threads import one_blas_thread
 from hovi.clearance import MARGIN, Clearance
 from hovi.errors import ChartError, InputError, SceneError
@@ -84,8 +84,8 @@ def plan(
     scheme, intervals: how the action is discretised.
     tolerance: the largest error over the whole motion, in place of a scheme: a number is relative
         in the cost, "0.1 mm" at the robot's tip_frame, "0.1 mm at tool0" at another frame,
-        "0.01 deg" or "1e-4 rad" in the joints. The grid to begin with has up to 60 of the
-        `intervals`; the solution's `accuracy` says what was reached.
+        "0.01 deg" or "1e-4 rad" in the joints. The grid to begin with has two
+        thirds of the `intervals`, up to 40; the solution's `accuracy` says what was reached.
     limits: on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF),
         "none", a Limits, or a mapping as as_limits takes it.
     obstacles: what the robot's collision shapes keep a distance of `margin` from, in [m], all along
@@ -122,9 +122,10 @@ def plan(
         )
     T = duration if free is None else free.first
     passed = tuple(sorted(via, key=lambda each: each.time))
-    if wanted is not None:
-        table, intervals = galerkin(2), min(_count("intervals", intervals, 1), COARSE_INTERVALS)
-    grid = Grid.uniform(cast(float, T), intervals, table)
+    if wanted is None:
+        grid = Grid.uniform(cast(float, T), intervals, table)
+    else:
+        grid = first_grid(cast(float, T), _count("intervals", intervals, 1))
     fine = Job(
         scene,
         tuple(scene.effort_lagrangian(weight).weight),

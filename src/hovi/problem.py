@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -103,7 +104,14 @@ class TrajectoryProblem:
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         ld = DiscreteLagrangian(self.ld.lagrangian, grid)
-        return dataclasses.replace(self, ld=ld)
+        if self.conditions or not np.isclose(grid.duration, self.grid.duration, rtol=1e-12, atol=0):
+            return dataclasses.replace(self, ld=ld)
+        for scheme, _ in grid.groups:
+            require_regular(scheme)
+        problem = copy.copy(self)  # nothing else depends on the grid, and was checked already
+        object.__setattr__(problem, "ld", ld)
+        problem.__dict__.pop("structure", None)
+        return problem
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""

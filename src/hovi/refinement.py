@@ -7,7 +7,6 @@ More modes lower the error by rho per mode; cutting the interval makes rho itsel
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,19 +18,24 @@ from hovi.schemes import galerkin
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 DECAY = 0.02, 0.97
 """Range of the decay that is believed."""
-PIECES = np.array([1, 2, 4])
+PIECES = np.array([1, 2, 3, 4])
 """Pieces into which an interval may be cut at a time."""
-DEGREES = np.array([0, 1, 2, 3, 4, 6, 8, 10, 12])
-"""Inner modes that intervals may be given: few values, since those of one scheme are evaluated
-together."""
-OVERHEAD = 1.0
-"""What an interval costs besides its quadrature points, in points."""
+DEGREES = np.array([2, 3, 4, 5, 6, 8, 10, 12])
+"""Inner modes that intervals may be given."""
+PADDING = 0.05
+"""What an interval costs besides its quadrature points, in points per square of the columns of the
+most flexible scheme: the Hessians of all intervals are stored and factored with as many."""
 GROUP = 900.0
 """What a scheme costs besides, since its intervals are evaluated on their own: in points, for one
 joint. A point's cost grows like the square of the joints, this does not."""
+HOPELESS = 1000
+"""Pieces that stand for a number of modes that cannot meet the demands."""
+CUT = 900.0
+"""What it costs to read the motion at new nodes, in points, for one joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +49,14 @@ class Demand:
 
     factor: Array
     power: int
+
+    def left(self, change: Array | float) -> float:
+        """What is left to be done once the acceleration's error falls by `change`: 1 is just met.
+
+        The cost sums the intervals up; of the curve the largest counts.
+        """
+        left = change**self.power / self.factor
+        return float(np.mean(left) if self.power == 2 else np.max(left))
 
 
 def decay(grid: Grid, path: DiscretePath) -> Array:
@@ -67,53 +79,53 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
 
 
 def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) -> Grid:
-    """The cheapest grid that is foreseen to meet every demand.
+    """The cheapest grid that is foreseen to meet every demand, of one scheme or of two.
 
     rho: decay of each interval. joints: degrees of freedom of what moves.
     An interval whose demands nothing meets is cut into four.
     """
     degrees = np.array([scheme.inner_modes for scheme in grid.schemes])
-    pieces, chosen = _choice(degrees, rho, demands)
-    chosen = _fewer_schemes(pieces, chosen, GROUP / joints**2)
-    steps = np.repeat(grid.steps / pieces, pieces)
-    return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(chosen, pieces)))
+    more = np.maximum(DEGREES, degrees[:, None])  # (N, D)
+    pieces = _pieces(degrees, more, rho, demands)
+    low, high = _cheapest(more, pieces, 1.0 / joints**2)
+    kept, N = np.array([low, high]), np.arange(grid.intervals)
+    choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
+    cut, modes = pieces[N, choice], more[N, choice]
+    steps = np.repeat(grid.steps / cut, cut)
+    return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(modes, cut)))
 
 
-def _choice(degrees: Index, rho: Array, demands: Sequence[Demand]) -> tuple[Index, Index]:
-    """Pieces and inner modes of every interval, by the least work."""
-    more = np.maximum(DEGREES[None, :], degrees[:, None])  # (N, D)
-    log_rho = np.log(_decay_of_pieces(rho))  # (N, S)
-    after = (more[:, None] + 2) * log_rho[:, :, None]  # (N, S, D)
-    before = (degrees + 2) * np.log(rho)
-    change = after - before[:, None, None]
-    meets = np.ones(change.shape, dtype=bool)
+def _pieces(degrees: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:
+    """Into how many pieces each interval is cut with each number of modes, (N, D).
+
+    Where no number of pieces meets the demands, but another of modes does, out of all proportion.
+    """
+    after = (more[:, :, None] + 2) * np.log(_decay_of_pieces(rho))[:, None]  # (N, D, S)
+    change = after - ((degrees + 2) * np.log(rho))[:, None, None]
+    meets: Mask = np.ones(change.shape, dtype=bool)
     for demand in demands:
         wanted = np.log(np.minimum(demand.factor, 1.0))
         meets &= demand.power * change <= wanted[:, None, None] + 1e-12
-    work = PIECES[:, None] * (more[:, None] + 2 + OVERHEAD)
-    work = np.where(meets, work, np.inf).reshape(len(rho), -1)
-    best = np.argmin(work, axis=1)
-    s, d = np.divmod(best, len(DEGREES))
-    hopeless = ~np.isfinite(work[np.arange(len(rho)), best])
-    pieces = np.where(hopeless, PIECES[-1], PIECES[s])
-    return pieces, np.where(hopeless, np.maximum(degrees, 2), more[np.arange(len(rho)), d])
+    possible: Mask = np.any(meets, axis=2)
+    pieces = np.where(possible, PIECES[np.argmax(meets, axis=2)], HOPELESS)
+    hopeless = ~possible.any(axis=1)
+    pieces[hopeless] = PIECES[-1]
+    return pieces
 
 
-def _fewer_schemes(pieces: Index, chosen: Index, group: float) -> Index:
-    """Inner modes raised to the next of a few values that cost the least together.
+def _cheapest(more: Index, pieces: Index, share: float) -> tuple[int, int]:
+    """Places in DEGREES of the two numbers of modes that cost the least together; they may agree.
 
-    group: what a value costs besides its points, in points.
+    share: what a group or a cut costs for these joints, as a share of what it does for one.
     """
-    values = np.unique(chosen)
-    best, least = chosen, np.inf
-    for size in range(1, min(len(values), 4) + 1):
-        for kept in itertools.combinations(values[:-1], size - 1):
-            levels = np.array([*kept, values[-1]])
-            raised = levels[np.searchsorted(levels, chosen)]
-            work = float(np.sum(pieces * (raised + 2))) + group * size
-            if work < least:
-                best, least = raised, work
-    return best
+    low, high = np.triu_indices(len(DEGREES))
+    points = pieces * (more + 2)
+    taken = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
+    work = np.minimum(points[:, low], points[:, high]).sum(axis=0)
+    work = work + PADDING * taken.sum(axis=0) * (more.max(axis=0)[high] + 4) ** 2
+    work += share * (GROUP * (low != high) + CUT * (taken > 1).any(axis=0))
+    best = int(np.argmin(work))
+    return int(low[best]), int(high[best])
 
 
 def _decay_of_pieces(rho: Array) -> Array:

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from hovi import tangent
 from hovi.configuration_space import ConfigurationSpace
-from hovi.mimic_kernel import MimicKernel
 from hovi.point_function import PointFunction, default_threads
 from hovi.rigid_body import InverseDynamicsKernel
 from hovi.tangent import Symbols
@@ -132,7 +131,7 @@ class AnalyticTorque:
     kernel: RNEA of the scene's model.
     """
 
-    def __init__(self, kernel: InverseDynamicsKernel | MimicKernel) -> None:
+    def __init__(self, kernel: InverseDynamicsKernel) -> None:
         self.kernel = kernel
         self._threads = default_threads()
 

@@ -11,12 +11,9 @@ from hovi.accuracy.budget import Budget
 from hovi.accuracy.method import Stopwatch
 from hovi.accuracy.motion_error import MotionError, Yardstick
 from hovi.accuracy.variational_method import on_grid
-from hovi.adaptive import solve_to_tolerance
-from hovi.grid import Grid
+from hovi.adaptive import first_grid, solve_to_tolerance
 from hovi.guess import Curve
-from hovi.planner import COARSE_INTERVALS
 from hovi.problem import TrajectoryProblem
-from hovi.schemes import galerkin
 from hovi.solver import Solution
 from hovi.tolerance import Tolerance
 
@@ -67,11 +64,10 @@ def choices(
 ) -> tuple[Choice, ...]:
     """One choice per tolerance in TOLERANCES, as far as the budget allows.
 
-    problem: on any grid. intervals: of the scene; a search begins with as many, up to 60.
+    problem: on any grid. intervals: of the scene; see first_grid.
     clock: in CLOCKS.
     """
-    first = min(intervals, COARSE_INTERVALS)
-    coarse = on_grid(problem, Grid.uniform(problem.grid.duration, first, galerkin(2)))
+    coarse = on_grid(problem, first_grid(problem.grid.duration, intervals))
     path = coarse.path(guess)
     found = []
     for size in TOLERANCES:

@@ -15,9 +15,6 @@ def info(
             help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name.",
         ),
     ],
-    mimic: Annotated[
-        bool, typer.Option("--mimic", help="Joints of a URDF with <mimic> follow others.")
-    ] = False,
 ) -> None:
     """Describe a robot, or a scene and what it leaves out."""
     from hovi.errors import InputError, nearest
@@ -28,7 +25,7 @@ def info(
     if what.endswith(".toml") or what in scenes:
         print(_scene(what))
     elif what.endswith(".urdf") or what in robots:
-        print(_robot(what, mimic))
+        print(_robot(what))
     else:
         raise InputError(
             f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
@@ -44,7 +41,7 @@ def _scene(scene: str) -> str:
     return describe_task(load_task(find_scene(scene)))
 
 
-def _robot(robot: str, mimic: bool) -> str:
+def _robot(robot: str) -> str:
     from hovi.robot import load_robot
 
-    return load_robot(robot, mimic=mimic).describe()
+    return load_robot(robot).describe()

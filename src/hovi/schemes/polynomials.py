@@ -23,19 +23,22 @@ def legendre(x: Array, degree: int) -> Array:
     return P
 
 
-def inner_mode_rows(s: Array, j: int) -> Array:
-    """(double integral, integral, value) of b_j at s, for j >= 2, shape (M, 3).
+def inner_mode_rows(s: Array, inner_modes: int) -> Array:
+    """(double integral, integral, value) of b_2, b_3, ... at s, shape (M, 3, r).
 
     Integrals come from P_{j+1} - P_{j-1}: integrating monomials would move the end velocity by
     3e-10 at b_10 and by 5e-3 at b_20.
     """
-    P = legendre(2 * s - 1, j + 2)
-    once = (P[j + 1] - P[j - 1]) / (2 * (2 * j + 1))
-    upper = (P[j + 2] - P[j]) / (2 * (2 * j + 3))
-    lower = (P[j] - P[j - 2]) / (2 * (2 * j - 1))
-    twice = (upper - lower) / (2 * (2 * j + 1))
-    rows = np.sqrt(2 * j + 1) * np.stack([twice, once, P[j]], axis=1)
-    return np.asarray(rows)
+    P = legendre(2 * s - 1, inner_modes + 3).T  # (M, r + 4)
+    j = np.arange(2, 2 + inner_modes)
+    middle, above, below = P[:, 2:-2], P[:, 4:], P[:, :-4]
+    rows = np.empty((len(s), 3, inner_modes))
+    upper = (above - middle) / (2 * (2 * j + 3))
+    lower = (middle - below) / (2 * (2 * j - 1))
+    rows[:, 0] = (upper - lower) / (2 * (2 * j + 1))
+    rows[:, 1] = (P[:, 3:-1] - P[:, 1:-3]) / (2 * (2 * j + 1))
+    rows[:, 2] = middle
+    return rows * np.sqrt(2 * j + 1)
 
 
 def interval_rows(s: Array, inner_modes: int) -> Array:
@@ -45,9 +48,10 @@ def interval_rows(s: Array, inner_modes: int) -> Array:
     b_0 = sqrt(3) (1 - 2 s); h v and q follow by integration from (q0, h v0).
     """
     s = np.asarray(s, dtype=np.float64)
-    zero, one = np.zeros_like(s), np.ones_like(s)
-    velocity = np.stack([s, one, zero], axis=1)
-    Z0 = np.stack([s**2 * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s], axis=1)
-    Z1 = np.stack([s**2 * (s - 1), s * (3 * s - 2), 6 * s - 2], axis=1)
-    modes = [inner_mode_rows(s, j) for j in range(2, 2 + inner_modes)]
-    return np.stack([velocity, Z0, Z1, *modes], axis=2)
+    rows = np.empty((len(s), 3, 3 + inner_modes))
+    rows[:, 0, 0], rows[:, 1, 0], rows[:, 2, 0] = s, 1.0, 0.0
+    rows[:, 0, 1], rows[:, 1, 1], rows[:, 2, 1] = s**2 * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s
+    rows[:, 0, 2], rows[:, 1, 2], rows[:, 2, 2] = s**2 * (s - 1), s * (3 * s - 2), 6 * s - 2
+    if inner_modes:
+        rows[:, :, 3:] = inner_mode_rows(s, inner_modes)
+    return rows
