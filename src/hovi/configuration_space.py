@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import InputError
-from hovi.lie_groups import GROUPS, SE2, SE3, SO2, SO3, Group
+from hovi.lie_groups import GROUPS, SE2, SE3, SO2, SO3, Group, Layout, integrated
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -65,13 +65,23 @@ class ConfigurationSpace:
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
         """The groups among the parts."""
-        found, iq, iv = [], 0, 0
-        for part in self.parts:
-            nq, nv = (part, part) if isinstance(part, int) else _sizes(GROUPS[part])
+        found = []
+        for part, (_, iq, iv, _) in zip(self.parts, self.layout.tolist(), strict=True):
             if isinstance(part, str):
+                nq, nv = _sizes(GROUPS[part])
                 found.append(Factor(GROUPS[part], slice(iq, iq + nq), slice(iv, iv + nv)))
-            iq, iv = iq + nq, iv + nv
         return tuple(found)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The parts as the compiled charts read them, (kind, place in q, place in v, size)."""
+        rows, iq, iv = [], 0, 0
+        for part in self.parts:
+            kind = 0 if isinstance(part, int) else GROUPS[part].kind
+            nq, nv = (part, part) if isinstance(part, int) else _sizes(GROUPS[part])
+            rows.append((kind, iq, iv, nv))
+            iq, iv = iq + nq, iv + nv
+        return np.array(rows, dtype=np.int64).reshape(-1, 4)
 
     @cached_property
     def curved(self) -> tuple[Factor, ...]:
@@ -119,14 +129,7 @@ class ConfigurationSpace:
         q, dq = np.asarray(q, dtype=np.float64), np.asarray(dq, dtype=np.float64)
         if self.vector:
             return q + dq
-        lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
-        q, dq = np.broadcast_to(q, (*lead, self.nq)), np.broadcast_to(dq, (*lead, self.nv))
-        result = np.empty((*lead, self.nq))
-        iq, iv = self.plain
-        result[..., iq] = q[..., iq] + dq[..., iv]
-        for group, rows, columns in self._grouped:
-            result[..., rows] = group.integrate(q[..., rows], dq[..., columns])
-        return result
+        return integrated(self.layout, q, dq)
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """q1 (-) q0: the tangent vector of least angles that moves q0 to q1, (..., nv)."""

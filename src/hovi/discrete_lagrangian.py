@@ -320,10 +320,8 @@ def _points(batch: IntervalBatch, path: DiscretePath) -> Array:
 
 def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
     """As `_jet`, in the charts q = q0 (+) x."""
-    n = path.v.shape[1]
-    x, dx, ddx = np.moveaxis((_points(batch, path) * batch.minus_powers).reshape(-1, 3, n), 1, 0)
-    q0 = np.repeat(path.q[:-1][batch.index], len(batch.scheme.weights), axis=0)
-    return Chart(space).jet(q0, x, dx, ddx)
+    x = _points(batch, path) * batch.minus_powers
+    return Chart(space).jets_from(path.q[:-1][batch.index], x)
 
 
 def _charts(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:

@@ -1,28 +1,20 @@
 // The Python binding. Shapes and types are checked by the Python side that calls it.
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <algorithm>
-#include <memory>
-#include <new>
 #include <optional>
 
+#include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 
+#include "arrays.hpp"
 #include "doors.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
+using namespace hovi::arrays;
 using hovi::Doors;
 
 namespace {
 
-template <typename Scalar, int dimensions>
-using Array = nb::ndarray<Scalar, nb::numpy, nb::ndim<dimensions>, nb::c_contig, nb::device::cpu>;
-template <int dimensions>
-using Input = Array<const double, dimensions>;
-template <int dimensions>
-using Output = Array<double, dimensions>;
 using Index = Array<const std::int64_t, 1>;
 
 const Doors& best_doors() {
@@ -35,17 +27,6 @@ const Doors& best_doors() {
 const Doors& doors(bool portable) {
   static const Doors& best = best_doors();
   return portable ? hovi::packed_baseline : best;
-}
-
-constexpr std::align_val_t alignment{64};
-
-struct Free {
-  void operator()(double* memory) const { ::operator delete(memory, alignment); }
-};
-
-std::unique_ptr<double, Free> room(std::size_t numbers) {
-  void* memory = ::operator new(numbers * sizeof(double), alignment);
-  return std::unique_ptr<double, Free>(static_cast<double*>(memory));
 }
 
 void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,

@@ -13,38 +13,42 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.lie_groups import _charts
+
 Array = npt.NDArray[np.float64]
+Layout = npt.NDArray[np.int64]
+"""Rows (kind, place in q, place in v, size in v) for the parts of a configuration."""
 
 SERIES_BELOW = 1.0
 """Angles squared below which coefficients are summed as series."""
 NO_TURN = 1e-9
 """Turn, in [rad], below which its axis says nothing."""
-_TERMS = 10
 
 
 @dataclass(frozen=True)
 class Group:
     """One of the groups.
 
-    name: as files name it. nq: numbers of an element. nv: of a tangent vector.
+    name: as files name it. kind: as layouts name it. nq: numbers of an element. nv: of a tangent
+        vector.
     angular: places of the rotation in a tangent vector.
     unit: places in an element of what has unit norm.
     parts: names of an element's numbers.
     """
 
     name: str
+    kind: int
     nq: int
     nv: int
     angular: tuple[int, ...]
     unit: tuple[int, ...]
     parts: tuple[str, ...]
-    _compose: Callable[[Array, Array], Array]
     _turn: Callable[[Array, Array], Array]
     _log: Callable[[Array, Array, Array], Array]
 
     def integrate(self, g: Array, d: Array) -> Array:
         """g exp(d): elements (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
-        return self.normalized(self._compose(g, d))
+        return integrated(np.array([[self.kind, 0, 0, self.nv]]), g, d)
 
     def difference(self, g0: Array, g1: Array) -> Array:
         """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
@@ -70,18 +74,21 @@ class Group:
         return result
 
 
+def integrated(layout: Layout, q: Array, dq: Array) -> Array:
+    """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
+    lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
+    starts = np.ascontiguousarray(np.broadcast_to(q, (*lead, q.shape[-1])), dtype=np.float64)
+    steps = np.ascontiguousarray(np.broadcast_to(dq, (*lead, dq.shape[-1])), dtype=np.float64)
+    result = np.empty_like(starts)
+    rows = starts.reshape(-1, q.shape[-1]), steps.reshape(-1, dq.shape[-1])
+    _charts.integrate(layout, *rows, result.reshape(-1, q.shape[-1]))
+    return result
+
+
 def _rotate(c: Array, p: Array) -> Array:
     """The product of complex numbers (real, imaginary): p turned by c."""
     real = c[..., 0] * p[..., 0] - c[..., 1] * p[..., 1]
     return np.stack([real, c[..., 1] * p[..., 0] + c[..., 0] * p[..., 1]], axis=-1)
-
-
-def _circle(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _so2_compose(g: Array, d: Array) -> Array:
-    return _rotate(g, _circle(d[..., 0]))
 
 
 def _angle_between(g0: Array, g1: Array) -> Array:
@@ -98,16 +105,6 @@ def _turn_alone(g0: Array, g1: Array, w: Array) -> Array:
     return w
 
 
-def _se2_compose(g: Array, d: Array) -> Array:
-    w = d[..., 2]
-    # V(w) d = (sin w / w) d + ((1 - cos w) / w) (-d_y, d_x)
-    along, across = np.sinc(w / np.pi), 0.5 * w * np.sinc(w / (2 * np.pi)) ** 2
-    local = _rotate(np.stack([along, across], axis=-1), d[..., :2])
-    return np.concatenate(
-        [g[..., :2] + _rotate(g[..., 2:], local), _rotate(g[..., 2:], _circle(w))], axis=-1
-    )
-
-
 def _se2_turn(g0: Array, g1: Array) -> Array:
     return _so2_turn(g0[..., 2:], g1[..., 2:])
 
@@ -119,12 +116,6 @@ def _se2_log(g0: Array, g1: Array, turn: Array) -> Array:
     along = 1.0 - w * w * half_cotangent(w * w)  # (w / 2) cot(w / 2)
     v = _rotate(np.stack([along, -0.5 * w], axis=-1), p)
     return np.concatenate([v, turn], axis=-1)
-
-
-def _quaternion(w: Array) -> Array:
-    """exp(w) as (x, y, z, w), shape (..., 4)."""
-    angle = np.sqrt(np.sum(w * w, axis=-1, keepdims=True))
-    return np.concatenate([0.5 * np.sinc(angle / (2 * np.pi)) * w, np.cos(0.5 * angle)], axis=-1)
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
@@ -146,10 +137,6 @@ def conjugate(quaternion: Array) -> Array:
     return np.asarray(quaternion * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
-def _so3_compose(g: Array, d: Array) -> Array:
-    return quaternion_product(g, _quaternion(d))
-
-
 def _so3_turn(g0: Array, g1: Array) -> Array:
     product = quaternion_product(conjugate(g0), g1)
     product = np.where(product[..., 3:] < 0, -product, product)
@@ -158,17 +145,6 @@ def _so3_turn(g0: Array, g1: Array) -> Array:
     tiny = size < 1e-150
     angle = 2.0 * np.arctan2(size, w)
     return np.asarray(np.where(tiny, 2.0, angle / np.where(tiny, 1.0, size)) * u)
-
-
-def _se3_compose(g: Array, d: Array) -> Array:
-    v, w = d[..., :3], d[..., 3:]
-    square = np.sum(w * w, axis=-1, keepdims=True)
-    across = np.cross(w, v)
-    half = np.sinc(np.sqrt(square) / (2 * np.pi))
-    local = v + 0.5 * half * half * across + sine_defect(square) * np.cross(w, across)
-    return np.concatenate(
-        [g[..., :3] + rotated(g[..., 3:], local), _so3_compose(g[..., 3:], w)], axis=-1
-    )
 
 
 def _se3_turn(g0: Array, g1: Array) -> Array:
@@ -181,19 +157,6 @@ def _se3_log(g0: Array, g1: Array, w: Array) -> Array:
     square = np.sum(w * w, axis=-1, keepdims=True)
     v = p - 0.5 * across + half_cotangent(square) * np.cross(w, across)
     return np.concatenate([v, w], axis=-1)
-
-
-def sine_defect(square: Array) -> Array:
-    """(t - sin t) / t^3 of t^2."""
-    series, factorial = np.zeros_like(square), 1.0
-    coefficients = []
-    for k in range(_TERMS + 1):
-        factorial *= (2 * k + 2) * (2 * k + 3) if k else 6.0
-        coefficients.append((-1) ** k / factorial)
-    for c in reversed(coefficients):
-        series = series * square + c
-    t = np.sqrt(np.maximum(square, SERIES_BELOW))
-    return np.where(square < SERIES_BELOW, series, (t - np.sin(t)) / t**3)
 
 
 def half_cotangent(square: Array) -> Array:
@@ -222,20 +185,8 @@ _COTANGENT = (
 )
 
 _TURN = ("qx", "qy", "qz", "qw")
-SO2 = Group("SO(2)", 2, 1, (0,), (0, 1), ("cos", "sin"), _so2_compose, _so2_turn, _turn_alone)
-SE2 = Group(
-    "SE(2)", 4, 3, (2,), (2, 3), ("x", "y", "cos", "sin"), _se2_compose, _se2_turn, _se2_log
-)
-SO3 = Group("SO(3)", 4, 3, (0, 1, 2), (0, 1, 2, 3), _TURN, _so3_compose, _so3_turn, _turn_alone)
-SE3 = Group(
-    "SE(3)",
-    7,
-    6,
-    (3, 4, 5),
-    (3, 4, 5, 6),
-    ("x", "y", "z", *_TURN),
-    _se3_compose,
-    _se3_turn,
-    _se3_log,
-)
+SO2 = Group("SO(2)", 1, 2, 1, (0,), (0, 1), ("cos", "sin"), _so2_turn, _turn_alone)
+SE2 = Group("SE(2)", 2, 4, 3, (2,), (2, 3), ("x", "y", "cos", "sin"), _se2_turn, _se2_log)
+SO3 = Group("SO(3)", 3, 4, 3, (0, 1, 2), (0, 1, 2, 3), _TURN, _so3_turn, _turn_alone)
+SE3 = Group("SE(3)", 4, 7, 6, (3, 4, 5), (3, 4, 5, 6), ("x", "y", "z", *_TURN), _se3_turn, _se3_log)
 GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}

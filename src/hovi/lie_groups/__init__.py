@@ -1,0 +1,25 @@
+"""The groups that joints move on and charts of them, by C++ over batches."""
+
+from hovi.lie_groups.groups import (
+    GROUPS,
+    SE2,
+    SE3,
+    SO2,
+    SO3,
+    Group,
+    Layout,
+    half_cotangent,
+    integrated,
+)
+
+__all__ = [
+    "GROUPS",
+    "SE2",
+    "SE3",
+    "SO2",
+    "SO3",
+    "Group",
+    "Layout",
+    "half_cotangent",
+    "integrated",
+]

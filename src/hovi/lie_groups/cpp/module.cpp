@@ -1,0 +1,117 @@
+// The Python binding. Shapes and types are checked by the Python side that calls it.
+#include <optional>
+#include <vector>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+
+#include "arrays.hpp"
+#include "doors.hpp"
+#include "integrate.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace hovi::arrays;
+using hovi::ChartDoors;
+using hovi::Charts;
+
+namespace {
+
+// Rows (kind, place in q, place in v, size), one for each part.
+using Layout = Array<const std::int64_t, 2>;
+
+const ChartDoors& best_doors() {
+#ifdef HOVI_WITH_AVX2
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return hovi::charts_avx2;
+#endif
+  return hovi::charts_baseline;
+}
+
+const ChartDoors& doors(bool portable = false) {
+  static const ChartDoors& best = best_doors();
+  return portable ? hovi::charts_baseline : best;
+}
+
+// The layout's numbers are those of hovi::Part.
+hovi::Space space_of(const Layout& layout, std::size_t nq, std::size_t nv) {
+  static_assert(sizeof(hovi::Part) == 4 * sizeof(std::int64_t));
+  return {nq, nv, layout.shape(0), reinterpret_cast<const hovi::Part*>(layout.data())};
+}
+
+Charts charts_of(const Layout& layout, const Input<3>& table, const Input<1>& weights,
+                 const Input<1>& steps, const Input<4>& x, const Input<3>& ends) {
+  return {space_of(layout, 0, x.shape(3)), x.shape(0),   x.shape(1), table.shape(2),
+          table.data(),                    weights.data(), steps.data(), x.data(), ends.data()};
+}
+
+void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
+               const Output<2>& result) {
+  const hovi::Space space = space_of(layout, q.shape(1), x.shape(1));
+  const std::size_t points = x.shape(0);
+  const nb::gil_scoped_release released;
+  for (std::size_t p = 0; p < points; ++p)
+    hovi::integrate(space, q.data() + p * space.nq, x.data() + p * space.nv,
+                    result.data() + p * space.nq);
+}
+
+void rates(const Layout& layout, const Input<3>& x, const std::optional<Input<3>>& carried,
+           const Output<3>& out) {
+  const std::size_t points = x.shape(0), n = x.shape(2);
+  const hovi::Space space = space_of(layout, 0, n);
+  const nb::gil_scoped_release released;
+  doors().rates(space, points, x.data(), carried ? carried->data() : nullptr, out.data(),
+                out.data() + points * n);
+}
+
+void local_rates(const Layout& layout, const Input<2>& x, const Input<2>& v, const Input<2>& a,
+                 const Output<3>& out) {
+  const std::size_t points = x.shape(0), n = x.shape(1);
+  const hovi::Space space = space_of(layout, 0, n);
+  const nb::gil_scoped_release released;
+  doors().local_rates(space, points, x.data(), v.data(), a.data(), out.data(),
+                      out.data() + points * n);
+}
+
+void expand(const Layout& layout, const Input<3>& table, const Input<1>& weights,
+            const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
+            const Input<4>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
+            const Output<5>& columns_hessian, bool portable) {
+  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+  const nb::gil_scoped_release released;
+  const auto work = room(doors(portable).workspace(charts));
+  doors(portable).expand(charts, gradient.data(), hessian.data(), work.get(),
+                         columns_gradient.data(), columns_hessian.data());
+}
+
+void pull_gradient(const Layout& layout, const Input<3>& table, const Input<1>& weights,
+                   const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
+                   const Input<4>& gradient, bool regular, const Output<3>& columns_gradient) {
+  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+  const nb::gil_scoped_release released;
+  const auto work = room(doors().workspace(charts));
+  doors().pull_gradient(charts, gradient.data(), regular, work.get(), columns_gradient.data());
+}
+
+void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& weights,
+                const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
+                const Input<3>& step, const Output<4>& change) {
+  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+  const nb::gil_scoped_release released;
+  const auto work = room(doors().workspace(charts));
+  doors().push_steps(charts, step.data(), work.get(), change.data());
+}
+
+}  // namespace
+
+NB_MODULE(_charts, m) {
+  m.def("integrate", &integrate, "layout"_a, "q"_a, "x"_a, "result"_a);
+  m.def("rates", &rates, "layout"_a, "x"_a, "carried"_a.none(), "out"_a);
+  m.def("local_rates", &local_rates, "layout"_a, "x"_a, "v"_a, "a"_a, "out"_a);
+  m.def("expand", &expand, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
+        "gradient"_a, "hessian"_a, "columns_gradient"_a, "columns_hessian"_a,
+        "portable"_a = false);
+  m.def("pull_gradient", &pull_gradient, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a,
+        "ends"_a, "gradient"_a, "regular"_a, "columns_gradient"_a);
+  m.def("push_steps", &push_steps, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
+        "step"_a, "change"_a);
+}

@@ -1,0 +1,291 @@
+// Derivatives at points as those in the nodal columns of intervals, where configurations are no
+// vectors.
+//
+// Rows of a few joint coordinates are done at a time, and of them the columns from the first of
+// these coordinates on: the rest is symmetric.
+#pragma once
+
+#include "packed_intervals.hpp"
+
+namespace hovi {
+namespace {
+
+// Some coordinates of a part, whose rows are done at a time.
+struct Tile {
+  std::size_t part, first, size;
+};
+
+inline std::size_t workspace_packs(const Charts& charts) {
+  const std::size_t n = charts.space.nv, m = charts.columns;
+  return Intervals::room(charts) + std::max<std::size_t>(3 * n, (3 + 4 * (3 + 4)) * largest_group * n) +
+         4 * m + largest_group * n * m * m;
+}
+
+std::size_t workspace(const Charts& charts) { return workspace_packs(charts) * lanes; }
+
+struct TileRows {
+  const Intervals& intervals;
+  Tile tile;
+  std::size_t width, m;  // columns of each kind
+  Pack *weighted, *half, *both, *products, *sums;
+
+  TileRows(const Intervals& all, const Tile& chosen)
+      : intervals(all),
+        tile(chosen),
+        width(all.dof() - chosen.first),
+        m(all.charts.columns) {
+    const std::size_t n = all.dof();
+    weighted = all.rest;
+    half = weighted + 3 * n;
+    both = half + 3 * largest_group * 4 * n;
+    products = both + 4 * largest_group * 4 * n;
+    sums = products + 4 * m;
+  }
+
+  const Part& part(std::size_t f) const { return intervals.part(f); }
+
+  // Rows of the Hessian at a point over the columns (q0, x, h x', h^2 x''): half, (3, k, 4, width).
+  void read_point(std::size_t q, const double* hessian) const {
+    const std::size_t n = intervals.dof(), k = tile.size;
+    const std::size_t stride = intervals.charts.points * 9 * n * n;
+    Pack weight[3];
+    intervals.weigh(q, weight);
+    const Pack powers[3] = {broadcast(1.0), 1.0 / intervals.h,
+                            1.0 / (intervals.h * intervals.h)};
+    for (std::size_t r = 0; r < 3; ++r)
+      for (std::size_t i = 0; i < k; ++i) {
+        const double* const row = hessian + (q * 3 * n + r * n + tile.first + i) * 3 * n;
+        for (std::size_t s = 0; s < 3; ++s) {
+          Pack* const run = weighted + s * width;
+          read(row + s * n + tile.first, stride, intervals.rows, width, run);
+          const Pack factor = weight[r] * powers[s];
+          for (std::size_t j = 0; j < width; ++j) run[j] *= factor;
+        }
+        pull_row(q, half + (r * k + i) * 4 * width);
+      }
+  }
+
+  void pull_row(std::size_t q, Pack* out) const {
+    for (std::size_t f = tile.part; f < intervals.charts.space.parts; ++f) {
+      const std::size_t begin = std::max<std::size_t>(part(f).v, tile.first);
+      const Pack* const own = weighted + begin - tile.first;
+      Pack* const to = out + begin - tile.first;
+      if (!curved(part(f))) {
+        const std::size_t count = part(f).v + part(f).size - begin;
+        for (std::size_t s = 0; s < 4; ++s)
+          std::copy_n(own + (s > 0 ? s - 1 : 0) * width, count, to + s * width);
+      }
+      on_group(part(f).kind, [&](auto group) {
+        using Group = decltype(group);
+        pull<Group>(intervals.at_point<Group>(q, f).jacobian, own, width, 1, to);
+      });
+    }
+  }
+
+  // Rows (q0, x, h x', h^2 x'') of the Hessian at a point, added up over the points.
+  void add_point(std::size_t q) const {
+    const std::size_t k = tile.size, row = 4 * width, order = k * row;
+    const Pack* rows[] = {half, half, half + order, half + 2 * order};
+    on_group(part(tile.part).kind, [&](auto group) {
+      using Group = decltype(group);
+      const PointMaps<Group>& maps = intervals.at_point<Group>(q, tile.part);
+      for (std::size_t j = 0; j < row; ++j)
+        pull<Group>(maps.jacobian, half + j, order, row, both + j);
+      add_bend<Group>(maps);
+      for (std::size_t r = 0; r < 4; ++r) rows[r] = both + r * order;
+    });
+    const double* const table = intervals.charts.table + 3 * q * m;
+    for (std::size_t i = 0; i < k; ++i)
+      for (std::size_t j = 0; j < width; ++j)
+        contract(table, rows, i * row + j, sums + (i * width + j) * m * m);
+  }
+
+  template <typename Group>
+  void add_bend(const PointMaps<Group>& maps) const {
+    const std::size_t row = 4 * width, order = Group::k * row;
+    const auto at = [&](std::size_t r, std::size_t s, std::size_t i, std::size_t j) -> Pack& {
+      return both[r * order + i * row + s * width + j];
+    };
+    for (std::size_t i = 0; i < Group::k; ++i)
+      for (std::size_t j = 0; j < Group::k; ++j) {
+        at(0, 1, i, j) += maps.base_x.at[i][j], at(1, 0, j, i) += maps.base_x.at[i][j];
+        at(1, 1, i, j) += maps.x_x.at[i][j], at(2, 2, i, j) += maps.dx_dx.at[i][j];
+        at(1, 2, i, j) += maps.x_dx.at[i][j], at(2, 1, j, i) += maps.x_dx.at[i][j];
+        at(1, 3, i, j) += maps.x_ddx.at[i][j], at(3, 1, j, i) += maps.x_ddx.at[i][j];
+      }
+  }
+
+  // sum += A^T H A for one entry of the four by four blocks; q0 stands for itself.
+  void contract(const double* table, const Pack* const (&rows)[4], std::size_t entry,
+                Pack* sum) const {
+    const double *const A = table, *const B = A + m, *const C = B + m;
+    for (std::size_t r = 0; r < 4; ++r) {
+      const Pack* const H = rows[r] + entry;
+      const Pack base = H[0], x = H[width], y = H[2 * width], z = H[3 * width];
+      products[r * m] = base;
+      for (std::size_t j = 1; j < m; ++j) products[r * m + j] = A[j] * x + B[j] * y + C[j] * z;
+    }
+    const Pack *const x = products + m, *const y = x + m, *const z = y + m;
+    for (std::size_t j = 0; j < m; ++j) sum[j] += products[j];
+    for (std::size_t i = 1; i < m; ++i)
+      for (std::size_t j = 0; j < m; ++j)
+        sum[i * m + j] += A[i] * x[j] + B[i] * y[j] + C[i] * z[j];
+  }
+
+  // From the charts' columns to the nodal ones.
+  void pull_ends() const {
+    const std::size_t k = tile.size, entry = m * m;
+    for (std::size_t i = 0; i < k; ++i)
+      for (std::size_t row = 0; row < m; ++row)
+        pull_columns(sums + i * width * entry + row * m);
+    for (std::size_t j = 0; j < width; ++j)
+      for (std::size_t column = 0; column < m; ++column)
+        pull_rows(sums + j * entry + column);
+    on_group(part(tile.part).kind, [&](auto group) {
+      using Group = decltype(group);
+      constexpr std::size_t places[] = {0, 2, 3};
+      for (std::size_t i = 0; i < Group::k; ++i)
+        for (std::size_t j = 0; j < Group::k; ++j)
+          for (std::size_t r = 0; r < 3; ++r)
+            for (std::size_t s = 0; s < 3; ++s)
+              sums[(i * width + j) * entry + places[r] * m + places[s]] +=
+                  intervals.at_end<Group>(tile.part).hessian[r][s].at[i][j];
+    });
+  }
+
+  void pull_columns(Pack* n) const {
+    const std::size_t rest = part(tile.part).v + part(tile.part).size - tile.first;
+    if (curved(part(tile.part))) return intervals.pull_ends(tile.part, n, 1, m * m);
+    for (std::size_t i = 0; i < rest; ++i) n[i * m * m] -= n[i * m * m + 2];
+    if (rest < width) intervals.pull_ends(tile.part + 1, n + rest * m * m, 1, m * m);
+  }
+
+  void pull_rows(Pack* n) const {
+    const std::size_t place = width * m * m;
+    if (!curved(part(tile.part)))
+      for (std::size_t i = 0; i < tile.size; ++i) n[i * place] -= n[i * place + 2 * m];
+    on_group(part(tile.part).kind, [&](auto group) {
+      using Group = decltype(group);
+      pull_end<Group>(intervals.at_end<Group>(tile.part).jacobian, n, m, place);
+    });
+  }
+
+  // Both triangles.
+  void write_blocks(double* out) const {
+    const std::size_t n = intervals.dof(), block = n * n;
+    for (std::size_t lane = 0; lane < intervals.rows.count; ++lane) {
+      double* const hessian = out + intervals.rows.at[lane] * m * m * block;
+      const Pack* from = sums;
+      for (std::size_t a = tile.first; a < tile.first + tile.size; ++a)
+        for (std::size_t b = tile.first; b < n; ++b)
+          for (std::size_t i = 0; i < m; ++i)
+            for (std::size_t j = 0; j < m; ++j, ++from) {
+              hessian[(i * m + j) * block + a * n + b] = (*from)[lane];
+              if (b >= tile.first + tile.size)
+                hessian[(j * m + i) * block + b * n + a] = (*from)[lane];
+            }
+    }
+  }
+};
+
+inline void expand_tile(const Intervals& intervals, const Tile& tile, const double* hessian,
+                        double* columns_hessian) {
+  const TileRows rows(intervals, tile);
+  std::fill(rows.sums, rows.sums + tile.size * rows.width * rows.m * rows.m, Pack{});
+  for (std::size_t q = 0; q < intervals.charts.points; ++q) {
+    rows.read_point(q, hessian);
+    rows.add_point(q);
+  }
+  rows.pull_ends();
+  rows.write_blocks(columns_hessian);
+}
+
+void expand(const Charts& charts, const double* gradient, const double* hessian, double* workspace,
+            double* columns_gradient, double* columns_hessian) {
+  const std::size_t n = charts.space.nv, m = charts.columns;
+  for (std::size_t first = 0; first < charts.intervals; first += lanes) {
+    const Intervals intervals(charts, first, workspace);
+    intervals.lift(gradient, true);
+    intervals.find_ends(true);
+    for (std::size_t f = 0; f < charts.space.parts; ++f) {
+      const std::size_t begin = charts.space.part[f].v, end = begin + charts.space.part[f].size;
+      for (std::size_t row = begin; row < end; row += largest_group)
+        expand_tile(intervals, {f, row, std::min(largest_group, end - row)}, hessian,
+                    columns_hessian);
+    }
+    intervals.pull_ends(0, intervals.gradient, n, 1);
+    write(intervals.gradient, m * n, intervals.rows, m * n, columns_gradient);
+  }
+}
+
+void pull_gradient(const Charts& charts, const double* at_points, bool regular, double* workspace,
+          double* columns_gradient) {
+  const std::size_t n = charts.space.nv, m = charts.columns;
+  for (std::size_t first = 0; first < charts.intervals; first += lanes) {
+    const Intervals intervals(charts, first, workspace);
+    Pack* const g = intervals.gradient;
+    intervals.lift(at_points, false);
+    if (regular)  // Z0 = x1 - h v0 and Z1 = h x1' - h v0
+      for (std::size_t i = 0; i < n; ++i) g[n + i] -= g[2 * n + i] + g[3 * n + i];
+    intervals.find_ends(false);
+    intervals.pull_ends(0, g, n, 1);
+    write(g, m * n, intervals.rows, m * n, columns_gradient);
+  }
+}
+
+inline void push_ends(const Intervals& intervals, Pack* step) {
+  const std::size_t n = intervals.dof();
+  for (std::size_t f = 0; f < intervals.charts.space.parts; ++f) {
+    const Part& part = intervals.part(f);
+    Pack* const own = step + part.v;
+    if (!curved(part))
+      for (std::int64_t i = 0; i < part.size; ++i) own[2 * n + i] -= own[i];
+    on_group(part.kind, [&](auto group) {
+      push_end<decltype(group)>(intervals.at_end<decltype(group)>(f).jacobian, own, n);
+    });
+  }
+}
+
+// A step in the charts' columns as that of (q, h v, h^2 a) at a point, (3, n) of (4, n).
+inline void push_point(const Intervals& intervals, std::size_t q, const Pack* step, Pack* change) {
+  const std::size_t n = intervals.dof(), m = intervals.charts.columns;
+  const double* const table = intervals.charts.table + 3 * q * m;
+  std::copy_n(step, n, change);
+  std::fill(change + n, change + 4 * n, Pack{});
+  for (std::size_t r = 0; r < 3; ++r)
+    for (std::size_t j = 1; j < m; ++j)
+      for (std::size_t i = 0; i < n; ++i)
+        change[(r + 1) * n + i] += table[r * m + j] * step[j * n + i];
+  for (std::size_t f = 0; f < intervals.charts.space.parts; ++f) {
+    const Part& part = intervals.part(f);
+    Pack* const own = change + part.v;
+    if (!curved(part))
+      for (std::int64_t i = 0; i < part.size; ++i) {
+        own[i] += own[n + i];
+        own[n + i] = own[2 * n + i];
+        own[2 * n + i] = own[3 * n + i];
+      }
+    on_group(part.kind, [&](auto group) {
+      using Group = decltype(group);
+      push<Group>(PointJacobian<Group>(intervals.variation<Group>(q, part.v)), own, n);
+    });
+  }
+}
+
+void push_steps(const Charts& charts, const double* step, double* workspace, double* change) {
+  const std::size_t n = charts.space.nv, m = charts.columns, Q = charts.points;
+  for (std::size_t first = 0; first < charts.intervals; first += lanes) {
+    const Intervals intervals(charts, first, workspace);
+    Pack *const local = intervals.gradient, *const moved = intervals.lifted;
+    intervals.find_ends(false);
+    read(step, m * n, intervals.rows, m * n, local);
+    push_ends(intervals, local);
+    for (std::size_t q = 0; q < Q; ++q) {
+      push_point(intervals, q, local, moved);
+      write(moved, 3 * n, intervals.rows, 3 * Q * n, change + 3 * q * n);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hovi

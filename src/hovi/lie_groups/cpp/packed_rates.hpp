@@ -1,0 +1,120 @@
+// Velocities and accelerations of curves q0 (+) x(t), a pack of points at a time.
+#pragma once
+
+#include <algorithm>
+
+#include "doors.hpp"
+#include "point_chart.hpp"
+
+namespace hovi {
+namespace {
+
+// action(group) for the group of a part whose chart is not the identity.
+template <typename Action>
+inline void on_group(Kind kind, const Action& action) {
+  switch (kind) {
+    case Kind::se2: return action(SE2{});
+    case Kind::so3: return action(SO3{});
+    case Kind::se3: return action(SE3{});
+    default: return;
+  }
+}
+
+inline bool curved(const Part& part) { return part.kind >= Kind::se2; }
+
+// The rows of a pack: those past the last one repeat it, and are not written.
+struct Rows {
+  std::size_t first, count;
+  std::size_t at[lanes];
+
+  Rows(std::size_t begin, std::size_t end) : first(begin), count(std::min(lanes, end - begin)) {
+    for (std::size_t lane = 0; lane < lanes; ++lane) at[lane] = std::min(begin + lane, end - 1);
+  }
+};
+
+// Numbers of each row, `stride` from row to row.
+inline void read(const double* from, std::size_t stride, const Rows& rows, std::size_t numbers,
+                 Pack* to) {
+  for (std::size_t i = 0; i < numbers; ++i)
+    for (std::size_t lane = 0; lane < lanes; ++lane) to[i][lane] = from[rows.at[lane] * stride + i];
+}
+inline void write(const Pack* from, std::size_t numbers, const Rows& rows, std::size_t stride,
+                  double* to) {
+  for (std::size_t lane = 0; lane < rows.count; ++lane)
+    for (std::size_t i = 0; i < numbers; ++i) to[rows.at[lane] * stride + i] = from[i][lane];
+}
+
+template <typename Group>
+inline void rates_of(std::size_t n, const Rows& rows, const double* x, const double* carried,
+                     std::size_t points, double* v, double* a) {
+  constexpr std::size_t k = Group::k;
+  Pack in[3][k], out[k];
+  for (std::size_t r = 0; r < 3; ++r) read(x + r * n, 3 * n, rows, k, in[r]);
+  const Variation at(curve<Group>(in[0], in[1], in[2]));
+  Vector<Dual> velocity = at.v, acceleration = at.a;
+  if (carried) {
+    for (std::size_t r = 0; r < 2; ++r) read(carried + r * points * n, n, rows, k, in[r]);
+    const Vector<Dual> seen = at.carried_back * motion<Group>(in[0]);
+    acceleration = at.carried_back * motion<Group>(in[1]) + acceleration - cross(velocity, seen);
+    velocity = seen + velocity;
+  }
+  read<Group>(velocity, out), write(out, k, rows, n, v);
+  read<Group>(acceleration, out), write(out, k, rows, n, a);
+}
+
+inline void flat_rates(const Part& part, std::size_t n, std::size_t points, const double* x,
+                       const double* carried, double* v, double* a) {
+  for (std::size_t p = 0; p < points; ++p)
+    for (std::int64_t i = part.v; i < part.v + part.size; ++i) {
+      v[p * n + i] = x[(3 * p + 1) * n + i];
+      a[p * n + i] = x[(3 * p + 2) * n + i];
+      if (!carried) continue;
+      v[p * n + i] += carried[p * n + i];
+      a[p * n + i] += carried[(points + p) * n + i];
+    }
+}
+
+void rates(const Space& space, std::size_t points, const double* x, const double* carried,
+           double* v, double* a) {
+  const std::size_t n = space.nv;
+  for (const Part* part = space.part; part != space.part + space.parts; ++part) {
+    if (!curved(*part)) flat_rates(*part, n, points, x, carried, v, a);
+    on_group(part->kind, [&](auto group) {
+      const double* const moving = carried ? carried + part->v : nullptr;
+      for (std::size_t p = 0; p < points; p += lanes)
+        rates_of<decltype(group)>(n, Rows(p, points), x + part->v, moving, points, v + part->v,
+                                  a + part->v);
+    });
+  }
+}
+
+template <typename Group>
+inline void local_rates_of(std::size_t n, const Rows& rows, const double* x, const double* v,
+                           const double* a, double* dx, double* ddx) {
+  constexpr std::size_t k = Group::k;
+  Pack place[k], velocity[k], acceleration[k], still[k] = {};
+  read(x, n, rows, k, place), read(v, n, rows, k, velocity), read(a, n, rows, k, acceleration);
+  const Turning here(curve<Group>(place, still, still));
+  const Matrix<Dual> back = inverse(coefficient<0>(right_jacobian(here)));
+  read<Group>(back * motion<Group>(velocity), velocity);
+  const Turning moving(curve<Group>(place, velocity, still));
+  const Matrix<Dual> J1 = coefficient<1>(right_jacobian(moving));
+  const Vector<Dual> rest = motion<Group>(acceleration) - J1 * motion<Group>(velocity);
+  read<Group>(back * rest, acceleration);
+  write(velocity, k, rows, n, dx), write(acceleration, k, rows, n, ddx);
+}
+
+void local_rates(const Space& space, std::size_t points, const double* x, const double* v,
+                 const double* a, double* dx, double* ddx) {
+  const std::size_t n = space.nv;
+  std::copy(v, v + points * n, dx), std::copy(a, a + points * n, ddx);
+  for (const Part* part = space.part; part != space.part + space.parts; ++part)
+    on_group(part->kind, [&](auto group) {
+      const std::size_t i = part->v;
+      for (std::size_t p = 0; p < points; p += lanes)
+        local_rates_of<decltype(group)>(n, Rows(p, points), x + i, v + i, a + i, dx + i, ddx + i);
+    });
+}
+
+}  // namespace
+}  // namespace hovi

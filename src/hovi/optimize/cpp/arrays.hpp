@@ -1,0 +1,31 @@
+// NumPy's arrays at the door of a module, and memory for packs.
+#pragma once
+
+#include <memory>
+#include <new>
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+namespace hovi::arrays {
+
+template <typename Scalar, int dimensions>
+using Array = nanobind::ndarray<Scalar, nanobind::numpy, nanobind::ndim<dimensions>,
+                                nanobind::c_contig, nanobind::device::cpu>;
+template <int dimensions>
+using Input = Array<const double, dimensions>;
+template <int dimensions>
+using Output = Array<double, dimensions>;
+
+constexpr std::align_val_t alignment{64};
+
+struct Free {
+  void operator()(double* memory) const { ::operator delete(memory, alignment); }
+};
+
+inline std::unique_ptr<double, Free> room(std::size_t numbers) {
+  void* memory = ::operator new(numbers * sizeof(double), alignment);
+  return std::unique_ptr<double, Free>(static_cast<double*>(memory));
+}
+
+}  // namespace hovi::arrays
