@@ -61,14 +61,15 @@ def test_the_mechanical_momentum_drifts_by_the_order_of_the_scheme() -> None:
     """A motion that keeps its equations at the points only keeps momentum up to quadrature."""
     model = spacecraft().scene.model
     drifts = []
-    for N in (16, 32, 64):
+    grids = [16, 32, 48]  # beyond, the drift nears what the solver leaves of the equations
+    for N in grids:
         motion, data = reorientation(N).trajectory, model.createData()
         h = [
             pin.computeCentroidalMomentum(model, data, q, v).vector.copy()
             for q, v in zip(motion.q, motion.v, strict=True)
         ]
         drifts.append(np.max(np.abs(h)))
-    slopes = np.log2(np.divide(drifts[:-1], drifts[1:]))
+    slopes = -np.diff(np.log(drifts)) / np.diff(np.log(grids))
     assert np.all(slopes > 5.7)
     assert drifts[-1] < 1e-9
 
