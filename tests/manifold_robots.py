@@ -50,6 +50,13 @@ def mimicking() -> pin.Model:
     return pin.transformJointIntoMimic(model, 1, 2, 1.0, 0.0)
 
 
+def half_turning() -> pin.Model:
+    """Two continuous joints, of which the last turns half as far as the first."""
+    model = chain([pin.JointModelRUBX(), pin.JointModelRUBX()])
+    model.names[2] = "last"
+    return pin.transformJointIntoMimic(model, 1, 2, 0.5, 0.0)
+
+
 def revolute(model: pin.Model) -> pin.Model:
     """The model with a revolute joint about the same axis for each continuous one."""
     twin = pin.Model()

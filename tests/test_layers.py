@@ -25,6 +25,7 @@ FLOORS = [
         "skeleton",
         "meshcat_page",
         "json_numbers",
+        "rebuilt_model",
     },
     {
         "obstacles",
@@ -35,6 +36,7 @@ FLOORS = [
         "lie_groups",
         "urdf_rules",
         "robot_source",
+        "coupled_model",
         "srdf",
         "example_robots",
     },
@@ -59,6 +61,8 @@ FLOORS = [
         "segment",
         "tangent",
         "unwrapped",
+        "mimic_joints",
+        "mimic_kernel",
     },
     {"chain_urdf", "robot_model", "robot_report", "torque_model", "chart"},
     {

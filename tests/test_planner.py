@@ -23,7 +23,7 @@ from hovi.state import State
 from hovi.task_file import load_task
 from hovi.task_plan import plan_task
 from hovi.trajectory_objective import ActionObjective
-from manifold_robots import mimicking
+from manifold_robots import half_turning
 from paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
 
 Array = npt.NDArray[np.float64]
@@ -312,7 +312,7 @@ def test_a_whole_number_of_starts_may_be_a_float(arm_scene: Scene) -> None:
 
 
 def test_a_robot_that_cannot_be_planned_on_is_refused_before_any_work() -> None:
-    robot = load_robot(mimicking())
+    robot = load_robot(half_turning())
     with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimic"):
         plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0)
 

@@ -19,7 +19,7 @@ from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import CLASSIC, by_name, galerkin
 from hovi.state import State
-from manifold_robots import mimicking
+from manifold_robots import half_turning
 
 REST = State([0.0, 0.0])
 
@@ -89,10 +89,10 @@ def test_one_irregular_interval_is_enough_to_refuse(two_link: Robot) -> None:
         TrajectoryProblem(DiscreteLagrangian(L, Grid(np.ones(3), schemes)), REST, REST)
 
 
-def test_joints_that_mimic_others_are_named_with_the_cure() -> None:
-    robot = load_robot(mimicking())
+def test_a_joint_that_follows_half_a_turn_is_named_with_the_cure() -> None:
+    robot = load_robot(half_turning())
     start = State(robot.neutral())
-    with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimic.*locked="):
+    with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimics.*lock one"):
         problem(robot, start, start)
 
 

@@ -16,7 +16,7 @@ from hovi.effects import Effect, Gravity, JointLimitPotential
 from hovi.errors import ModelError, SceneError
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
-from manifold_robots import chain, mimicking
+from manifold_robots import chain, half_turning
 
 Array = npt.NDArray[np.float64]
 
@@ -118,9 +118,9 @@ def test_a_weight_that_is_none_is_refused(two_link: Robot, weight: Any) -> None:
         Scene(two_link).effort_lagrangian(weight)
 
 
-def test_a_robot_whose_joints_are_of_no_known_kind_has_no_effort() -> None:
-    robot = load_robot(mimicking())
-    with pytest.raises(ModelError, match=r"'last' mimic.*locked="):
+def test_a_robot_on_which_nothing_can_be_planned_has_no_effort() -> None:
+    robot = load_robot(half_turning())
+    with pytest.raises(ModelError, match=r"'last' mimics.*lock one"):
         Scene(robot, [Gravity()]).effort_lagrangian()
 
 

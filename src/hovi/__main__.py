@@ -5,12 +5,17 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from types import FrameType
 
 INTERRUPTED = 130
+IMPORTING = "<frozen importlib"
+"""What the file names of Python's own frames begin with while a module is imported."""
 
 
 def run() -> None:
     """Run the command that the command line asks for and leave with its exit code."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
+        signal.signal(signal.SIGINT, _interrupt)
     try:
         from hovi.cli import main
 
@@ -27,6 +32,18 @@ def run() -> None:
     # and would end by that signal although it was handled.
     exec("")
     sys.exit(_flushed(code))
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    """Ctrl-C. While modules are imported the program ends at once: nothing is there to finish.
+
+    Raises KeyboardInterrupt at any other time; modules that are imported may swallow that.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(IMPORTING):
+            os._exit(_flushed(INTERRUPTED))
+        frame = frame.f_back
+    raise KeyboardInterrupt
 
 
 def _flushed(code: int) -> int:

@@ -18,6 +18,7 @@ import pinocchio as pin
 
 from hovi.clearance import Clearance
 from hovi.convex_shapes import convex_geometry
+from hovi.coupled_model import column_sums
 from hovi.errors import ModelError
 from hovi.robot import Robot
 from hovi.srdf import checked_pairs
@@ -87,6 +88,7 @@ class Distances:
             _sharpen(request)
         self._forget()
         self._moves = _moves(robot, geometry)
+        self._sums = column_sums(robot.model) if robot.couplings else None
 
     def values(self, q: Array) -> Array:
         """Signed distances at configurations (P, nq), shape (P, K), in [m]."""
@@ -104,12 +106,13 @@ class Distances:
         """
         self._forget()
         distances = np.empty((len(q), len(self.pairs)))
-        contacts = _Contacts.none(len(q), len(self.pairs), self.robot.nv)
+        contacts = _Contacts.none(len(q), len(self.pairs), self.robot.model.nvExtended)
         for p, one in enumerate(q):
             self._measure(one)
             distances[p] = [result.min_distance for result in self._results]
             self._read(contacts, p, np.flatnonzero(distances[p] < reach))
-        return distances, np.matmul(contacts.wrenches(), contacts.J) * self._moves
+        slopes = np.matmul(contacts.wrenches(), contacts.J) * self._moves
+        return distances, slopes if self._sums is None else slopes @ self._sums
 
     def curvature(self, q: Array, force: Array) -> Array:
         """sum_k force_k d''_k at configurations (P, nq), shape (P, nv, nv).
@@ -128,7 +131,7 @@ class Distances:
             np.repeat(q[pushed], 1 + nv, axis=0), np.tile(steps, (len(pushed), 1))
         )
         self._forget()
-        contacts = _Contacts.none(len(moved), len(self.pairs), nv)
+        contacts = _Contacts.none(len(moved), len(self.pairs), self.robot.model.nvExtended)
         for i, one in enumerate(moved):
             chosen = pairs[i // (1 + nv)]
             self._place(one)
@@ -137,6 +140,7 @@ class Distances:
             self._read(contacts, i, chosen)
         pulls = np.repeat(force[pushed], 1 + nv, axis=0)[:, :, None] * self._moves
         slopes = np.einsum("pka,paj,pkj->pj", contacts.wrenches(), contacts.J, pulls)
+        slopes = slopes if self._sums is None else slopes @ self._sums
         slopes = slopes.reshape(len(pushed), 1 + nv, nv)
         rows = (slopes[:, 1:] - slopes[:, :1]) / STEP
         curvature = np.zeros((P, nv, nv))
@@ -179,7 +183,10 @@ class Distances:
 
 @dataclass(frozen=True, eq=False)
 class _Contacts:
-    """Normals and nearest points of the first shapes, (P, K, 3), and joint Jacobians (P, 6, nv)."""
+    """Normals and nearest points of the first shapes, (P, K, 3), and joint Jacobians (P, 6, nv).
+
+    Columns for every joint, those that mimic others included.
+    """
 
     normals: Array
     points: Array
@@ -211,12 +218,16 @@ def _sharpen(request: coal.DistanceRequest) -> None:
 
 
 def _moves(robot: Robot, geometry: pin.GeometryModel) -> Array:
-    """Which velocities move the second shape of each pair (1), the first (-1) or both, (K, nv)."""
-    carried = np.zeros((robot.model.njoints, robot.nv))
+    """Which velocities move the second shape of each pair (1), the first (-1) or both, (K, nv).
+
+    Of every joint, those that mimic others included.
+    """
+    carried = np.zeros((robot.model.njoints, robot.model.nvExtended))
     for joint in range(1, robot.model.njoints):
         for support in list(robot.model.supports[joint])[1:]:
             mover = robot.model.joints[support]
-            carried[joint, mover.idx_v : mover.idx_v + mover.nv] = 1.0
+            first = mover.idx_vExtended
+            carried[joint, first : first + mover.nvExtended] = 1.0
     parents = [shape.parentJoint for shape in geometry.geometryObjects]
     pairs = geometry.collisionPairs
     return np.array([carried[parents[p.second]] - carried[parents[p.first]] for p in pairs])

@@ -1,5 +1,7 @@
 """Do the planned torques move the robot as planned? Asked of SciPy and of Pinocchio's ABA.
 
+(Of its mass matrix where joints mimic others, which ABA does not know.)
+
 The forward dynamics are integrated under the planned torques by an independent method, from every
 node to the next. That certifies dynamics and torques. It says nothing of optimality: the inverse
 dynamics of any curve reproduce that curve.
@@ -142,12 +144,21 @@ class _ForwardDynamics:
             tau = tau - self._added(q, v, np.zeros_like(v), t)
         model, data = self.scene.model, self.data
         rows = zip(q, v, tau, strict=True)
-        return np.array([pin.aba(model, data, *row) for row in rows])
+        solve = _solved if self.scene.robot.couplings else pin.aba
+        return np.array([solve(model, data, *row) for row in rows])
 
     def _added(self, q: Array, v: Array, a: Array, t: Array) -> Array:
         model, data = self.scene.model, self.data
         rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
         return np.asarray(self.scene.inverse_dynamics(q, v, a, t) - rigid)
+
+
+def _solved(model: pin.Model, data: pin.Data, q: Array, v: Array, tau: Array) -> Array:
+    """a of M(q) a + b(q, v) = tau, shape (nv,)."""
+    mass = np.triu(pin.crba(model, data, q))
+    mass += np.triu(mass, 1).T
+    bias = pin.nonLinearEffects(model, data, q, v)
+    return np.asarray(np.linalg.solve(mass, tau - bias))
 
 
 def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:

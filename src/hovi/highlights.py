@@ -56,7 +56,8 @@ class Highlights:
         by_coordinate[-1] = False
         flags = np.zeros((len(times), robot.model.njoints), dtype=bool)
         for joint in list(robot.model.joints)[1:]:
-            flags[:, joint.id] = by_coordinate[:, joint.idx_v : joint.idx_v + joint.nv].any(axis=1)
+            own = slice(joint.idx_v, joint.idx_v + joint.nvExtended)  # its leader's if it mimics
+            flags[:, joint.id] = by_coordinate[:, own].any(axis=1)
         return cls(times, flags) if flags.any() else None
 
     def at(self, t: float) -> Mask:

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.mimic_kernel import rnea_kernel
 from hovi.point_function import PointFunction, default_threads
-from hovi.rigid_body import InverseDynamicsKernel, casadi_functions
+from hovi.rigid_body import casadi_functions
 from hovi.torque_model import times
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +69,7 @@ class MovingBaseTorque:
     """
 
     def __init__(self, model: pin.Model, base: ca.SX, t: ca.SX, compile: bool = False) -> None:
-        self.kernel = InverseDynamicsKernel(on_base_joints(model))
+        self.kernel = rnea_kernel(on_base_joints(model))
         self._jet = PointFunction(ca.Function("base", [t], list(base_jet(base, t))), compile)
         columns = np.arange(3 * (FREEDOM + model.nv)).reshape(3, -1)[:, FREEDOM:]
         self._columns = columns.ravel()

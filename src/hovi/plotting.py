@@ -174,7 +174,7 @@ def plot_all(trajectory: Trajectory, path: str | os.PathLike[str]) -> tuple[Path
 
 def is_planar_two_link(robot: Robot) -> bool:
     """Whether a robot is two revolute joints, one carrying the other, with parallel axes."""
-    if (robot.nq, robot.nv) != (2, 2) or list(robot.model.parents)[2] != 1:
+    if (robot.nq, robot.nv, robot.model.njoints) != (2, 2, 3) or list(robot.model.parents)[2] != 1:
         return False
     first, second = _axes_in_world(robot).T
     return bool(not sliding_coordinates(robot).any() and abs(first @ second) > 1 - 1e-9)
@@ -193,7 +193,9 @@ def _axes_in_world(robot: Robot) -> Array:
     """Angular part of each coordinate's motion at the neutral configuration, shape (3, nv)."""
     data = robot.model.createData()
     axes: Array = pin.computeJointJacobians(robot.model, data, robot.neutral())[3:]
-    return axes
+    leading = [joint for joint in list(robot.model.joints)[1:] if joint.nv]  # mimics have columns
+    places = [range(joint.idx_vExtended, joint.idx_vExtended + joint.nv) for joint in leading]
+    return axes[:, [place for each in places for place in each]]
 
 
 def _coordinates(trajectory: Trajectory, q: Array) -> Array:

@@ -21,8 +21,10 @@ import pinocchio as pin
 from hovi import configuration, robot_model
 from hovi.chart import Chart
 from hovi.configuration_space import ConfigurationSpace, configuration_space
+from hovi.coupled_model import Coupling, PortableModel, couplings_of, uncoupled
 from hovi.errors import InputError, ModelError, nearest
 from hovi.example_robots import BUILT_IN_CODE, build_in_code
+from hovi.mimic_joints import leaders_first
 from hovi.robot_geometry import Shapes, load_shapes
 from hovi.robot_reading import example_source, file_source, is_path
 from hovi.robot_report import describe
@@ -64,8 +66,14 @@ class Robot:
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """The movable joints, in Pinocchio's order."""
-        return tuple(self.model.names)[1:]
+        """The joints that move on their own, in Pinocchio's order: none that mimics another."""
+        pairs = zip(self.model.names, self.model.joints, strict=True)
+        return tuple(name for name, joint in list(pairs)[1:] if joint.nv)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """The joints that mimic others, and how."""
+        return couplings_of(self.model)
 
     @cached_property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -96,13 +104,13 @@ class Robot:
 
     def joint_at(self, place: int) -> str:
         """The joint to which a place in v belongs."""
-        pairs = zip(self.joint_names, list(self.model.joints)[1:], strict=True)
+        pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
         return next(n for n, joint in pairs if joint.idx_v <= place < joint.idx_v + joint.nv)
 
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:
         """The joints whose configuration is not a plain vector (nq != nv)."""
-        pairs = zip(self.joint_names, self.model.joints[1:], strict=True)
+        pairs = zip(self.model.names, self.model.joints, strict=True)
         return tuple(name for name, joint in pairs if joint.nq != joint.nv)
 
     @property
@@ -297,7 +305,12 @@ class Robot:
 
     def __getstate__(self) -> dict[str, Any]:
         """What a worker process needs: the fields, without shapes that are loaded on demand."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        state = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {**state, "model": PortableModel.of(self.model)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """The robot of what `__getstate__` gave."""
+        self.__dict__.update({**state, "model": state["model"].model()})
 
 
 def load_robot(
@@ -309,6 +322,7 @@ def load_robot(
     visual: pin.GeometryModel | None = None,
     collision: pin.GeometryModel | None = None,
     srdf: str | Path | None = None,
+    mimic: bool = False,
 ) -> Robot:
     """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
 
@@ -319,6 +333,8 @@ def load_robot(
     locked: joints held at the neutral configuration.
     visual, collision: geometry that goes with a pinocchio.Model.
     srdf: path of an SRDF with named poses; an example robot's own is found without it.
+    mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
+        take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
     Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock.
     """
     names = _names(locked)
@@ -329,12 +345,12 @@ def load_robot(
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
     if isinstance(x, Path) or is_path(x):
-        source = file_source(Path(x), folders, names, bool(free_flyer), semantics)
+        source = file_source(Path(x), folders, names, bool(free_flyer), semantics, mimic)
     elif x in BUILT_IN_CODE:
         model, *shapes = build_in_code(x)
         return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
     else:
-        source = example_source(x, folders, names, free_flyer, semantics)
+        source = example_source(x, folders, names, free_flyer, semantics, mimic)
     model = robot_model.build_model(source)
     return Robot(source.reference if source.kind == "example" else model.name, model, source)
 
@@ -357,7 +373,12 @@ def _from_model(
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]
-    reduced, shapes = robot_model.reduce_with_geometry(model.copy(), shapes, locked)
+    couplings = couplings_of(model)
+    again = bool(couplings and locked)
+    free = leaders_first(uncoupled(model), couplings) if again else model.copy()
+    reduced, shapes = robot_model.locked_and_coupled(
+        free, shapes, locked, couplings if again else ()
+    )
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)

@@ -18,7 +18,7 @@ import pinocchio as pin
 from hovi.errors import ModelError
 from hovi.example_robots import example_robot
 from hovi.plain_urdf import make_plain
-from hovi.robot_model import build_full_model, reduce_with_geometry
+from hovi.robot_model import build_full_model, couplings_in, locked_and_coupled
 from hovi.robot_source import RobotSource
 from hovi.urdf_check import checked_urdf
 
@@ -42,7 +42,7 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
         geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
     except (ValueError, RuntimeError) as error:
         return Shapes(None, f"the {kind} shapes of {source.reference!r} cannot be read: {error}.")
-    _, (geometry,) = reduce_with_geometry(model, [geometry], source.locked)
+    _, (geometry,) = locked_and_coupled(model, [geometry], source.locked, couplings_in(source))
     problem = _sentence(source, kind, problems)
     return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
 

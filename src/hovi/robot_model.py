@@ -1,14 +1,16 @@
-"""From a source to a Pinocchio model: build, give armature, lock joints, check the mass matrix."""
+"""From a source to a Pinocchio model: build, give armature, lock and couple joints, check M(q)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.coupled_model import Coupling
 from hovi.errors import ModelError, nearest
+from hovi.mimic_joints import held_values, leaders_first, read_couplings, with_mimics
 from hovi.plain_urdf import plain_urdf
 from hovi.robot_source import RobotSource
 
@@ -16,7 +18,10 @@ Array = npt.NDArray[np.float64]
 
 
 def build_full_model(source: RobotSource) -> pin.Model:
-    """The model of a source's URDF with no joint locked. Raises ModelError."""
+    """The model of a source's URDF, every joint on its own and none locked. Raises ModelError.
+
+    Where joints mimic others, those come first: Pinocchio couples them in no other order.
+    """
     if source.urdf is None:
         raise ModelError(
             f"robot {source.reference!r} was given as a pinocchio.Model, which no file can hold: "
@@ -36,26 +41,53 @@ def build_full_model(source: RobotSource) -> pin.Model:
             f"robot {source.reference!r} has a joint 'root_joint', which is what its floating base "
             "is called: give that joint another name, or load the robot without free_flyer."
         )
-    return _with_armature(model, source.armature)
+    model = _with_armature(model, source.armature)
+    return leaders_first(model, _moving(couplings_in(source), source.locked))
+
+
+def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
+    """The couplings that a source's URDF states, if the robot is to have them."""
+    return read_couplings(source.urdf or "", source.reference) if source.mimic else ()
 
 
 def build_model(source: RobotSource) -> pin.Model:
-    """The model of a source, its locked joints taken out. Raises ModelError."""
+    """The model of a source: locked joints taken out, mimics coupled. Raises ModelError."""
     model = build_full_model(source)
-    if not source.locked:
-        return model
-    return pin.buildReducedModel(model, joint_ids(model, source.locked), pin.neutral(model))
+    return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
 
 
-def reduce_with_geometry(
-    model: pin.Model, geometry: list[pin.GeometryModel], locked: Iterable[str]
+def locked_and_coupled(
+    model: pin.Model,
+    geometry: list[pin.GeometryModel] | None,
+    locked: Sequence[str],
+    couplings: Sequence[Coupling] = (),
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
-    """Model and geometry with the `locked` joints held at the neutral configuration."""
-    ids = joint_ids(model, locked)
-    if not ids:
-        return model, geometry
-    reduced, shapes = pin.buildReducedModel(model, geometry, ids, pin.neutral(model))
-    return reduced, list(shapes)
+    """Model and geometry with some joints held and the couplings of the others.
+
+    The `locked` joints are held at the neutral configuration, and their followers at the offset.
+    """
+    joint_ids(model, locked)
+    shapes = list(geometry or [])
+    held = held_values(couplings, locked)
+    if held:
+        ids, dq = joint_ids(model, held), np.zeros(model.nv)
+        for index, value in zip(ids, held.values(), strict=True):
+            if value:
+                dq[model.joints[index].idx_v] = value
+        q = pin.integrate(model, pin.neutral(model), dq)
+        if shapes:
+            model, found = pin.buildReducedModel(model, shapes, ids, q)
+            shapes = list(found)
+        else:
+            model = pin.buildReducedModel(model, ids, q)
+    moving = _moving(couplings, locked)
+    return with_mimics(model, moving) if moving else model, shapes
+
+
+def _moving(couplings: Sequence[Coupling], locked: Sequence[str]) -> tuple[Coupling, ...]:
+    """The couplings whose follower moves."""
+    held = held_values(couplings, locked)
+    return tuple(coupling for coupling in couplings if coupling.follower not in held)
 
 
 def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:

@@ -23,6 +23,7 @@ def file_source(
     locked: tuple[str, ...],
     free_flyer: bool,
     srdf: Path | None = None,
+    mimic: bool = False,
 ) -> RobotSource:
     """The source of a URDF file, and of an SRDF. Raises ModelError when one cannot be read."""
     text = read_urdf(path)
@@ -36,6 +37,7 @@ def file_source(
         free_flyer=free_flyer,
         folder=str(path.parent.absolute()),
         srdf=None if srdf is None else read_srdf_file(srdf),
+        mimic=mimic,
     )
 
 
@@ -45,6 +47,7 @@ def example_source(
     locked: tuple[str, ...],
     free_flyer: bool | None,
     srdf: Path | None = None,
+    mimic: bool = False,
 ) -> RobotSource:
     """The source of an example robot, its own SRDF included. Raises ModelError for a bad name."""
     example = example_robot(name)
@@ -59,6 +62,7 @@ def example_source(
         locked=locked,
         free_flyer=example.free_flyer if free_flyer is None else free_flyer,
         srdf=None if semantics is None else read_srdf_file(semantics),
+        mimic=mimic,
     )
     if example.srdf is None or not example.rotors:
         return source

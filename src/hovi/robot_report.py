@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.coupled_model import couplings_of
 from hovi.robot_source import RobotSource
 from hovi.urdf_check import checked_urdf
 
@@ -77,7 +78,11 @@ def _joint_table(model: pin.Model) -> Iterator[str]:
     width = max((len(name) for name in names), default=5)
     yield _ROW.format("joint", "type", "lower", "upper", "velocity", "effort", width=width)
     yield _ROW.format("", "", "[rad, m]", "[rad, m]", "[/s]", "[N m, N]", width=width)
+    couplings = {coupling.follower: coupling for coupling in couplings_of(model)}
     for joint, name in zip(model.joints[1:], names, strict=True):
+        if name in couplings:
+            yield f"  {name:<{width}}  {'mimic':<11}  = {couplings[name].text()}"
+            continue
         limits = ("-", "-")
         if joint.nq == joint.nv == 1:
             limits = (
@@ -130,8 +135,8 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     movable = {name for _, name in pairs}
     mimics = [j.get("name", "") for j in robot.iterfind("joint") if j.find("mimic") is not None]
     mimics = [name for name in mimics if name in movable]
-    if mimics:
-        yield f"{_some(mimics)}: <mimic> is not simulated; the joint moves freely unless locked"
+    if mimics and not source.mimic:
+        yield f"{_some(mimics)}: <mimic> counts with mimic=True only; the joint moves freely"
     odd = [link.get("name", "") for link in robot.iterfind("link") if _breaks_triangle(link)]
     if odd:
         yield f"no rigid body has the principal inertias that are written for {_some(odd)}"
@@ -149,9 +154,9 @@ def _breaks_triangle(link: ElementTree.Element) -> bool:
 
 
 def _joints_at(model: pin.Model, coordinates: npt.NDArray[np.intp]) -> str:
-    pairs = zip(model.joints[1:], model.names[1:], strict=True)
+    pairs = [(j, n) for j, n in zip(model.joints[1:], model.names[1:], strict=True) if j.nv]
     held = [name for joint, name in pairs if np.any((coordinates - joint.idx_v) // joint.nv == 0)]
-    return f"all {len(held)} joints" if len(held) == model.njoints - 1 > 3 else _some(held)
+    return f"all {len(held)} joints" if len(held) == len(pairs) > 3 else _some(held)
 
 
 def _some(names: list[str]) -> str:

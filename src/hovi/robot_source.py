@@ -27,6 +27,7 @@ class RobotSource:
     folder: the folder of the URDF file, for its meshes; "" when the file is not at hand.
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
     srdf: the text of the SRDF that goes with the URDF; None where there is none.
+    mimic: whether the joints with a <mimic> tag follow others.
     """
 
     kind: SourceKind
@@ -39,6 +40,7 @@ class RobotSource:
     folder: str = ""
     armature: tuple[tuple[str, float], ...] = ()
     srdf: str | None = field(default=None, repr=False)
+    mimic: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-able dictionary without any path of this machine."""
@@ -49,6 +51,7 @@ class RobotSource:
             "sha256": self.sha256,
             "locked": list(self.locked),
             "free_flyer": self.free_flyer,
+            **({"mimic": True} if self.mimic else {}),
             "armature": dict(self.armature),
             "srdf": self.srdf,
         }
@@ -77,6 +80,7 @@ class RobotSource:
             free_flyer=_entry(data, "free_flyer", bool),
             armature=_armature(_entry(data, "armature", dict)),
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
+            mimic="mimic" in data and _entry(data, "mimic", bool),
         )
 
 

@@ -14,12 +14,13 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.configuration_space import ConfigurationSpace
+from hovi.coupled_model import PortableModel, check_coupling
 from hovi.effects import REGISTRY, Effect
 from hovi.effort_term import EffortTerm
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.lagrangian import EffortLagrangian, PotentialTerm
+from hovi.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
-from hovi.rigid_body import InverseDynamicsKernel, joints_without_kernel
 from hovi.robot import Robot
 from hovi.scene_account import SceneAccount, account
 from hovi.scene_terms import SceneTerms
@@ -79,7 +80,7 @@ class Scene:
             return CasadiTorque(symbols.columns(), total, self.compile, space)
         main: TorqueModel
         if symbols.base is None:
-            main = AnalyticTorque(InverseDynamicsKernel(self.model))
+            main = AnalyticTorque(rnea_kernel(self.model))
         else:
             main = MovingBaseTorque(self.model, symbols.base, symbols.t, self.compile)
         if added is None:
@@ -199,7 +200,7 @@ class Scene:
     @cached_property
     def _without_kernel(self) -> tuple[str, ...]:
         moves = self.terms.symbols.base is not None
-        return joints_without_kernel(on_base_joints(self.model) if moves else self.model)
+        return without_rnea_kernel(on_base_joints(self.model) if moves else self.model)
 
     @cached_property
     def _is_passive(self) -> npt.NDArray[np.bool_]:
@@ -239,10 +240,11 @@ class Scene:
     def __getstate__(self) -> dict[str, Any]:
         """Without what is cached, so that worker processes build their own functions."""
         names = ("robot", "effects", "passive", "compile", "model")
-        return {name: getattr(self, name) for name in names}
+        state = {name: getattr(self, name) for name in names}
+        return {**state, "model": PortableModel.of(self.model)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
+        for name, value in {**state, "model": state["model"].model()}.items():
             object.__setattr__(self, name, value)
 
 
@@ -255,12 +257,11 @@ def require_known_joints(robot: Robot) -> None:
             "nor on SO(2), SE(2), SO(3) or SE(3); lock these joints with "
             "load_robot(..., locked=[...])."
         )
-    if len(robot.model.mimicking_joints):
-        joints = ", ".join(repr(str(robot.model.names[i])) for i in robot.model.mimicking_joints)
-        raise ModelError(
-            f"robot {robot.name!r} cannot be planned on: {joints} mimic other joints; lock them "
-            "with load_robot(..., locked=[...])."
-        )
+    for coupling in robot.couplings:
+        try:
+            check_coupling(robot.model, coupling)
+        except ModelError as wrong:
+            raise ModelError(f"robot {robot.name!r} cannot be planned on: {wrong}") from None
 
 
 def _as_effects(given: object) -> tuple[Effect, ...]:

@@ -42,10 +42,12 @@ class Srdf:
     def poses(self, model: pin.Model) -> dict[str, Array]:
         """Configurations (nq,) by name: neutral, except for the joints that a state lists.
 
-        Joints that the model does not have are passed over, and so are states of such joints
-        alone. Raises ModelError for a joint that is given the wrong count of numbers.
+        Joints that the model does not have, or that mimic others, are passed over, and so are
+        states of such joints alone. Raises ModelError for a joint that is given the wrong count
+        of numbers.
         """
-        known = set(list(model.names)[1:])
+        pairs = zip(model.names, model.joints, strict=True)
+        known = {name for name, joint in list(pairs)[1:] if joint.nv}
         poses = {}
         for name, joints in self.states.items():
             values = {joint: value for joint, value in joints.items() if joint in known}

@@ -144,9 +144,10 @@ def _base_motion(scene: Scene, twist: Array) -> Symmetry:
 def _trunk(scene: Scene) -> list[int]:
     """Joints, of one coordinate each, up to the first body with mass or the first branch."""
     model, trunk = scene.model, []
+    leading = set(scene.model.mimicked_joints)  # moves other joints, too
     for joint in range(1, model.njoints):
         alone = list(model.parents)[1:].count(model.parents[joint]) == 1
-        simple = model.joints[joint].nq == model.joints[joint].nv == 1
+        simple = model.joints[joint].nq == model.joints[joint].nv == 1 and joint not in leading
         if not (alone and simple and model.parents[joint] == joint - 1):
             break
         trunk.append(joint)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hovi import tangent
 from hovi.configuration_space import ConfigurationSpace
+from hovi.mimic_kernel import MimicKernel
 from hovi.point_function import PointFunction, default_threads
 from hovi.rigid_body import InverseDynamicsKernel
 from hovi.tangent import Symbols
@@ -131,7 +132,7 @@ class AnalyticTorque:
     kernel: RNEA of the scene's model.
     """
 
-    def __init__(self, kernel: InverseDynamicsKernel) -> None:
+    def __init__(self, kernel: InverseDynamicsKernel | MimicKernel) -> None:
         self.kernel = kernel
         self._threads = default_threads()
 

@@ -249,3 +249,25 @@ def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=False)
     assert done.returncode == 130
     assert b"Traceback" not in done.stderr
+
+
+def test_an_interrupt_that_a_module_swallows_as_it_is_imported_is_one(tmp_path: Path) -> None:
+    (tmp_path / "deaf.py").write_text(
+        "import os, signal\n"
+        "try: os.kill(os.getpid(), signal.SIGINT)\n"
+        "except KeyboardInterrupt: pass\n"
+        "print('went on')\n"
+    )
+    program = (
+        "import signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "import hovi.cli\n"
+        "def main(): print('begun'); import deaf\n"
+        "hovi.cli.main = main\n"
+        "from hovi.__main__ import run\n"
+        "run()\n"
+    )
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}"}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "begun\n", "")

@@ -137,10 +137,24 @@ def test_an_unknown_frame_is_refused_with_near_names(load_model) -> None:
         functions.frame_placement("tool")
 
 
-def test_mimic_joints_are_refused_by_name() -> None:
+def test_functions_of_a_model_with_a_mimic_joint_are_those_of_pinocchio() -> None:
     model = pin.buildModelFromXML(MIMIC_URDF, True)
-    with pytest.raises(ModelError, match="'second' mimics"):
-        rigid_body.casadi_functions(model)
+    functions, data = rigid_body.casadi_functions(model), model.createData()
+    q, v, a = np.array([0.3]), np.array([-0.7]), np.array([1.1])
+    tau = functions.inverse_dynamics(q, v, a).full().ravel()
+    np.testing.assert_allclose(tau, pin.rnea(model, data, q, v, a), rtol=1e-14)
+    mass = functions.mass_matrix(q).full()
+    np.testing.assert_allclose(mass, pin.crba(model, data, q), rtol=1e-14)
+    held = functions.generalized_gravity(q).full().ravel()
+    np.testing.assert_allclose(held, pin.computeGeneralizedGravity(model, data, q), atol=1e-14)
+    assert float(functions.kinetic_energy(q, v)) == pytest.approx(
+        0.5 * mass[0, 0] * 0.49, rel=1e-14
+    )
+    pin.framesForwardKinematics(model, data, q)
+    frame = model.getFrameId("right")
+    R, p = functions.frame_placement("right")(q)
+    np.testing.assert_allclose(R.full(), data.oMf[frame].rotation, atol=1e-15)
+    np.testing.assert_allclose(p.full().ravel(), data.oMf[frame].translation, atol=1e-15)
 
 
 def test_another_version_of_pinocchio_is_named_with_the_cure() -> None:
@@ -153,11 +167,12 @@ MIMIC_URDF = """<robot name="gripper">
   <link name="base"/>
   <link name="left"><inertial><mass value="1"/>
     <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="right"><inertial><mass value="1"/>
+  <link name="right"><inertial><mass value="1"/><origin xyz="0.2 0.3 0"/>
     <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <joint name="first" type="revolute"><parent link="base"/><child link="left"/>
     <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-  <joint name="second" type="revolute"><parent link="base"/><child link="right"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+  <joint name="second" type="revolute"><parent link="left"/><child link="right"/>
+    <origin xyz="0.4 0.1 0.2" rpy="1.2 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/>
     <mimic joint="first" multiplier="-1"/></joint>
 </robot>"""

@@ -15,6 +15,9 @@ def info(
             help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name.",
         ),
     ],
+    mimic: Annotated[
+        bool, typer.Option("--mimic", help="Joints of a URDF with <mimic> follow others.")
+    ] = False,
 ) -> None:
     """Describe a robot, or a scene and what it leaves out."""
     from hovi.errors import InputError, nearest
@@ -25,7 +28,7 @@ def info(
     if what.endswith(".toml") or what in scenes:
         print(_scene(what))
     elif what.endswith(".urdf") or what in robots:
-        print(_robot(what))
+        print(_robot(what, mimic))
     else:
         raise InputError(
             f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
@@ -41,7 +44,7 @@ def _scene(scene: str) -> str:
     return describe_task(load_task(find_scene(scene)))
 
 
-def _robot(robot: str) -> str:
+def _robot(robot: str, mimic: bool) -> str:
     from hovi.robot import load_robot
 
-    return load_robot(robot).describe()
+    return load_robot(robot, mimic=mimic).describe()

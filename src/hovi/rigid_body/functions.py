@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,9 +10,12 @@ from typing import Any
 import casadi
 import pinocchio as pin
 
+from hovi.coupled_model import Pull, uncoupled
 from hovi.errors import ModelError, nearest
 from hovi.rigid_body import _core
 from hovi.rigid_body.extension import archive
+
+_Back = Callable[[casadi.SX, casadi.SX], list[casadi.SX]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,37 +26,43 @@ class RigidBodyFunctions:
     joints). Gravity and armature are those of the model as it stood when this was made. Outputs
     are dense.
 
-    text: Pinocchio's archive of the model.
+    text: Pinocchio's archive of the model; where joints mimic others, with every joint on its own:
+        an archive of Pinocchio 4.1 loses the size of mimic joints.
     frames: the model's frame names, in Pinocchio's order.
+    pull: from the model's coordinates to those of all joints; None where no joint mimics another.
     """
 
     text: str
     frames: tuple[str, ...]
+    pull: Pull | None = None
 
     @cached_property
     def inverse_dynamics(self) -> casadi.Function:
         """tau = M(q) a + b(q, v) [Featherstone2008, sec. 5.3]: (q, v, a) -> tau (nv,) in [N m]."""
-        return casadi.Function.deserialize(self._model.inverse_dynamics())
+        whole = casadi.Function.deserialize(self._model.inverse_dynamics())
+        return self._pulled(whole, lambda tau, G: [casadi.mtimes(G.T, tau)])
 
     @cached_property
     def mass_matrix(self) -> casadi.Function:
         """q -> M (nv, nv) in [kg m^2], both triangles, armature included."""
-        return casadi.Function.deserialize(self._model.mass_matrix())
+        whole = casadi.Function.deserialize(self._model.mass_matrix())
+        return self._pulled(whole, lambda M, G: [casadi.mtimes([G.T, M, G])])
 
     @cached_property
     def generalized_gravity(self) -> casadi.Function:
         """g = dV/dq: q -> g (nv,) in [N m], the torque that holds the robot still."""
-        return casadi.Function.deserialize(self._model.generalized_gravity())
+        whole = casadi.Function.deserialize(self._model.generalized_gravity())
+        return self._pulled(whole, lambda g, G: [casadi.mtimes(G.T, g)])
 
     @cached_property
     def kinetic_energy(self) -> casadi.Function:
         """K = 1/2 v^T M(q) v: (q, v) -> K in [J]."""
-        return casadi.Function.deserialize(self._model.kinetic_energy())
+        return self._pulled(casadi.Function.deserialize(self._model.kinetic_energy()))
 
     @cached_property
     def potential_energy(self) -> casadi.Function:
         """V = -sum m g^T c(q): q -> V in [J]."""
-        return casadi.Function.deserialize(self._model.potential_energy())
+        return self._pulled(casadi.Function.deserialize(self._model.potential_energy()))
 
     def frame_placement(self, frame_name: str) -> casadi.Function:
         """q -> R (3, 3), p (3,) in [m]: the frame's axes and origin in the world.
@@ -64,7 +74,24 @@ class RigidBodyFunctions:
                 f"the robot has no frame {frame_name!r}: {nearest(frame_name, self.frames)}"
             )
         index = self.frames.index(frame_name)
-        return casadi.Function.deserialize(self._model.frame_placement(index))
+        return self._pulled(casadi.Function.deserialize(self._model.frame_placement(index)))
+
+    def _pulled(self, whole: casadi.Function, back: _Back | None = None) -> casadi.Function:
+        """A function of (q_all, v_all, ...) as one of (q, v, ...).
+
+        back: from its output and G to the output in the model's coordinates; the same when None.
+        """
+        if self.pull is None:
+            return whole
+        G = casadi.SX(casadi.sparsify(casadi.DM(self.pull.matrix)))
+        names, outputs = whole.name_in(), whole.name_out()
+        nq = len(self.pull.sources)
+        inputs = [casadi.SX.sym(n, nq if n == "q" else G.shape[1]) for n in names]
+        q, *rates = inputs
+        made = whole.call([self.pull.expression(q), *(casadi.mtimes(G, x) for x in rates)])
+        if back is not None:
+            made = [casadi.densify(x) for x in back(made[0], G)]
+        return casadi.Function(whole.name(), inputs, made, names, outputs)
 
     @cached_property
     def _model(self) -> _core.SymbolicModel:
@@ -72,7 +99,7 @@ class RigidBodyFunctions:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as the archive: the functions are built again on the other side."""
-        return type(self), (self.text, self.frames)
+        return type(self), (self.text, self.frames, self.pull)
 
 
 def casadi_functions(model: pin.Model) -> RigidBodyFunctions:
@@ -80,13 +107,10 @@ def casadi_functions(model: pin.Model) -> RigidBodyFunctions:
 
     model: any model without closed loops; read here, so that later changes to it have no effect.
 
-    Raises ModelError when the model has mimic joints, and BuildMismatchError when the installed
-    Pinocchio is not the one hovi was compiled against.
+    Raises BuildMismatchError when the installed Pinocchio is not the one hovi was compiled against.
     """
-    if len(model.mimicking_joints):
-        names = ", ".join(repr(model.names[i]) for i in model.mimicking_joints)
-        raise ModelError(
-            f"joint {names} mimics another joint, which hovi does not support: lock it, or "
-            "remove its <mimic> tag."
-        )
-    return RigidBodyFunctions(archive(model), tuple(frame.name for frame in model.frames))
+    frames = tuple(frame.name for frame in model.frames)
+    if not len(model.mimicking_joints):
+        return RigidBodyFunctions(archive(model), frames)
+    free = uncoupled(model)
+    return RigidBodyFunctions(archive(free), frames, Pull.of(model, free))

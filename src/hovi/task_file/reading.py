@@ -130,6 +130,7 @@ def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
             folder / table.robot if is_file else table.robot,
             package_dirs=tuple(folder / each for each in table.package_dirs),
             free_flyer=table.free_flyer,
+            mimic=table.mimic,
             locked=tuple(table.locked),
             srdf=None if table.srdf is None else folder / table.srdf,
         )

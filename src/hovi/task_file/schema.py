@@ -164,6 +164,7 @@ class TaskTable(Table):
     )
     srdf: str | None = Field(default=None, description="the path of an .srdf relative to this file")
     free_flyer: bool = Field(default=False, description="true or false")
+    mimic: bool = Field(default=False, description="true or false")
     passive: list[str] = Field(default=[], description="a list of joint names")
     duration: Duration = Field(
         description="a positive number of seconds, or a list [lower, upper] of two"

@@ -53,6 +53,8 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
         document["srdf"] = _srdf_name(source)
     if source.free_flyer:
         document["free_flyer"] = True
+    if source.mimic:
+        document["mimic"] = True
     if task.scene.passive:
         document["passive"] = list(task.scene.passive)
     free = isinstance(task.duration, tuple)
