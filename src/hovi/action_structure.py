@@ -12,7 +12,6 @@ from hovi.grid import Grid
 from hovi.interval_batch import COORDINATES, Coordinates
 from hovi.optimize.band import BandLayout
 from hovi.optimize.merge_tree import MergeTree, merge_levels
-from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -38,36 +37,15 @@ class ActionStructure:
         return {name: action_metric(self.grid, name) for name in COORDINATES}
 
     @cached_property
-    def changes(self) -> dict[Coordinates, Array]:
-        """Matrices from both kinds of columns to (q0, v0, z0, z1, inner modes), (N or 1, m, m)."""
-        h = self._lengths[:, None]
-        powers = h ** -np.array([0, 1, 2, 2, *[2] * self.grid.inner_modes])
-        regular = powers[:, :, None] * np.eye(powers.shape[1])
-        return {
-            "regular": regular,
-            "nodal": regular @ regular_from_nodal(self.grid.inner_modes),
-        }
-
-    @cached_property
     def sizes(self) -> dict[Coordinates, Array]:
         """What makes columns changes of q, T v and h^2 c, 0 where one is none, (N or 1, m, 1)."""
-        speed = self.duration / self._lengths
+        h = self.grid.steps
+        speed = self.grid.duration / (h[:1] if np.ptp(h) == 0 else h)
         sizes = np.ones((len(speed), 4 + self.grid.inner_modes, 1))
         sizes[:, 1, 0] = sizes[:, 3, 0] = speed
         regular = sizes.copy()
         regular[:, 2:4] = 0.0
         return {"nodal": sizes, "regular": regular}
-
-    @cached_property
-    def duration(self) -> float:
-        """T, in [s]."""
-        return self.grid.duration
-
-    @cached_property
-    def _lengths(self) -> Array:
-        """Steps of the intervals, (N,), or just one where they are equal."""
-        steps = self.grid.steps
-        return steps[:1] if np.ptp(steps) == 0 else steps
 
     @cached_property
     def layout(self) -> BandLayout:

@@ -26,11 +26,9 @@ def carried_momenta(derivatives: Array) -> Array:
     N = len(derivatives)
     evaluated = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
     p = evaluated[:, 0]
-    sums = np.concatenate(
-        [np.zeros_like(p[:1]), np.cumsum(derivatives[:, 0] + derivatives[:, 2], 0)]
-    )
-    start = np.mean(p - sums, axis=0)
-    carried = start + sums
-    if not np.abs(carried - p).max() <= ROUNDING * N * np.abs(p).max():
-        return evaluated
-    return np.stack([carried, evaluated[:, 1]], axis=1)
+    sums = np.zeros_like(p)
+    np.cumsum(derivatives[:, 0] + derivatives[:, 2], axis=0, out=sums[1:])
+    carried = sums + (p - sums).sum(axis=0) / (N + 1)
+    if np.abs(carried - p).max() <= ROUNDING * N * np.abs(p).max():
+        evaluated[:, 0] = carried
+    return evaluated

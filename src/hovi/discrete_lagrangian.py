@@ -80,7 +80,9 @@ class DiscreteLagrangian:
 
     def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
-        return float(self.values(path, jets).sum())
+        triples = zip(self._batches, jets or self.jets(path), self.point_weights, strict=True)
+        value = self.lagrangian.value
+        return sum(float(weights @ value(*jet, t=batch.t)) for batch, jet, weights in triples)
 
     def expand(
         self,
@@ -227,15 +229,21 @@ class DiscreteLagrangian:
         g = self.derivatives(path, forces)
         return np.concatenate([-g[:, :2], g[-1:, 2:]])
 
-    def derivatives(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
+    def derivatives(
+        self,
+        path: DiscretePath,
+        forces: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
+    ) -> Array:
         """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
 
         At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
         forces: multipliers of limits and of torques that vanish, whose work belongs to L_d.
+        jets: as for `values`.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
         g = np.empty((N, 4, n))
-        gradients = self.point_gradients(path, forces)
+        gradients = self.point_gradients(path, forces, jets)
         for batch, gradient in zip(self._batches, gradients, strict=True):
             if self.chart is not None:
                 g[batch.index] = _charts(self.chart, batch, path).end_gradient(gradient)
@@ -249,12 +257,15 @@ class DiscreteLagrangian:
         return np.stack([d1 - d3, h * (d2 - d3 - d4), d3, h * d4], axis=1)
 
     def point_gradients(
-        self, path: DiscretePath, forces: list[PointTerms] | None = None
+        self,
+        path: DiscretePath,
+        forces: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
     ) -> list[Array]:
-        """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; forces as above."""
+        """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
         gradients = []
-        for i, batch in enumerate(self._batches):
-            jet = self._jet(batch, path)
+        known = jets or self.jets(path)
+        for i, (batch, jet) in enumerate(zip(self._batches, known, strict=True)):
             if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
                 gradients.append(self.lagrangian.gradient(*jet, t=batch.t, terms=forces[i]))
             else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -75,14 +76,16 @@ class Grid:
         """Number N of intervals."""
         return len(self.steps)
 
-    @property
+    @cached_property
     def t(self) -> Array:
         """Times of the nodes, shape (N + 1,), in [s]."""
-        if np.ptp(self.steps) == 0:
-            return np.asarray(np.arange(self.intervals + 1) * self.steps[0])
-        return np.concatenate([[0.0], np.cumsum(self.steps)])
+        t: Array = np.arange(self.intervals + 1) * self.steps[0]
+        if np.ptp(self.steps) > 0:
+            t = np.concatenate([[0.0], np.cumsum(self.steps)])
+        t.setflags(write=False)
+        return t
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """T, in [s]."""
         return float(self.t[-1])
@@ -122,7 +125,7 @@ class Grid:
         t = np.interp(nodes, nodes[[*fixed, self.intervals]], places)
         return Grid(np.diff(t), self.schemes)
 
-    @property
+    @cached_property
     def inner_modes(self) -> int:
         """The largest number of inner modes of an interval."""
         return max(scheme.inner_modes for scheme, _ in self.groups)
@@ -163,3 +166,8 @@ class DiscretePath:
     def intervals(self) -> int:
         """Number N of intervals."""
         return len(self.z)
+
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """q, v, z and the inner modes."""
+        return self.q, self.v, self.z, self.inner

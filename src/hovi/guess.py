@@ -180,7 +180,7 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
     h = grid.steps[:, None]
     turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
     gap = (regularised(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
-    if np.max(np.abs(gap)) > 1e-6 * max(1.0, float(np.max(np.abs(path.q)))):
+    if np.abs(gap).max() > 1e-6 * max(1.0, np.abs(path.q).max()):
         raise InputError(
             "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
             "where configurations are vectors."

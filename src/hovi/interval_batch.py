@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.grid import DiscretePath, Grid
+from hovi.optimize.interval_paths import interpolate
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -26,12 +27,17 @@ CHUNK = 4096
 
 @dataclass(frozen=True, eq=False)
 class IntervalBatch:
-    """Intervals of one scheme, evaluated together."""
+    """Intervals of one scheme, evaluated together.
+
+    numbers: of the intervals, shape (B,). index: the same, as a slice where they follow each other.
+    h: their lengths, shape (B,), in [s]. t: times of the points, shape (B Q,), in [s].
+    """
 
     scheme: Scheme
+    numbers: Index
     index: Index | slice
-    h: Array  # (B,)
-    t: Array  # (B * Q,)
+    h: Array
+    t: Array
 
     @cached_property
     def tables(self) -> dict[Coordinates, Array]:
@@ -60,40 +66,22 @@ class IntervalBatch:
         return np.asarray(np.vecdot(values.reshape(self.weights.shape), self.weights))
 
     @cached_property
-    def jet_table(self) -> Array:
-        """(x, x', x'') at the points over (v0, z, c / h^2), (3, B or 1, Q, 3 + r)."""
-        h = self._lengths
-        table = self.scheme.table.transpose(1, 0, 2)  # (3, Q, 3 + r)
-        columns = h[:, None] ** np.where(np.arange(table.shape[2]) == 0, 1, 2)  # (B or 1, 3 + r)
-        rows = h ** -np.arange(3.0)[:, None]  # (3, B or 1)
-        return np.asarray(table[:, None] * columns[:, None] * rows[..., None, None])
-
-    @cached_property
     def step_tables(self) -> dict[Coordinates, Array]:
         """(q, v, a) at the points over the columns of both coordinates, (B or 1, 3 Q, m)."""
-        powers = self._lengths[:, None, None, None] ** -np.arange(3.0)[:, None]
+        h = self.h[:1] if np.ptp(self.h) == 0 else self.h
+        powers = h[:, None, None, None] ** -np.arange(3.0)[:, None]
         rows = 3 * len(self.scheme.weights)
         return {
             name: (table * powers).reshape(len(powers), rows, -1)
             for name, table in self.tables.items()
         }
 
-    @cached_property
-    def _lengths(self) -> Array:
-        """h, (B,), or just one where all are equal."""
-        return self.h[:1] if np.ptp(self.h) == 0 else self.h
-
     def jet(self, path: DiscretePath) -> Jet:
         """(q, v, a) at the quadrature points, each of shape (B * Q, n).
 
         The chart of an interval is the identity: q = q0 + x.
         """
-        n = path.v.shape[1]
-        v0, inner = path.v[:-1][self.index], path.inner[self.index, : self.scheme.inner_modes]
-        local = np.concatenate([v0[:, None], path.z[self.index], inner], axis=1)
-        jet = np.matmul(self.jet_table, local)  # (3, B, Q, n)
-        jet[0] += path.q[:-1][self.index][:, None]
-        q, v, a = jet.reshape(3, -1, n)
+        q, v, a = interpolate(self.scheme.table, self.h, self.numbers, path.arrays)
         return q, v, a
 
     def contracted(self, gradient: Array, coordinates: Coordinates) -> Array:
@@ -109,9 +97,9 @@ def interval_batches(grid: Grid) -> Iterator[IntervalBatch]:
     t0 = grid.t
     for scheme, index in grid.groups:
         for first in range(0, len(index), CHUNK):
-            chosen: Index | slice = index[first : first + CHUNK]
-            if len(grid.groups) == 1:
-                chosen = slice(first, min(first + CHUNK, len(index)))
+            numbers = index[first : first + CHUNK]
+            alone = len(grid.groups) == 1
+            chosen = slice(first, first + len(numbers)) if alone else numbers
             h = grid.steps[chosen]
             t = t0[:-1][chosen][:, None] + h[:, None] * scheme.points
-            yield IntervalBatch(scheme, chosen, h, t.ravel())
+            yield IntervalBatch(scheme, numbers, chosen, h, t.ravel())

@@ -113,7 +113,7 @@ class Robot:
         pairs = zip(self.model.names, self.model.joints, strict=True)
         return tuple(name for name, joint in pairs if joint.nq != joint.nv)
 
-    @property
+    @cached_property
     def vector_joints(self) -> bool:
         """Whether every joint has nq = nv, so that configurations add like vectors."""
         return not self.manifold_joints

@@ -20,6 +20,7 @@ from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
 from hovi.guess import check_path, moved, named_curve, stretched, with_turns
+from hovi.interval_batch import Jet
 from hovi.lagrangian import PointTerms
 from hovi.limited_solver import solve_limited
 from hovi.limits import no_limits
@@ -160,6 +161,7 @@ def solve(
         max_iterations=max_iterations,
         time_limit=time_limit,
         escape_saddles=escape_saddles,
+        exact=not (problem.limited or problem.constrained),
     )
     started = time.perf_counter()
     method = _with_limits if problem.limited else _without_limits
@@ -180,6 +182,7 @@ class _Answer:
     n_neg: int
     history: list[Iteration]
     forces: list[PointTerms] | None
+    jets: list[Jet] | None = None
 
     def trajectory(self) -> Trajectory:
         """The motion with its momenta and where it came from."""
@@ -193,7 +196,7 @@ class _Answer:
             metadata["limits"] = problem.limits.to_dict()
         if problem.clearance is not None and problem.distances is not None:
             metadata["clearance"] = problem.clearance.to_dict()
-        momenta = carried_momenta(problem.ld.derivatives(self.path, self.forces))
+        momenta = carried_momenta(problem.ld.derivatives(self.path, self.forces, self.jets))
         return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
 
 
@@ -236,13 +239,14 @@ def _without_limits(
     if problem.constrained:
         return _with_equations(problem, path, options, report)
     objective = ActionObjective(problem, structure=problem.structure)
-    options = dataclasses.replace(options, exact=True)
     outcome = minimize(objective, path, options, report)
     n_neg = 0 if outcome.convex else _inertia(objective, outcome)
     status, message = verdict(problem, outcome, n_neg)
     message += chart_sentence(problem, outcome.x)
-    nit, history = outcome.iterations, outcome.history
-    return _Answer(problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None)
+    nit, history, jets = outcome.iterations, outcome.history, objective.jets(outcome.x)
+    return _Answer(
+        problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None, jets
+    )
 
 
 def _with_equations(

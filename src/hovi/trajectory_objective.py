@@ -20,6 +20,7 @@ from hovi.interval_batch import Coordinates, Jet
 from hovi.lagrangian import EffortLagrangian, PointTerms
 from hovi.multipliers import Multipliers, Residuals, node_residuals
 from hovi.optimize.band import BandModel
+from hovi.optimize.interval_paths import move
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
@@ -213,15 +214,9 @@ class ActionObjective(Objective[DiscretePath]):
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
-        local = model.gather(step)  # (N, m, n)
-        change = np.matmul(self.structure.changes[self.coordinates], local)
-        nodes = np.zeros((len(x.q), 2, local.shape[2]))
-        nodes[:-1] = change[:, :2]
-        if self.algebra == "band":
-            nodes[-1] = local[-1, 2:4]
-            nodes[-1, 1] /= self.problem.grid.steps[-1]
-        q = self.problem.robot.integrate(x.q, nodes[:, 0])
-        path = DiscretePath(q, x.v + nodes[:, 1], x.z + change[:, 2:4], x.inner + change[:, 4:])
+        nodal = self.coordinates == "nodal"
+        dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
+        path = DiscretePath(self.problem.robot.integrate(x.q, dq), *moved)
         if self.ld.chart is None:
             return path
         return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
@@ -229,7 +224,7 @@ class ActionObjective(Objective[DiscretePath]):
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
         """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
         changes = self.structure.sizes[self.coordinates] * model.gather(step)
-        T = self.structure.duration
+        T = self.problem.grid.duration
         size = max(1.0, np.abs(x.q).max(), T * np.abs(x.v).max())
         return float(np.abs(changes).max() / size)
 

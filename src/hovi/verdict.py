@@ -27,6 +27,8 @@ class Status(StrEnum):
 
 def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """What to say where an orientation turns by more than half a turn in an interval, or ""."""
+    if problem.ld.chart is None:
+        return ""
     turns = problem.ld.turns(path)
     k = int(np.argmax(turns))
     if turns[k] <= np.pi:

@@ -33,4 +33,27 @@ def factor(
     out: Array,
     portable: bool = False,
 ) -> bool: ...
+def product(band: Array, rows: Index, x: Array, out: Array) -> None: ...
+def interpolate(
+    table: Array,
+    steps: Array,
+    intervals: Index,
+    q: Array,
+    v: Array,
+    z: Array,
+    inner: Array,
+    out: Array,
+) -> None: ...
+def move(
+    step: Array,
+    steps: Array,
+    nodal: bool,
+    v: Array,
+    z: Array,
+    inner: Array,
+    dq: Array,
+    new_v: Array,
+    new_z: Array,
+    new_inner: Array,
+) -> None: ...
 def solve(factor: Array, rows: Index, rhs: Array, out: Array, portable: bool = False) -> None: ...

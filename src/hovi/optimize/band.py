@@ -159,6 +159,12 @@ class BandModel(QuadraticModel):
         scales = self.layout.scales
         return local if scales is None else np.asarray(local * scales[..., None])
 
+    def metric_product(self, s: Array) -> Array:
+        """D s."""
+        product = np.empty_like(s)
+        _packed.product(self._metric_band, self.layout.rows, s, product)
+        return product
+
     def factor(self, shift: float) -> Factor | None:
         """Banded Cholesky of H + shift D; None where it fails."""
         if self._band is None:

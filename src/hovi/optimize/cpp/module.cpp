@@ -6,7 +6,9 @@
 #include <nanobind/stl/optional.h>
 
 #include "arrays.hpp"
+#include "band_product.hpp"
 #include "doors.hpp"
+#include "interval_paths.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -78,6 +80,32 @@ void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const
   std::copy_n(x.get(), size, out.data());
 }
 
+void product(const Input<2>& band, const Index& rows, const Input<1>& x, const Output<1>& out) {
+  const hovi::Band shape{x.shape(0), rows.shape(0), band.shape(1), rows.data()};
+  const nb::gil_scoped_release released;
+  hovi::product(shape, band.data(), x.data(), out.data());
+}
+
+void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,
+                 const Input<2>& q, const Input<2>& v, const Input<3>& z, const Input<3>& inner,
+                 const Output<3>& out) {
+  const hovi::IntervalPath path{z.shape(0), inner.shape(1), v.shape(1), v.data(), z.data(),
+                                inner.data()};
+  const nb::gil_scoped_release released;
+  hovi::interpolate(path, q.data(), table.data(), table.shape(0), table.shape(2), steps.data(),
+                    intervals.data(), steps.shape(0), out.data());
+}
+
+void move(const Input<3>& step, const Input<1>& steps, bool nodal, const Input<2>& v,
+          const Input<3>& z, const Input<3>& inner, const Output<2>& dq, const Output<2>& new_v,
+          const Output<3>& new_z, const Output<3>& new_inner) {
+  const hovi::IntervalPath path{z.shape(0), inner.shape(1), v.shape(1), v.data(), z.data(),
+                                inner.data()};
+  const nb::gil_scoped_release released;
+  hovi::move(path, step.data(), step.shape(1), steps.data(), nodal, dq.data(), new_v.data(),
+             new_z.data(), new_inner.data());
+}
+
 }  // namespace
 
 NB_MODULE(_packed, m) {
@@ -88,5 +116,10 @@ NB_MODULE(_packed, m) {
         "scales"_a.none(), "band"_a);
   m.def("factor", &factor, "band"_a, "metric"_a, "shift"_a, "rows"_a, "size"_a, "out"_a,
         "portable"_a = false);
+  m.def("product", &product, "band"_a, "rows"_a, "x"_a, "out"_a);
+  m.def("interpolate", &interpolate, "table"_a, "steps"_a, "intervals"_a, "q"_a, "v"_a, "z"_a,
+        "inner"_a, "out"_a);
+  m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
+        "new_z"_a, "new_inner"_a);
   m.def("solve", &solve, "factor"_a, "rows"_a, "rhs"_a, "out"_a, "portable"_a = false);
 }

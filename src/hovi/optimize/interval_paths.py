@@ -1,0 +1,40 @@
+"""Paths of intervals: what their quadrature points see, and where steps in their columns lead."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize import _packed
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Path = tuple[Array, Array, Array, Array]
+"""q (N + 1, n), v (N + 1, n), z (N, 2, n) and inner modes (N, r, n): see DiscretePath."""
+
+
+def interpolate(table: Array, steps: Array, intervals: Index, path: Path) -> Array:
+    """(q, v, a) at the points of some intervals, where tangent vectors add, shape (3, B Q, n).
+
+    (q - q0, h v, h^2 a) = table (h v0, h^2 z0, h^2 z1, h^2 inner) at every point.
+
+    table: shape (Q, 3, 3 + r), of no more modes than the path. steps: h of the intervals, (B,).
+    intervals: their numbers, shape (B,).
+    """
+    q, v, z, inner = path
+    out = np.empty((3, len(steps) * len(table), v.shape[1]))
+    _packed.interpolate(table, steps, intervals, q, v, z, inner, out)
+    return out
+
+
+def move(path: Path, step: Array, steps: Array, nodal: bool) -> Path:
+    """Change of q in a step, and where it leads v, z and the inner modes.
+
+    step: in the intervals' columns (q0, h v0, q1, h v1, c) when nodal, else (q0, h v0, Z0, Z1, c),
+        which leave the last node where it is; shape (N, 4 + r, n).
+    steps: h, shape (N,).
+    """
+    _, v, z, inner = path
+    after = np.empty_like(v), np.empty_like(v), np.empty_like(z), np.empty_like(inner)
+    _packed.move(step, steps, nodal, v, z, inner, *after)
+    return after
