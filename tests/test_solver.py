@@ -19,7 +19,7 @@ from hovi.non_finite import non_finite_sentence
 from hovi.predictor import follow
 from hovi.problem import TrajectoryProblem
 from hovi.rigid_body import casadi_functions
-from hovi.robot import Robot
+from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name
 from hovi.solver import Solution, Status, guess_path, solve
@@ -356,6 +356,19 @@ def test_the_iteration_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert "iteration limit was reached after 2 steps" in stopped.message
     assert stopped.minima == ()
     assert_fits(problem, stopped)
+
+
+def test_the_last_step_of_a_motion_is_small(arm_scene: Scene) -> None:
+    robot = load_robot("kinova")
+    goal = robot.integrate(robot.neutral(), np.array([0.5, 0.3, -0.2, 2.0, 0.4, -1.0]))
+    wound = State(goal, turns={"j2s6s200_joint_6": 1})
+    ends, scene = (State(robot.neutral()), wound), Scene(robot, [Gravity()])
+    for problem in (problem_on(arm_scene), problem_on(scene, *ends, duration=2.0, intervals=8)):
+        solution = solve(problem)
+        assert solution.success, solution.message
+        assert solution.history[-1].decrease <= 1e-14 * solution.cost
+        assert solution.nit == len(solution.history)
+        assert solve(problem, max_iterations=solution.nit - 1).nit == solution.nit - 1
 
 
 def test_the_time_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
