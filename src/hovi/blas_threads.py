@@ -7,6 +7,7 @@ number of processors; and the blocks of a motion are small: two threads only wai
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
@@ -21,7 +22,7 @@ def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments
 
     @functools.wraps(function)
     def limited(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        blas = _blas()
+        blas = _blas("scipy.linalg" in sys.modules)
         if all(library.num_threads == 1 for library in blas.lib_controllers):
             return function(*args, **kwargs)
         with blas.limit(limits=1):
@@ -31,8 +32,6 @@ def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments
 
 
 @functools.cache
-def _blas() -> ThreadpoolController:
-    """Those of NumPy and of SciPy; looking for them takes some milliseconds."""
-    import scipy.linalg  # noqa: F401  # brings a BLAS of its own
-
+def _blas(scipy_too: bool) -> ThreadpoolController:
+    """That of NumPy, and SciPy's own one once it is there; to find them takes some milliseconds."""
     return ThreadpoolController().select(user_api="blas")

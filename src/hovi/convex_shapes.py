@@ -8,7 +8,6 @@ import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.spatial import ConvexHull, QhullError
 
 from hovi.errors import ModelError
 from hovi.robot import Robot
@@ -68,8 +67,11 @@ def _convex(item: pin.GeometryObject, robot: Robot) -> coal.CollisionGeometry:
 def _hull(vertices: Array) -> coal.ConvexBase | None:
     """The convex hull of vertices (M, 3); None where they span no volume.
 
-    SciPy finds the corners first, since Coal's own call crashes on flat shapes.
+    SciPy finds the corners first, since Coal's own call crashes on flat shapes. It is imported
+    here, since that takes a quarter of a second, and few scenes ask for it.
     """
+    from scipy.spatial import ConvexHull, QhullError
+
     try:
         corners = vertices[ConvexHull(vertices).vertices]
     except (QhullError, ValueError):

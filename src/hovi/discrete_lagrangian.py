@@ -19,6 +19,7 @@ from hovi.grid import DiscretePath, Grid
 from hovi.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
 from hovi.optimize.contraction import contract
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -250,11 +251,14 @@ class DiscreteLagrangian:
                 continue
             regular = batch.contracted(gradient, "regular")
             g[batch.index] = regular[:, :4]
-        h = self.grid.steps[:, None]
-        d1, d2, d3, d4 = g[:, 0], g[:, 1], g[:, 2], g[:, 3]
-        if self.chart is not None:
-            return np.stack([d1, h * d2, d3, h * d4], axis=1)
-        return np.stack([d1 - d3, h * (d2 - d3 - d4), d3, h * d4], axis=1)
+        return np.asarray(np.matmul(self._end_columns, g))
+
+    @cached_property
+    def _end_columns(self) -> Array:
+        """What makes D1 .. D4 of the derivatives in an interval's first four columns, (N, 4, 4)."""
+        scales = self.grid.steps[:, None] ** [0, 1, 0, 1]
+        nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0).T
+        return np.asarray(scales[:, :, None] * nodal)
 
     def point_gradients(
         self,

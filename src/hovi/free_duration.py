@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from hovi.errors import InputError
 from hovi.solver import Solution
@@ -110,6 +109,7 @@ class _Search:
 
     def between(self, known: dict[float, float]) -> None:
         """Brent's method on a bracket, of which both slopes are known, to where J' + w vanishes."""
+        from scipy.optimize import brentq  # a quarter of a second, for free durations alone
 
         def slope_at(T: float) -> float:
             if T not in known:

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from joblib import Parallel, delayed, parallel_config
 
 from hovi.clearance import Clearance
 from hovi.discrete_lagrangian import DiscreteLagrangian
@@ -99,10 +98,13 @@ class Pool:
         count = min(self.processes, len(guesses))
         if count <= 1:
             return _solve_chunk(self.job, guesses, left)
+        import joblib  # here, since it takes 60 ms and one process does without
+
+        solve_chunk = joblib.delayed(_solve_chunk)
         chunks = [guesses[i::count] for i in range(count)]
-        with parallel_config(backend="loky", inner_max_num_threads=1):
+        with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
             _start_workers(count)
-            parts = Parallel(n_jobs=count)(delayed(_solve_chunk)(self.job, c, left) for c in chunks)
+            parts = joblib.Parallel(n_jobs=count)(solve_chunk(self.job, c, left) for c in chunks)
         solutions: list[Solution | None] = [None] * len(guesses)
         for i, part in enumerate(parts):
             solutions[i : i + count * len(part) : count] = part
@@ -114,10 +116,12 @@ def _start_workers(count: int) -> None:
 
     A terminal sends it to all of them, and one that still imports would complain.
     """
+    import joblib
+
     ensure_running()  # which Python would do later, and unblock Ctrl-C
     heard = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
-        Parallel(n_jobs=count)(delayed(abs)(i) for i in range(count))
+        joblib.Parallel(n_jobs=count)(joblib.delayed(abs)(i) for i in range(count))
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, heard)
 

@@ -29,7 +29,7 @@ def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 
     corrections: how many quasi-Newton steps may follow, which begin with H's factorisation and
         cost a gradient each.
     """
-    ends = problem.ends(solved.q[[0, -1]], solved.v[[0, -1]])
+    ends = problem.ends(solved.q, solved.v)
     path = moved(solved, problem.grid, ends, problem.robot)
     if not problem.plain:
         return path

@@ -126,18 +126,18 @@ class TrajectoryProblem:
         return path_on_grid(curve, self.grid, self.ends(q, v), self.robot)
 
     def ends(self, q: Array, v: Array) -> Boundary:
-        """The boundary data, with what is free taken from two states (2, nq) and (2, nv)."""
+        """The boundary data, with what is free taken from the ends of q (M, nq) and v (M, nv)."""
         q0, v0, q1, v1 = self.boundary
-        if not self.free_ends.any():
+        if not self._has_free_ends:
             return self.boundary
         robot, free = self.robot, self.free_ends
         q = np.stack(
             [
                 robot.integrate(a, np.where(free[i, 0], robot.difference(a, b), 0.0))
-                for i, (a, b) in enumerate(((q0, q[0]), (q1, q[1])))
+                for i, (a, b) in enumerate(((q0, q[0]), (q1, q[-1])))
             ]
         )
-        v = np.where(free[:, 1], v, np.stack([v0, v1]))
+        v = np.where(free[:, 1], v[[0, -1]], np.stack([v0, v1]))
         return q[0], v[0], q[1], v[1]
 
     @cached_property
@@ -160,7 +160,11 @@ class TrajectoryProblem:
     @property
     def plain(self) -> bool:
         """Whether both ends are fixed and no equation has to be met."""
-        return not self.constrained and not self.free_ends.any()
+        return not self.constrained and not self._has_free_ends
+
+    @cached_property
+    def _has_free_ends(self) -> bool:
+        return bool(self.free_ends.any())
 
     @property
     def limited(self) -> bool:

@@ -345,7 +345,7 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
     robot, grid, boundary = problem.robot, problem.grid, problem.boundary
     if isinstance(guess, DiscretePath):
         check_path(guess, grid, robot)
-        return moved(guess, grid, problem.ends(guess.q[[0, -1]], guess.v[[0, -1]]), robot)
+        return moved(guess, grid, problem.ends(guess.q, guess.v), robot)
     if isinstance(guess, str):
         curve = named_curve(guess, robot, boundary, grid.duration)
         if problem.turns.any():

@@ -66,6 +66,7 @@ class ActionObjective(Objective[DiscretePath]):
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
+        self._torques: tuple[DiscretePath, list[Array]] | None = None
 
     @property
     def expansion(self) -> Expansion:
@@ -81,17 +82,15 @@ class ActionObjective(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The discrete action, with what equations add."""
-        if self._overturned(x):
-            return float("inf")
-        if self.multipliers is None:
-            return self.ld.action(x, self.jets(x))
         return self.value_of(x, self.torques(x))
 
     def torques(self, x: DiscretePath) -> list[Array]:
-        """tau at the quadrature points, (P, nv) per batch."""
-        lagrangian = self.lagrangian
-        pairs = zip(self.jets(x), self.ld.point_times, strict=True)
-        return [lagrangian.torques.torque(*jet, t) for jet, t in pairs]
+        """tau at the quadrature points, (P, nv) per batch, remembered for the last path."""
+        if self._torques is None or self._torques[0] is not x:
+            torque = self.lagrangian.torques.torque
+            pairs = zip(self.jets(x), self.ld.point_times, strict=True)
+            self._torques = x, [torque(*jet, t) for jet, t in pairs]
+        return self._torques[1]
 
     def _overturned(self, x: DiscretePath) -> bool:
         """Whether an orientation leaves the chart of an interval, which is singular at a turn."""
@@ -149,12 +148,11 @@ class ActionObjective(Objective[DiscretePath]):
         if previous is not None and step is not None and self._expansion is not None:
             local = previous.gather(step)
             curvatures = self.ld.predict(self._expansion, local, self.coordinates)
-        if self.multipliers is not None:
-            if curvatures is None:
-                curvatures = [self.effort(tau, i) for i, tau in enumerate(self.torques(x))]
-            else:
-                pairs = zip(curvatures, self.multipliers.torque, strict=True)
-                curvatures = [effort + more for effort, more in pairs]
+        if curvatures is None:
+            curvatures = [self.effort(tau, i) for i, tau in enumerate(self.torques(x))]
+        elif self.multipliers is not None:
+            pairs = zip(curvatures, self.multipliers.torque, strict=True)
+            curvatures = [effort + more for effort, more in pairs]
         return self.model_with(x, curvatures, None)
 
     def model_with(
