@@ -73,7 +73,8 @@ struct TileRows {
       if (!curved(part(f))) {
         const std::size_t count = part(f).v + part(f).size - begin;
         for (std::size_t s = 0; s < 4; ++s)
-          std::copy_n(own + (s > 0 ? s - 1 : 0) * width, count, to + s * width);
+          for (std::size_t j = 0; j < count; ++j)
+            to[s * width + j] = own[(s > 0 ? s - 1 : 0) * width + j];
       }
       on_group(part(f).kind, [&](auto group) {
         using Group = decltype(group);
@@ -96,8 +97,19 @@ struct TileRows {
     });
     const double* const table = intervals.charts.table + 3 * q * m;
     for (std::size_t i = 0; i < k; ++i)
-      for (std::size_t j = 0; j < width; ++j)
+      for (std::size_t j = i; j < width; ++j)
         contract(table, rows, i * row + j, sums + (i * width + j) * m * m);
+  }
+
+  // The entries on the other side of the diagonal.
+  void mirror() const {
+    for (std::size_t i = 0; i < tile.size; ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const Pack* const from = sums + (j * width + i) * m * m;
+        Pack* const to = sums + (i * width + j) * m * m;
+        for (std::size_t r = 0; r < m; ++r)
+          for (std::size_t s = 0; s < m; ++s) to[r * m + s] = from[s * m + r];
+      }
   }
 
   template <typename Group>
@@ -125,11 +137,24 @@ struct TileRows {
       products[r * m] = base;
       for (std::size_t j = 1; j < m; ++j) products[r * m + j] = A[j] * x + B[j] * y + C[j] * z;
     }
-    const Pack *const x = products + m, *const y = x + m, *const z = y + m;
     for (std::size_t j = 0; j < m; ++j) sum[j] += products[j];
-    for (std::size_t i = 1; i < m; ++i)
-      for (std::size_t j = 0; j < m; ++j)
-        sum[i * m + j] += A[i] * x[j] + B[i] * y[j] + C[i] * z[j];
+    std::size_t i = 1;
+    for (; i + 2 <= m; i += 2) add_rows<2>(table + i, sum + i * m);
+    for (; i < m; ++i) add_rows<1>(table + i, sum + i * m);
+  }
+
+  // Rows of A^T (H A).
+  template <std::size_t count>
+  void add_rows(const double* A, Pack* sum) const {
+    const Pack *const x = products + m, *const y = x + m, *const z = y + m;
+    Pack a[count], b[count], c[count];
+    for (std::size_t i = 0; i < count; ++i)
+      a[i] = broadcast(A[i]), b[i] = broadcast(A[m + i]), c[i] = broadcast(A[2 * m + i]);
+    for (std::size_t j = 0; j < m; ++j) {
+      const Pack xj = x[j], yj = y[j], zj = z[j];
+      for (std::size_t i = 0; i < count; ++i)
+        sum[i * m + j] += a[i] * xj + b[i] * yj + c[i] * zj;
+    }
   }
 
   // From the charts' columns to the nodal ones.
@@ -172,19 +197,17 @@ struct TileRows {
 
   // Both triangles.
   void write_blocks(double* out) const {
-    const std::size_t n = intervals.dof(), block = n * n;
-    for (std::size_t lane = 0; lane < intervals.rows.count; ++lane) {
-      double* const hessian = out + intervals.rows.at[lane] * m * m * block;
-      const Pack* from = sums;
-      for (std::size_t a = tile.first; a < tile.first + tile.size; ++a)
-        for (std::size_t b = tile.first; b < n; ++b)
-          for (std::size_t i = 0; i < m; ++i)
-            for (std::size_t j = 0; j < m; ++j, ++from) {
-              hessian[(i * m + j) * block + a * n + b] = (*from)[lane];
-              if (b >= tile.first + tile.size)
-                hessian[(j * m + i) * block + b * n + a] = (*from)[lane];
-            }
-    }
+    const std::size_t n = intervals.dof(), k = tile.size, entry = m * m, stride = entry * n * n;
+    for (std::size_t i = 0; i < m; ++i)
+      for (std::size_t j = 0; j < m; ++j) {
+        const Pack* const from = sums + i * m + j;
+        double* const lower = out + ((i * m + j) * n + tile.first) * n + tile.first;
+        double* const upper = out + ((j * m + i) * n + tile.first) * n + tile.first;
+        for (std::size_t a = 0; a < k; ++a)
+          write(from + a * width * entry, width, intervals.rows, stride, lower + a * n, entry);
+        for (std::size_t b = k; b < width; ++b)
+          write(from + b * entry, k, intervals.rows, stride, upper + b * n, width * entry);
+      }
   }
 };
 
@@ -196,6 +219,7 @@ inline void expand_tile(const Intervals& intervals, const Tile& tile, const doub
     rows.read_point(q, hessian);
     rows.add_point(q);
   }
+  rows.mirror();
   rows.pull_ends();
   rows.write_blocks(columns_hessian);
 }

@@ -32,16 +32,51 @@ struct Rows {
   }
 };
 
+inline void transpose(Pack (&x)[lanes]) {
+#if HOVI_LANES == 2
+  const Pack a = x[0], b = x[1];
+  x[0] = Pack{a[0], b[0]}, x[1] = Pack{a[1], b[1]};
+#else
+  const Pack a = Pack{x[0][0], x[1][0], x[0][2], x[1][2]};
+  const Pack b = Pack{x[0][1], x[1][1], x[0][3], x[1][3]};
+  const Pack c = Pack{x[2][0], x[3][0], x[2][2], x[3][2]};
+  const Pack d = Pack{x[2][1], x[3][1], x[2][3], x[3][3]};
+  x[0] = Pack{a[0], a[1], c[0], c[1]}, x[1] = Pack{b[0], b[1], d[0], d[1]};
+  x[2] = Pack{a[2], a[3], c[2], c[3]}, x[3] = Pack{b[2], b[3], d[2], d[3]};
+#endif
+}
+
 // Numbers of each row, `stride` from row to row.
 inline void read(const double* from, std::size_t stride, const Rows& rows, std::size_t numbers,
                  Pack* to) {
-  for (std::size_t i = 0; i < numbers; ++i)
+  std::size_t i = 0;
+  for (; i + lanes <= numbers; i += lanes) {
+    Pack block[lanes];
+    for (std::size_t lane = 0; lane < lanes; ++lane)
+      block[lane] = load(from + rows.at[lane] * stride + i);
+    transpose(block);
+    for (std::size_t j = 0; j < lanes; ++j) to[i + j] = block[j];
+  }
+  for (; i < numbers; ++i)
     for (std::size_t lane = 0; lane < lanes; ++lane) to[i][lane] = from[rows.at[lane] * stride + i];
 }
+
+// The packs lie `place` apart.
 inline void write(const Pack* from, std::size_t numbers, const Rows& rows, std::size_t stride,
-                  double* to) {
-  for (std::size_t lane = 0; lane < rows.count; ++lane)
-    for (std::size_t i = 0; i < numbers; ++i) to[rows.at[lane] * stride + i] = from[i][lane];
+                  double* to, std::size_t place = 1) {
+  std::size_t i = 0;
+  for (; i + lanes <= numbers; i += lanes) {
+    Pack block[lanes];
+    for (std::size_t j = 0; j < lanes; ++j) block[j] = from[(i + j) * place];
+    transpose(block);
+    for (std::size_t lane = 0; lane < rows.count; ++lane)
+      store(to + rows.at[lane] * stride + i, block[lane]);
+  }
+  for (; i < numbers; ++i) {
+    const Pack last = from[i * place];
+    for (std::size_t lane = 0; lane < rows.count; ++lane)
+      to[rows.at[lane] * stride + i] = last[lane];
+  }
 }
 
 template <typename Group>
