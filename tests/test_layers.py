@@ -80,7 +80,7 @@ FLOORS = [
     {"scene"},
     {"free_fall", "discrete_lagrangian", "lagrangians"},
     {"action_structure"},
-    {"trajectory", "segment_lagrangian", "clearance_outputs", "relaxed_modes"},
+    {"trajectory", "segment_lagrangian", "clearance_outputs", "carried_efforts"},
     {"guess", "legendre_transforms", "motion_error", "refinement", "clearance_check"},
     {
         "limit_check",

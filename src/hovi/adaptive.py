@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from hovi.carried_efforts import carried_efforts
 from hovi.error_estimate import estimate_against
 from hovi.finer_solution import FinerSolution
 from hovi.grid import DiscretePath, Grid
@@ -17,7 +18,6 @@ from hovi.known_error import Candidate, least_error
 from hovi.nearby_minimum import nearby_minimum
 from hovi.next_grid import moved_to, next_grid
 from hovi.problem import TrajectoryProblem
-from hovi.relaxed_modes import relaxed
 from hovi.schemes import galerkin
 from hovi.solver import Solution, solve
 from hovi.tolerance import Accuracy, Quantity, Round, Tolerance
@@ -219,6 +219,7 @@ def _near(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:
     """A solution next to a finer one on another grid; None where it takes the optimiser."""
     if problem.limited or problem.constrained:
         return None
-    start = relaxed(problem.ld, moved_to(finer, problem)).path
-    found = nearby_minimum(ActionObjective(problem), start)
+    efforts = carried_efforts(finer.problem.ld, finer.path, problem.ld)
+    objective, start = ActionObjective(problem), moved_to(finer, problem)
+    found = nearby_minimum(objective, start, objective.model_with(start, efforts, None))
     return None if found is None else found.solution()

@@ -15,13 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.carried_efforts import carried_efforts
+from hovi.discrete_lagrangian import Expansion
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
 from hovi.motion_error import places
 from hovi.nearby_minimum import nearby_minimum
 from hovi.problem import TrajectoryProblem
-from hovi.relaxed_modes import relaxed
 from hovi.schemes import galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
 from hovi.solver import Solution, solve
@@ -68,16 +69,18 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
         curve = stretched(motion(problem, path), problem.grid.duration)
         return _solved(halves, halves.path(curve), problem, path)
     fine = problem.on(finer_grid(problem.grid))
-    longer = prolonged(path, fine.grid)
+    start = prolonged(path, fine.grid)
     if problem.constrained:
-        return _solved(fine, longer, problem, path)
-    start = relaxed(fine.ld, longer)
+        return _solved(fine, start, problem, path)
     values = problem.ld.values(path)
-    gains, known = values - start.values, float(np.sum(values))
-    found = nearby_minimum(ActionObjective(fine), start.path)
+    objective, known = ActionObjective(fine), float(np.sum(values))
+    efforts = carried_efforts(problem.ld, path, fine.ld)
+    model = objective.model_with(start, efforts, None)
+    gains = _gains(objective.expansion, values)
+    found = nearby_minimum(objective, start, model, known)
     if found is not None:
         return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
-    solution = solve(fine, longer)
+    solution = solve(fine, start)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
@@ -128,3 +131,16 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     inner = np.zeros((N, fine.inner_modes, n))
     inner[:, :r] = path.inner
     return DiscretePath(path.q, path.v, path.z, inner)
+
+
+def _gains(expansion: Expansion, values: Array) -> Array:
+    """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
+    N, m, n = expansion.gradient.shape
+    size = (m - 4) * n
+    g = expansion.gradient[:, 4:].reshape(N, size, 1)
+    H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, size, size)
+    # modes that an interval does not have are rows of zeros
+    absent = np.asarray(~H.any(axis=2))
+    H = H + absent[:, :, None] * np.eye(size)
+    fall = 0.5 * np.sum(g * np.linalg.solve(H, g), axis=(1, 2))
+    return np.asarray(values - expansion.values + fall)

@@ -16,20 +16,22 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.solver import Solution, minimum_at
 from hovi.trajectory_objective import ActionObjective
 
-HESSIANS = 4
+HESSIANS = 5
 """That may be factored before the search is given up."""
-CORRECTIONS = 3
-"""Steps with one Hessian."""
+CORRECTIONS = 2
+"""Further steps with one Hessian."""
 CONTRACTION = 0.3
-"""Ratio of the lengths of successive steps above which the Hessian is renewed."""
+"""Ratio of the lengths of successive steps above which the Hessian is renewed instead."""
 NEGLIGIBLE = 0.02
 """Length of a step, as a share of the whole way, that makes it the last of an approach."""
 ROUNDING = 1e-15
 """Length of a step, relative to the data, below which nothing is left to gain."""
 POLISHES = 8
 """Steps with the last Hessian until only rounding is left."""
-SETTLED = 1e-8
-"""Length of a step that may be left where it does not shrink any more."""
+SETTLED = 1e-9
+"""Length of a step that may be left where it hardly shrinks any more."""
+LONG = 3e-3
+"""Length of a step after which the Hessian is renewed in any case."""
 FAR = 1e-2
 """Length of a way beyond which the Hessian at its end is factored again: it is that which tells a
 minimum."""
@@ -58,59 +60,77 @@ class NearbyMinimum:
 
     def solution(self) -> Solution | None:
         """The minimum, as exact as rounding lets it be; None where that fails."""
-        objective, x, length = self.objective, self.path, self.last
-        model: QuadraticModel = self.model
-        factor: Factor | None = self.factor
-        if self.way > FAR:
-            model, length = objective.model(x, None, None), np.inf
-            factor = model.factor(0.0)
-        if factor is None:
-            return None
-        steps = 0
-        while steps < POLISHES:
+        objective, x, last = self.objective, self.path, self.last
+        model: QuadraticModel | None = self.model if self.way <= FAR else None
+        factor, steps, length = self.factor, self.steps, np.inf
+        for _ in range(POLISHES):
+            if model is None:
+                model, last = objective.model(x, None, None), np.inf
+                renewed = model.factor(0.0)
+                if renewed is None:
+                    return None
+                factor = renewed
             gradient = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
             step = factor.solve(-model.scatter(gradient))
-            last, length = length, objective.relative_size(x, step, model)
-            if not length < last:
-                break
+            length = objective.relative_size(x, step, model)
+            if not length <= CONTRACTION * last:
+                if length <= SETTLED:
+                    break
+                model = None
+                continue
             x, steps = objective.retract(x, step, model), steps + 1
             if length <= ROUNDING or (length * length <= ROUNDING * last and last < np.inf):
                 break
+            last = length
         if not length <= SETTLED:
             return None
         seconds = time.perf_counter() - self.began
-        return minimum_at(objective.problem, x, self.steps + steps, seconds)
+        return minimum_at(objective.problem, x, steps, seconds)
 
 
-def nearby_minimum(objective: ActionObjective, x: DiscretePath) -> NearbyMinimum | None:
+def nearby_minimum(
+    objective: ActionObjective,
+    x: DiscretePath,
+    model: QuadraticModel,
+    known: float | None = None,
+) -> NearbyMinimum | None:
     """Newton's method from a path; None where it does not contract at once.
 
+    model: the last of the objective, at the path: its curvature is best weighted with
+        carried_efforts. Later Hessians are weighted with what the steps foresee.
+    known: a cost whose difference from the minimum's has to come out well.
     Lengths are those of changes of q and T v: in a flat valley a change of the action says little
     of them.
     """
-    began, whole, steps = time.perf_counter(), 0.0, 0
+    began, whole, steps, before = time.perf_counter(), 0.0, 0, np.inf
     for _ in range(HESSIANS):
-        model = objective.model(x, None, None)
         factor = model.factor(0.0)
         if factor is None:
             return None
         value, gradient = objective.expansion.action, model.gradient
-        way, length = 0.0, np.inf
-        for _ in range(CORRECTIONS):
+        way, last, gone = 0.0, before, np.zeros_like(gradient)
+        for correction in range(CORRECTIONS + 1):
             step = factor.solve(-gradient)
-            last, length = length, objective.relative_size(x, step, model)
-            if not length <= last:
-                return None
+            length = objective.relative_size(x, step, model)
+            if not length <= (CONTRACTION if correction else 1.0) * last:
+                break
             x, steps, way = objective.retract(x, step, model), steps + 1, way + length
-            whole = max(whole, length)
-            if length <= max(NEGLIGIBLE * whole, ROUNDING) and last < np.inf:
-                value += 0.5 * float(np.vdot(gradient, step))
-                return NearbyMinimum(objective, x, value, model, factor, way, length, steps, began)
-            if length > CONTRACTION * last and last < np.inf:
+            whole, gone = max(whole, length), gone + step
+            fall = -0.5 * float(np.vdot(gradient, step))
+            near = length <= max(NEGLIGIBLE * whole, ROUNDING)
+            if near and (known is None or fall <= NEGLIGIBLE * abs(value - known)):
+                return NearbyMinimum(
+                    objective, x, value - fall, model, factor, way, length, steps, began
+                )
+            before, last = length if correction == 0 else before, length
+            if length > LONG or correction == CORRECTIONS:
                 break
             after = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
             after = model.scatter(after)
             # the trapezium rule along the step, which is right to the third order
             value += 0.5 * float(np.vdot(gradient + after, step))
             gradient = after
+        if way == 0.0:
+            return None
+        model = objective.model(x, model, gone)
     return None

@@ -1,0 +1,46 @@
+"""R tau of a solution at the points of another grid: what weights the curvature there.
+
+Torques are read at the solution's own quadrature points and interpolated in between: a curve of a
+Galerkin scheme lacks the modes beyond its own, and those vanish at its Gauss points. Elsewhere its
+torques swing about the right ones, and a Hessian that is weighted with them may be indefinite
+right beside a minimum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.grid import DiscretePath
+from hovi.lagrangian import EffortLagrangian
+from hovi.schemes.polynomials import legendre
+
+Array = npt.NDArray[np.float64]
+
+
+def carried_efforts(
+    ld: DiscreteLagrangian, path: DiscretePath, other: DiscreteLagrangian
+) -> list[Array]:
+    """R tau at the quadrature points of another grid of the same duration, (P, nv) per batch.
+
+    path: a solution on the grid of `ld`.
+    """
+    lagrangian = ld.lagrangian
+    assert isinstance(lagrangian, EffortLagrangian)
+    N, Q = ld.grid.intervals, max(len(scheme.points) for scheme, _ in ld.grid.groups)
+    series = np.zeros((N, Q, lagrangian.nv))
+    parts = zip(ld.jets(path), ld.point_times, ld.point_intervals, strict=True)
+    for jet, t, numbers in parts:
+        points = ld.grid.schemes[numbers[0]].points
+        P = legendre(2 * points - 1, len(points) - 1).T  # (points, degrees)
+        tau = lagrangian.torques.torque(*jet, t).reshape(-1, len(points), lagrangian.nv)
+        series[numbers[:: len(points)], : len(points)] = (
+            np.linalg.pinv(P) @ tau
+        )  # points may coincide
+    nodes, efforts = ld.grid.t, []
+    for t in other.point_times:
+        k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, N - 1)
+        P = legendre(2 * (t - nodes[k]) / ld.grid.steps[k] - 1, Q - 1)  # (degrees, points)
+        efforts.append(lagrangian.weight * np.einsum("jp,pjn->pn", P, series[k]))
+    return efforts
