@@ -137,6 +137,32 @@ def test_a_robot_that_floats_is_not_put_on_a_moving_base() -> None:
     assert "moving_base" not in keys
 
 
+def test_nothing_rubs_where_a_base_floats() -> None:
+    by_key = {e.key: e for e in effect_candidates(load_robot("solo8", free_flyer=True))}
+    for effect in (by_key["viscous_friction"], by_key["dry_friction"], by_key["armature"]):
+        (numbers,) = [x for x in vars(effect).values() if isinstance(x, tuple)]
+        assert numbers[:6] == (0.0,) * 6
+        assert min(numbers[6:]) > 0.0
+
+
+def test_a_study_of_continuous_joints_is_that_of_their_revolute_twins(
+    study: EffectStudy, task: Task, models: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "turning.urdf"
+    text = (models / "two_link.urdf").read_text()
+    path.write_text(text.replace('type="revolute"', 'type="continuous"'))
+    robot = load_robot(path)
+    assert robot.nq == 2 * robot.nv
+    ends = (
+        State(robot.integrate(robot.neutral(), np.asarray(end.q)))
+        for end in (task.start, task.goal)
+    )
+    turning = Task(Scene(robot, [Gravity(9.8)]), *ends, 0.4, intervals=8, limits="none")
+    for ours, theirs in zip(study_effects(turning, CANDIDATES).trials, study.trials, strict=True):
+        for key in ("torque", "cost", "tip", "open_loop", "held"):
+            assert getattr(ours, key) == pytest.approx(getattr(theirs, key), rel=1e-6, abs=1e-9)
+
+
 # The command
 
 SCENE = """robot = "two_link.urdf"

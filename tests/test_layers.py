@@ -79,7 +79,7 @@ FLOORS = [
     {"goals", "scene_account", "scene_terms"},
     {"scene"},
     {"free_fall", "discrete_lagrangian", "lagrangians"},
-    {"action_structure"},
+    {"action_structure", "charted_lagrangian"},
     {"trajectory", "segment_lagrangian", "clearance_outputs", "carried_efforts"},
     {"guess", "legendre_transforms", "motion_error", "refinement", "clearance_check"},
     {

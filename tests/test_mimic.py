@@ -188,6 +188,32 @@ def test_a_plan_of_the_panda_with_its_gripper_moves_it_as_planned(tmp_path: Path
     np.testing.assert_array_equal(again.sample(t).tau, solution.trajectory.sample(t).tau)
 
 
+def test_shapes_stand_where_those_of_the_free_robot_do() -> None:
+    """Of a robot whose leaders come after their followers in the URDF."""
+    bound, free = (load_robot("romeo", mimic=each) for each in (True, False))
+    q, follow = configurations(bound, 1, size=0.4)[0], free.neutral()
+    for name in bound.joint_names:
+        ours, theirs = (r.model.joints[r.model.getJointId(name)] for r in (bound, free))
+        follow[theirs.idx_q : theirs.idx_q + theirs.nq] = q[ours.idx_q : ours.idx_q + ours.nq]
+    for coupling in bound.couplings:
+        leader = bound.model.joints[bound.model.getJointId(coupling.leader)]
+        place = free.model.joints[free.model.getJointId(coupling.follower)].idx_q
+        follow[place] = coupling.multiplier * q[leader.idx_q] + coupling.offset
+    first, second = placed(bound, q), placed(free, follow)
+    assert len(first) == len(second) > 20
+    for name, placement in first.items():
+        np.testing.assert_allclose(placement, second[name], atol=1e-14)
+
+
+def placed(robot: Robot, q: Array) -> dict[str, Array]:
+    shapes = robot.visual
+    assert shapes is not None
+    data, places = robot.model.createData(), shapes.createData()
+    pin.updateGeometryPlacements(robot.model, data, shapes, places, q)
+    pairs = zip(shapes.geometryObjects, places.oMg, strict=True)
+    return {shape.name: np.array(place.homogeneous) for shape, place in pairs}
+
+
 def test_distances_bend_with_joints_that_follow() -> None:
     robot = load_robot("baxter", mimic=True)
     distances = Distances(robot, Clearance(Box([0.2, 0.2, 0.2], [0.9, -0.3, 0.4])))

@@ -48,6 +48,13 @@ class Chart:
         _charts.local_rates(self.space.layout, *rows, still, out)
         return out[0], out[1]
 
+    def difference_slopes(self, x: Array) -> Array:
+        """d(q1 (-) q0) / dq0 in the tangent space at q0, where x = q1 (-) q0, (P, nv, nv)."""
+        P, n = x.shape
+        each = np.tile(np.eye(n), (P, 1))
+        columns = self.rates(-np.repeat(x, n, axis=0), each)[0]  # of J(-x)^-1
+        return -columns.reshape(P, n, n).swapaxes(1, 2)
+
     def carried(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q(t) (+) x(t) for a curve q(t) with the jet (q, v, a)."""
         q, v, a = jet

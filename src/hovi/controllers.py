@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.chart import Chart
 from hovi.errors import InputError, nearest
 from hovi.robot import Robot
 from hovi.scene import Scene
@@ -51,7 +52,7 @@ class OpenLoop(Controller):
 
 @dataclass(frozen=True, eq=False)
 class ProportionalDerivative(Controller):
-    """u = tau_plan + K (q_plan - q) + D (v_plan - v). [SicilianoKhatib2016, sec. 8.3]
+    """u = tau_plan + K (q_plan (-) q) + D (v_plan - v). [SicilianoKhatib2016, sec. 8.3]
 
     stiffness: K, shape (nv,), in [N m/rad]. damping: D, shape (nv,), in [N m s/rad].
     """
@@ -72,16 +73,18 @@ class ProportionalDerivative(Controller):
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """Feedback by joint."""
         wanted = self.planned(t)
-        u = wanted.tau + self.stiffness * (wanted.q - q) + self.damping * (wanted.v - v)
-        slope = np.stack([-np.diag(self.stiffness), -np.diag(self.damping)], axis=1)
-        return u, np.broadcast_to(slope, (len(t), *slope.shape))
+        ahead, slopes = _ahead(self.plan, q, wanted.q)
+        u = wanted.tau + self.stiffness * ahead + self.damping * (wanted.v - v)
+        damped = np.broadcast_to(-np.diag(self.damping), slopes.shape)
+        return u, np.stack([self.stiffness[:, None] * slopes, damped], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
 class ComputedTorque(Controller):
-    """u = tau(q, v, a_plan + w^2 (q_plan - q) + 2 w (v_plan - v)) of the plan's own scene.
+    """u = tau(q, v, a_plan + w^2 (q_plan (-) q) + 2 w (v_plan - v)) of the plan's own scene.
 
-    Where the world is as planned, the error decays like exp(-w t) (1 + w t) in every joint.
+    Where the world is as planned, the error decays like exp(-w t) (1 + w t) in every joint; in
+    orientations as far as it is small.
     [SicilianoKhatib2016, sec. 8.5]
 
     scene: what is believed. omega: w, in [rad/s].
@@ -93,11 +96,12 @@ class ComputedTorque(Controller):
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """Inverse dynamics of the corrected acceleration."""
         wanted, w, n = self.planned(t), self.omega, v.shape[1]
-        a = wanted.a + w**2 * (wanted.q - q) + 2 * w * (wanted.v - v)
+        ahead, slopes = _ahead(self.plan, q, wanted.q)
+        a = wanted.a + w**2 * ahead + 2 * w * (wanted.v - v)
         u, J = self.scene.torques.linearize(q, v, a, t)
         J = J.reshape(len(t), n, 3, n)
-        slope = np.stack([J[:, :, 0] - w**2 * J[:, :, 2], J[:, :, 1] - 2 * w * J[:, :, 2]], axis=2)
-        return u, slope
+        by_q = J[:, :, 0] + w**2 * J[:, :, 2] @ slopes
+        return u, np.stack([by_q, J[:, :, 1] - 2 * w * J[:, :, 2]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,15 @@ class WithoutMotors(Controller):
         u, slope = (np.array(x) for x in self.driver.evaluate(q, v, t))
         u[:, self.passive], slope[:, self.passive] = 0.0, 0.0
         return u, slope
+
+
+def _ahead(plan: Trajectory, q: Array, wanted: Array) -> tuple[Array, Array]:
+    """q_plan (-) q, shape (P, nv), and its derivatives by q in the tangent space, (P, nv, nv)."""
+    if plan.space is None:
+        n = q.shape[1]
+        return wanted - q, np.broadcast_to(-np.eye(n), (len(q), n, n))
+    ahead = plan.space.difference(q, wanted)
+    return ahead, Chart(plan.space).difference_slopes(ahead)
 
 
 FEEDBACKS = ("none", "pd", "computed-torque")

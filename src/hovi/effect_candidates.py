@@ -41,8 +41,9 @@ def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
         "friction": robot.friction.any(),
         "armature": robot.armature.any(),
     }
-    rub = _rounded(FRICTION * level)
-    rotors = _rounded(ROTORS * _inertia(robot))
+    borne = _borne(robot)
+    rub = _rounded(FRICTION * level * borne)
+    rotors = _rounded(ROTORS * _inertia(robot) * borne)
     candidates: list[Effect] = [
         Gravity(),
         ViscousFriction(from_urdf=True) if stated["damping"] else ViscousFriction(rub),
@@ -57,8 +58,17 @@ def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
             Wrench(tip, (0.0, push, 0.0)),
             Drag(tip, 0.05, wind=(0.0, 5.0, 0.0)),
         ]
-    floats = any(j.shortname() == "JointModelFreeFlyer" for j in robot.model.joints)
+    floats = not borne.all()
     return tuple(e for e in candidates if not (floats and isinstance(e, MovingBase)))
+
+
+def _borne(robot: Robot) -> Array:
+    """1 for coordinates with a bearing and perhaps a motor, 0 for those of a base that floats."""
+    borne = np.ones(robot.nv)
+    for joint in robot.model.joints:
+        if joint.shortname() == "JointModelFreeFlyer":
+            borne[joint.idx_v : joint.idx_v + joint.nv] = 0.0
+    return borne
 
 
 def _efforts(robot: Robot) -> Array:

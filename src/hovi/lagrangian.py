@@ -258,30 +258,40 @@ class PotentialTerm:
 
 
 class CasadiLagrangian(Lagrangian):
-    """A Lagrangian of any order k on a vector space from a CasADi expression.
+    """A Lagrangian of any order k from a CasADi expression.
 
-    jet: symbols (q, v, a, ...), k + 1 columns of n each.
+    jet: symbols (q, v, a, ...), k + 1 columns of n each; q one of nq where there is a space.
     expression: L as a function of them. [ColomboFerraroMartin2016, section 2]
+    space: the configuration space; None where configurations are vectors.
     """
 
-    def __init__(self, jet: list[ca.SX], expression: ca.SX) -> None:
+    def __init__(
+        self, jet: list[ca.SX], expression: ca.SX, space: ConfigurationSpace | None = None
+    ) -> None:
         self.order = len(jet) - 1
         self.jet = list(jet)
         self.expression = expression
-        self._n = int(jet[0].shape[0])
-        hessian, gradient = ca.hessian(expression, ca.vertcat(*jet))
+        self._space = space
+        nothing = ca.SX(0, 1)
+        symbols = jet[0], ca.vertcat(*jet[1:]), nothing, nothing
+        hessian, gradient = tangent.hessian(expression, symbols, space)
         self._value = PointFunction(ca.Function("L", jet, [expression]))
         self._expand = PointFunction(ca.Function("L_expand", jet, [expression, gradient, hessian]))
 
     @property
     def nq(self) -> int:
         """Numbers in a configuration."""
-        return self._n
+        return int(self.jet[0].shape[0])
 
     @property
     def nv(self) -> int:
         """Degrees of freedom."""
-        return self._n
+        return int(self.jet[1].shape[0])
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The configuration space; None where configurations are vectors."""
+        return self._space
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """L at P points, shape (P,)."""

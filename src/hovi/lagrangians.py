@@ -10,15 +10,20 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi import tangent
+from hovi.configuration_space import ConfigurationSpace
+from hovi.effects.configuration_rate import configuration_rate
 from hovi.errors import InputError, SceneError
 from hovi.lagrangian import CasadiLagrangian, Lagrangian
 from hovi.moving_base_torque import inverse_dynamics
 from hovi.point_function import PointFunction
 from hovi.rigid_body import casadi_functions
-from hovi.scene import Scene
+from hovi.scene import Scene, require_known_joints
 from hovi.torque_model import times
 
 Array = npt.NDArray[np.float64]
+_PLACES = {"SE(2)": [0, 1, 5], "SO(3)": [3, 4, 5], "SE(3)": [0, 1, 2, 3, 4, 5]}
+"""Where the tangent vectors of a group stand in those of SE(3), (linear, angular)."""
 Torque = Callable[[Array], Array]
 """u(t): times (P,) in [s] -> joint efforts (P, nv) in [N m] or [N]."""
 
@@ -40,17 +45,18 @@ def mechanics(scene: Scene) -> CasadiLagrangian:
 
     A: the inertia of effects whose torque has a part A(q) a. What effects add besides, and what
     the motion of a base brings with it, are not in it: see `scene_force`.
-    Raises SceneError for joints whose configurations are not vectors, and for effects whose torque
-    depends on the acceleration in another way.
+    Raises ModelError for joints of no known kind, SceneError for effects whose torque depends on
+    the acceleration in another way.
     """
+    require_known_joints(scene.robot)
     functions = casadi_functions(scene.model)
-    q, v = _symbols(scene, 2)
+    q, v = ca.SX.sym("q", scene.robot.nq), ca.SX.sym("v", scene.robot.nv)
     L = functions.kinetic_energy(q, v) - functions.potential_energy(q)
     inertia = _added_inertia(scene)
     if inertia is not None:
         A = ca.Function("A", [scene.terms.symbols.q], [inertia])(q)
         L += ca.bilin(A, v, v) / 2
-    return CasadiLagrangian([q, v], L)
+    return CasadiLagrangian([q, v], L, _space(scene))
 
 
 def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
@@ -132,7 +138,7 @@ def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
     if resistance is None:
         return Force(scene.robot.nv, drive)
     q, v, t = scene.terms.symbols.q, scene.terms.symbols.v, scene.terms.symbols.t
-    slope = ca.jacobian(resistance, ca.vertcat(q, v))
+    slope = tangent.jacobian(resistance, (q, v, ca.SX(0, 1), t), _space(scene))
     function = ca.Function("resistance", [q, v, t], [resistance, slope])
     return Force(scene.robot.nv, drive, PointFunction(function, scene.compile))
 
@@ -150,13 +156,50 @@ def resistance_of(scene: Scene) -> ca.SX | None:
         parts.append(added if inertia is None else ca.substitute(added, a, ca.SX.zeros(a.shape)))
         if inertia is not None:
             momentum, energy = inertia @ v, ca.bilin(inertia, v, v) / 2
-            parts.append(ca.gradient(energy, q) - ca.jtimes(momentum, q, v))
+            parts.append(_slope(scene, energy) - ca.jtimes(momentum, q, _rate(scene)))
+            parts.append(_turned_back(scene, momentum))
+    if np.any(scene.model.armature):
+        parts.append(_turned_back(scene, ca.DM(np.array(scene.model.armature)) * v))
     if scene.terms.symbols.base is not None:
         # masses do not depend on where a base is: without accelerations the difference is exact
         still = ca.SX.zeros(a.shape)
         parts.append(inverse_dynamics(scene.model, scene.terms.symbols.base, q, v, still, t))
         parts.append(-inverse_dynamics(scene.model, None, q, v, still, t))
-    return sum(parts[1:], parts[0]) if parts else None
+    total = sum(parts[1:], parts[0]) if parts else None
+    return None if total is None or ca.SX(total).is_zero() else total
+
+
+def _space(scene: Scene) -> ConfigurationSpace | None:
+    return None if scene.robot.vector_joints else scene.robot.space
+
+
+def _slope(scene: Scene, energy: ca.SX) -> ca.SX:
+    """d energy / dq in the tangent space, shape (nv,)."""
+    nothing, t = ca.SX(0, 1), scene.terms.symbols.t
+    symbols = scene.terms.symbols.q, nothing, nothing, t
+    return ca.densify(tangent.jacobian(energy, symbols, _space(scene))).T
+
+
+def _rate(scene: Scene) -> ca.SX:
+    """q' of the scene's symbols, shape (nq,)."""
+    q, v = scene.terms.symbols.q, scene.terms.symbols.v
+    return v if scene.robot.vector_joints else configuration_rate(scene.model, q, v)
+
+
+def _turned_back(scene: Scene, momentum: ca.SX) -> ca.SX:
+    """ad*_v of a momentum in the body's axes, shape (nv,): zero where tangent vectors add.
+
+    The equations of Lagrange on a group are (d/dt - ad*_v) dL/dv - dL/dq = f, but inertia that
+    RNEA or an effect states as A a turns no momentum.
+    """
+    v, turned = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
+    for factor in scene.robot.space.curved:
+        i, places = factor.v, _PLACES[factor.group.name]
+        p, twist = ca.SX.zeros(6), ca.SX.zeros(6)
+        p[places], twist[places] = momentum[i], v[i]
+        moment = ca.cross(p[:3], twist[:3]) + ca.cross(p[3:], twist[3:])
+        turned[i] = ca.vertcat(ca.cross(p[:3], twist[3:]), moment)[places]
+    return turned
 
 
 def _added_inertia(scene: Scene) -> ca.SX | None:
@@ -208,6 +251,11 @@ class ForcedLagrangian(Lagrangian):
     def nq(self) -> int:
         """Numbers in a configuration."""
         return self.free.nq
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The configuration space; None where configurations are vectors."""
+        return self.free.space
 
     @property
     def nv(self) -> int:

@@ -65,14 +65,17 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
 
 
 def highest_derivative(lagrangian: Lagrangian, x: Array, p: Array) -> Array:
-    """q^(k) of p_{k-1} = dL/dq^(k)(x, q^(k)), shape (B, n) for x and p of shape (B, k, n)."""
+    """q^(k) of p_{k-1} = dL/dq^(k)(x, q^(k)), shape (B, n) for x and p of shape (B, k, n).
+
+    For k = 1 x holds configurations alone, (B, 1, nq), on groups too; q' is a velocity then.
+    """
     jet = [x[:, j] for j in range(lagrangian.order)]
 
     def system(u: Array) -> tuple[Array, Array]:
         _, gradient, hessian = lagrangian.evaluate(*jet, u)
         return gradient[:, -1] - p[:, -1], hessian[:, -1, :, -1]
 
-    u, found = newton(system, np.zeros_like(jet[0]))
+    u, found = newton(system, np.zeros_like(p[:, -1]))
     if not found.all():
         raise InputError("the Lagrangian is not regular there: dL/dq^(k) = p has no solution.")
     return u
@@ -84,7 +87,7 @@ def hamiltonian(lagrangian: Lagrangian, x: Array, p: Array) -> Array:
     H = E_L o FL^-1: mechanical energy for k = 1, Pontryagin's p.v + p~.a - L for k = 2.
     """
     top = highest_derivative(lagrangian, x, p)
-    rates = np.concatenate([x[:, 1:], top[:, None]], axis=1)
+    rates = np.concatenate([x[:, 1:, : top.shape[1]], top[:, None]], axis=1)
     jet = [*np.moveaxis(x, 1, 0), top]
     return np.asarray(np.sum(p * rates, axis=(1, 2)) - lagrangian.value(*jet))
 

@@ -12,8 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.blas_threads import one_blas_thread
+from hovi.charted_lagrangian import ChartedLagrangian
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
+from hovi.guess import regularised
 from hovi.lagrangian import CasadiLagrangian
 from hovi.lagrangians import (
     Drive,
@@ -53,12 +55,12 @@ class Simulation:
     @property
     def order(self) -> int:
         """Order of the integrator, 2 (r + 1)."""
-        assert isinstance(self.flow.ld, SchemeLagrangian)
+        assert isinstance(self.flow.ld, SchemeLagrangian | ChartedLagrangian)
         return 2 * (self.flow.ld.scheme.inner_modes + 1)
 
     @property
     def q(self) -> Array:
-        """Configurations, shape (N + 1, nv)."""
+        """Configurations, shape (N + 1, nq)."""
         return self.flow.q
 
     @property
@@ -84,9 +86,9 @@ class Simulation:
         order of the integrator.
         """
         ld = self.flow.ld
-        assert isinstance(ld, SchemeLagrangian)
+        assert isinstance(ld, SchemeLagrangian | ChartedLagrangian)
         assert isinstance(ld.lagrangian, ForcedLagrangian)
-        w = ld.regularised.w_of_z(self.flow.z)
+        w = self.flow.z  # for k = 1 both regularised coordinates are the same
         q, v = ld.jet(self.flow.x[:-1], w, self.flow.inner[:, : ld.scheme.inner_modes])
         t = (self.t[:-1, None] + ld.h * ld.scheme.points).ravel()
         done = []
@@ -100,15 +102,13 @@ class Simulation:
     def trajectory(self) -> Trajectory:
         """The motion to be replayed, plotted and saved: the cubic through (q, v) at the nodes."""
         q, v, h = self.q, self.v, self.flow.ld.h
-        N, n = len(q) - 1, q.shape[1]
-        z0 = ((q[1:] - q[:-1]) / h - v[:-1]) / h
-        z = np.stack([z0, (v[1:] - v[:-1]) / h], axis=1)
+        N, n = len(q) - 1, v.shape[1]
+        grid = Grid(np.full(N, h), (galerkin(0),) * N)
+        turned = None if self.scene.robot.vector_joints else h * self.flow.z[:, 0]
+        z = regularised(self.scene.robot, grid, q, v, turned)
         path = DiscretePath(q.copy(), v, z, np.zeros((N, 0, n)))
-        momenta = np.stack([self.momenta, np.zeros_like(q)], axis=1)
-        metadata = {"status": "simulated"}
-        return Trajectory(
-            Grid(np.full(N, h), (galerkin(0),) * N), path, momenta, self.scene, metadata
-        )
+        momenta = np.stack([self.momenta, np.zeros_like(v)], axis=1)
+        return Trajectory(grid, path, momenta, self.scene, {"status": "simulated"})
 
 
 @one_blas_thread
@@ -137,7 +137,12 @@ def simulate(
         raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
     free = mechanics(scene)
     forced = ForcedLagrangian(free, scene_force(scene, _drive(torque)))
-    ld = SchemeLagrangian(forced, galerkin(inner_modes, 1), duration / intervals)
+    table, h = galerkin(inner_modes, 1), duration / intervals
+    ld: SchemeLagrangian | ChartedLagrangian
+    if free.space is None:
+        ld = SchemeLagrangian(forced, table, h)
+    else:
+        ld = ChartedLagrangian(forced, free.space, table, h)
     q, v = as_state(start, scene.robot).on(scene.robot, "start")
     x, p = legendre(free, q, v)
     return Simulation(scene, free, flow(ld, x, p, intervals, force=True))

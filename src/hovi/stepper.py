@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from hovi.charted_lagrangian import ChartedLagrangian, ChartedSegment
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
@@ -39,14 +40,15 @@ class Flow:
     """A discrete motion from momenta.
 
     ld: the discrete Lagrangian. t: times of the nodes, shape (N + 1,), in [s].
-    x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n). p: momenta, same shape.
+    x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n); on groups q, (N + 1, 1, nq).
+    p: momenta, shape (N + 1, k, n).
     z: regularised coordinates of the intervals, shape (N, k, n).
     inner: inner modes, (N, r, n).
     rounding: what rounding of the start has grown to in q, shape (N + 1,); None when `force`d.
     symmetries: of which the momentum maps are wanted, by name.
     """
 
-    ld: SegmentLagrangian
+    ld: SegmentLagrangian | ChartedLagrangian
     t: Array
     x: Array
     p: Array
@@ -57,7 +59,7 @@ class Flow:
 
     @property
     def q(self) -> Array:
-        """Configurations at the nodes, shape (N + 1, n)."""
+        """Configurations at the nodes, shape (N + 1, nq)."""
         return self.x[:, 0]
 
     @property
@@ -96,7 +98,7 @@ class Flow:
 
 
 def flow(
-    ld: DiscreteLagrangian | SegmentLagrangian,
+    ld: DiscreteLagrangian | SegmentLagrangian | ChartedLagrangian,
     z0: State | npt.ArrayLike,
     p0: npt.ArrayLike,
     steps: int,
@@ -109,12 +111,14 @@ def flow(
     """The discrete Hamiltonian flow (x0, p0) -> (x1, p1) -> ..., F^+ o (F^-)^-1 repeated.
 
     ld: a discrete Lagrangian on a uniform grid, or that of one interval.
-    z0: start in T^(k-1)Q: a State for k = 2, or (q, q', ..., q^(k-1)) of shape (k, n).
+    z0: start in T^(k-1)Q: a State for k = 2, or (q, q', ..., q^(k-1)) of shape (k, n); on groups
+        (q,) of shape (1, nq).
     p0: momenta, shape (k, n): (p, p~) for k = 2. `legendre` gives both from (q, v, a, jerk).
     steps: how many. t0: time of the start, in [s].
     force: go on where the flow's own instability has made of the rounding of the start an error in
         q above `tolerance` (relative to the largest |q|, at least one); otherwise InputError says
-        how far the motion can be known. Optimal control is unstable both ways in time.
+        how far the motion can be known. Optimal control is unstable both ways in time. Motions
+        on groups are not watched.
     Raises InputError also for shapes that do not fit and steps that have no solution, SchemeError
     for a scheme that is not regular.
     """
@@ -124,18 +128,48 @@ def flow(
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
-    stepper = _Stepper(segment, x, p, t0)
-    watch = None if force else _Watch(segment, x, p, tolerance)
+    stepper = _stepper(segment, x, p, t0)
+    watch = None
+    if not force and not isinstance(segment, ChartedLagrangian):
+        watch = _Watch(segment, x, p, tolerance)
     records = _records(segment, x, p, steps)
     for i in range(steps):
         done = stepper.step()
         records[0][i + 1], records[1][i + 1] = stepper.x, stepper.p
         records[2][i], records[3][i, : done.inner.shape[1]] = done.z[0], done.inner[0]
-        if watch is not None:
+        if watch is not None and isinstance(done, Segment):
             watch.follow(done, stepper.x, (i + 1) * segment.h)
     t = np.asarray(t0 + np.arange(steps + 1) * segment.h)
     rounding = None if watch is None else np.array(watch.errors)
     return Flow(segment, t, *records, rounding, symmetries or {})
+
+
+def _stepper(
+    ld: SegmentLagrangian | ChartedLagrangian, x: Array, p: Array, t0: float
+) -> _Stepper | _ChartedStepper:
+    if isinstance(ld, ChartedLagrangian):
+        return _ChartedStepper(ld, x, p, t0)
+    return _Stepper(ld, x, p, t0)
+
+
+class _ChartedStepper:
+    """The state of a flow on groups, whose configurations are no sums."""
+
+    def __init__(self, ld: ChartedLagrangian, x: Array, p: Array, t0: float) -> None:
+        self.ld, self.x, self.p, self.t0 = ld, x, p, t0
+        self._segment: ChartedSegment | None = None
+        self._steps = 0
+
+    def step(self) -> ChartedSegment:
+        """One step: F^+ o (F^-)^-1."""
+        t = self.t0 + self._steps * self.ld.h
+        try:
+            segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
+        except InputError as lost:
+            raise InputError(f"the flow ends at t = {t:.6g} s: {lost}") from lost
+        self.x, self.p, self._segment = segment.x1[0], segment.p1[0], segment
+        self._steps += 1
+        return segment
 
 
 class _Stepper:
@@ -199,27 +233,30 @@ def compensated(sum_: Array, increment: Array, lost: Array) -> tuple[Array, Arra
 
 
 def _start(
-    ld: SegmentLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
+    ld: SegmentLagrangian | ChartedLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
 ) -> tuple[Array, Array]:
     """x and p as arrays (k, n). Raises InputError where they do not fit."""
     if isinstance(z0, State):
         v = np.zeros(ld.n) if z0.v is None else z0.v
         z0 = np.stack([np.asarray(z0.q, float), np.asarray(v, float)][: ld.k])
     x, p = np.array(z0, dtype=np.float64), np.array(p0, dtype=np.float64)
-    for name, array in (("z0", x), ("p0", p)):
-        if array.shape != (ld.k, ld.n) or not np.isfinite(array).all():
+    size = ld.lagrangian.nq if isinstance(ld, ChartedLagrangian) else ld.n
+    for name, array, n in (("z0", x, size), ("p0", p, ld.n)):
+        if array.shape != (ld.k, n) or not np.isfinite(array).all():
             raise InputError(
-                f"{name} needs {ld.k} rows of {ld.n} finite numbers, got shape {array.shape}."
+                f"{name} needs {ld.k} rows of {n} finite numbers, got shape {array.shape}."
             )
     return x, p
 
 
 def _records(
-    ld: SegmentLagrangian, x: Array, p: Array, steps: int
+    ld: SegmentLagrangian | ChartedLagrangian, x: Array, p: Array, steps: int
 ) -> tuple[Array, Array, Array, Array]:
     """Room for x, p, z and inner modes of all steps, the start filled in."""
     # an exact L_d may need as many inner modes as there are
-    modes = ld.scheme.inner_modes if isinstance(ld, SchemeLagrangian) else MAX_INNER_MODES
+    modes = MAX_INNER_MODES
+    if isinstance(ld, SchemeLagrangian | ChartedLagrangian):
+        modes = ld.scheme.inner_modes
     nodes, momenta = np.empty((steps + 1, *x.shape)), np.empty((steps + 1, *p.shape))
     nodes[0], momenta[0] = x, p
-    return nodes, momenta, np.empty((steps, *x.shape)), np.zeros((steps, modes, ld.n))
+    return nodes, momenta, np.empty((steps, *p.shape)), np.zeros((steps, modes, ld.n))
