@@ -269,6 +269,8 @@ def _settled(
         return outcome
     one = dataclasses.replace(options, max_iterations=1)
     again = minimize(objective, outcome.x, one, _shifted(report, len(steps)))
+    if again.stop is Stop.INTERRUPTED:
+        outcome.stop = again.stop  # whoever asked for the motion has stopped asking
     if again.stop is not Stop.STATIONARY or not again.convex:
         return outcome
     again.iterations += outcome.iterations
