@@ -41,12 +41,7 @@ Report = Callable[[int, float], None]
 CORRECTIONS = 6
 """Quasi-Newton steps that may correct the guess of a motion between other states."""
 DECREASE = 1e-9
-"""Relative decrease that the last step but one may predict, at most."""
-LAST_DECREASE = 1e-14
-"""Relative decrease that the last step may predict, at most: where the landscape bends sharply,
-motions are then within 1e-11 of a minimum whose cost was rounding alone long before."""
-
-
+"""Relative decrease of a Newton step from which on a motion is stationary but for rounding."""
 POLISHES = 8
 """Newton steps after the last round of equations, until only rounding is left."""
 
@@ -242,7 +237,7 @@ def _without_limits(
     if problem.constrained:
         return _with_equations(problem, path, options, report)
     objective = ActionObjective(problem, structure=problem.structure)
-    outcome = _settled(objective, minimize(objective, path, options, report), options, report)
+    outcome = minimize(objective, path, options, report)
     n_neg = 0 if outcome.convex else _inertia(objective, outcome)
     status, message = verdict(problem, outcome, n_neg)
     message += chart_sentence(problem, outcome.x)
@@ -250,33 +245,6 @@ def _without_limits(
     return _Answer(
         problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None, jets
     )
-
-
-def _settled(
-    objective: ActionObjective,
-    outcome: Outcome[DiscretePath],
-    options: Options,
-    report: Report | None,
-) -> Outcome[DiscretePath]:
-    """The outcome after one more Newton step, where the last one was larger than LAST_DECREASE.
-
-    Where it was larger than DECREASE, it changed nothing of the motion's own size.
-    """
-    steps, size = outcome.history, abs(outcome.value)
-    if outcome.stop is not Stop.STATIONARY or not 0 < len(steps) < options.max_iterations:
-        return outcome
-    if not LAST_DECREASE * size < steps[-1].decrease <= DECREASE * size:
-        return outcome
-    one = dataclasses.replace(options, max_iterations=1)
-    again = minimize(objective, outcome.x, one, _shifted(report, len(steps)))
-    if again.stop is Stop.INTERRUPTED:
-        outcome.stop = again.stop  # whoever asked for the motion has stopped asking
-    if again.stop is not Stop.STATIONARY or not again.convex:
-        return outcome
-    again.iterations += outcome.iterations
-    again.history = steps + again.history
-    again.saddles_left = outcome.saddles_left
-    return again
 
 
 def _with_equations(

@@ -27,8 +27,9 @@ MOST_FACTORS = 30
 """Factorisations that one subproblem may take."""
 NEAR = 1e-5
 """Relative decrease in a Newton step after which models are exact, where the last one shall be."""
-LEFT = 1e-24
-"""Relative decrease that is nothing but rounding: steps are like its square root."""
+LAST, LEFT = 1e-14, 1e-26
+"""Relative decrease that the last exact step may predict where it bends sharply, and what it may
+leave elsewhere: steps are like the square root of what they leave."""
 
 
 class Stop(StrEnum):
@@ -72,7 +73,7 @@ class Options:
     radius: first radius of the trust region, in the metric's norm.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only after the step of an exact model, one that no earlier model had a part in, that
-        leaves nothing but rounding or comes after one that predicted less than `decrease`.
+        leaves nothing but rounding.
     """
 
     decrease: float = 1e-11
@@ -228,15 +229,17 @@ def _is_last(
 ) -> bool:
     """Whether the Newton step from a stationary point may be the last: see Options.exact.
 
-    What it leaves to decrease is decrease^3 / before^2, since convergence is quadratic.
-    exact: whether the model is. before: the decrease that the Newton step before it predicted.
+    What it leaves to decrease is decrease^3 / before^2, since convergence is quadratic; where it
+    is not any more, only rounding is left.
+    exact: whether the model is. before: the decrease that the step before it predicted, infinite
+        where that was no Newton step.
     """
     size, decrease = abs(outcome.value), trial.decrease
     if not options.exact or not exact:
         return not options.exact
-    if before <= options.decrease * size or decrease > options.decrease * size:
+    if decrease <= LAST * size or decrease > min(options.decrease * size, 0.1 * before):
         return True
-    return decrease * (decrease / before) ** 2 <= LEFT * size
+    return before < math.inf and decrease * (decrease / before) ** 2 <= LEFT * size
 
 
 def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
