@@ -31,14 +31,13 @@ class Chart:
 
     def jet(self, q0: Array, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q0 (+) x(t): q0 (P, nq), x and its derivatives (P, nv)."""
-        v, a = self._rates(np.stack([x, dx, ddx], axis=1), None)
-        return self.space.integrate(q0, x), v, a
+        return self.jets_from(q0, np.stack([x, dx, ddx]))
 
     def jets_from(self, q0: Array, x: Array) -> Jet:
-        """(q, v, a) of B curves at Q points each: q0 (B, nq), (x, x', x'') (B, Q, 3, nv)."""
-        n = self.space.nv
-        v, a = self._rates(x.reshape(-1, 3, n), None)
-        return self.space.integrate(q0[:, None], x[:, :, 0]).reshape(len(v), -1), v, a
+        """As `jet` for (x, x', x''), (3, P, nv); each of q0 (B, nq) is that of P / B points."""
+        v, a = self._rates(x, None)
+        of_each = x[0].reshape(len(q0), -1, self.space.nv)
+        return self.space.integrate(q0[:, None], of_each).reshape(len(v), -1), v, a
 
     def rates(self, x: Array, v: Array, a: Array | None = None) -> tuple[Array, Array]:
         """(x', x'') of a curve that is at x with velocity v and acceleration a (zero if None)."""
@@ -58,10 +57,10 @@ class Chart:
     def carried(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q(t) (+) x(t) for a curve q(t) with the jet (q, v, a)."""
         q, v, a = jet
-        seen, turned = self._rates(np.stack([x, dx, ddx], axis=1), np.stack([v, a]))
+        seen, turned = self._rates(np.stack([x, dx, ddx]), np.stack([v, a]))
         return self.space.integrate(q, x), seen, turned
 
     def _rates(self, x: Array, carried: Array | None) -> tuple[Array, Array]:
-        out = np.empty((2, len(x), self.space.nv))
+        out = np.empty((2, *x.shape[1:]))
         _charts.rates(self.space.layout, np.ascontiguousarray(x), carried, out)
         return out[0], out[1]

@@ -2,7 +2,7 @@
 
 In an interval's chart the columns are (q0, h v0, x1, h x1', c), where q0 moves the chart as a
 whole; pulled back along the end map they become the nodal ones, (q0, h v0, q1, h v1, c).
-Everything is in the scaled variables of the scheme's table.
+Columns are in the scaled variables of the scheme's table.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class IntervalCharts:
     """The charts of some intervals of one scheme along a path.
 
     chart: of the robot. scheme: of the intervals. h: their lengths, shape (B,).
-    x: (x, h x', h^2 x'') at their quadrature points, shape (B, Q, 3, n).
+    x: (x, x', x'') at their quadrature points, shape (3, B Q, n).
     ends: (x1, h x1'), shape (B, 2, n).
     """
 
@@ -37,7 +37,8 @@ class IntervalCharts:
     @property
     def turns(self) -> Array:
         """The largest turn of an orientation in every chart, at points and ends, (B,)."""
-        x = np.concatenate([self.x[:, :, 0], self.ends[:, :1]], axis=1)
+        points = self.x[0].reshape(len(self.h), -1, self.x.shape[2])
+        x = np.concatenate([points, self.ends[:, :1]], axis=1)
         turns = [
             np.linalg.norm(x[..., [f.v.start + i for i in f.group.angular]], axis=-1).max(axis=1)
             for f in self.chart.space.curved
@@ -49,7 +50,7 @@ class IntervalCharts:
 
         gradient (P, 3 n), hessian (P, 3 n, 3 n): those of the Lagrangian at the points.
         """
-        B, n, m = len(self.h), self.x.shape[3], 4 + self.scheme.inner_modes
+        B, n, m = len(self.h), self.x.shape[2], 4 + self.scheme.inner_modes
         H = np.ascontiguousarray(hessian.reshape(-1, 3 * n, 3 * n))
         gradients, hessians = np.empty((B, m, n)), np.empty((B, m, m, n, n))
         charts = self._charts(self.scheme.nodal_table)
@@ -65,20 +66,20 @@ class IntervalCharts:
         return self._pulled(gradient, self.scheme.regular_table, True)[:, :4]
 
     def point_steps(self, step: Array) -> Array:
-        """Change of (q, h v, h^2 a) at the points in a nodal step (B, m, n), (B, Q, 3, n)."""
-        change = np.empty(self.x.shape)
+        """Change of (q, v, a) at the points in a nodal step (B, m, n), (B, Q, 3, n)."""
+        change = np.empty((len(self.h), len(self.scheme.weights), 3, self.x.shape[2]))
         charts = self._charts(self.scheme.nodal_table)
         _charts.push_steps(*charts, np.ascontiguousarray(step), change)
         return change
 
     def _pulled(self, gradient: Array, table: Array, regular: bool) -> Array:
-        pulled = np.empty((len(self.h), 4 + self.scheme.inner_modes, self.x.shape[3]))
+        pulled = np.empty((len(self.h), 4 + self.scheme.inner_modes, self.x.shape[2]))
         at_points = self._at_points(gradient)
         _charts.pull_gradient(*self._charts(table), at_points, regular, pulled)
         return pulled
 
     def _at_points(self, gradient: Array) -> Array:
-        return np.ascontiguousarray(gradient.reshape(self.x.shape))
+        return np.ascontiguousarray(gradient.reshape(self.x.shape[1], -1))
 
     def _charts(self, table: Array) -> tuple[Layout, Array, Array, Array, Array, Array]:
         """What the compiled chain rule has to know of the charts."""

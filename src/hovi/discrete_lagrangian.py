@@ -183,7 +183,7 @@ class DiscreteLagrangian:
         for i, batch in enumerate(self._batches):
             columns = step[batch.index, : 4 + batch.scheme.inner_modes]
             if expansion.charts is not None:
-                moved = expansion.charts[i].point_steps(columns) * batch.minus_powers
+                moved = expansion.charts[i].point_steps(columns)
             else:
                 moved = np.matmul(batch.step_tables[coordinates], columns)  # (B, 3 Q, n)
             steps.append(moved.reshape(len(batch.t), -1))
@@ -321,22 +321,9 @@ class DiscreteLagrangian:
         return batch.sums(value), gradient, hessian, torque
 
 
-def _points(batch: IntervalBatch, path: DiscretePath) -> Array:
-    """(x, h x', h^2 x'') of q0 (+) x at the quadrature points, shape (B, Q, 3, n)."""
-    h = batch.h[:, None]
-    r = batch.scheme.inner_modes
-    N, n = len(h), path.v.shape[1]
-    v0 = path.v[:-1][batch.index]
-    z, inner = path.z[batch.index], path.inner[batch.index, :r]
-    local = np.concatenate([(h * v0)[:, None], h[:, None] ** 2 * z, h[:, None] ** 2 * inner], 1)
-    table = batch.scheme.table
-    return np.asarray(np.matmul(table.reshape(-1, 3 + r), local).reshape(N, -1, 3, n))
-
-
 def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
     """As `_jet`, in the charts q = q0 (+) x."""
-    x = _points(batch, path) * batch.minus_powers
-    return Chart(space).jets_from(path.q[:-1][batch.index], x)
+    return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
 
 
 def _charts(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
@@ -344,4 +331,4 @@ def _charts(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalC
     h = batch.h[:, None, None]
     v0, z = path.v[:-1][batch.index], path.z[batch.index]
     ends = h * v0[:, None] + h**2 * z
-    return IntervalCharts(chart, batch.scheme, batch.h, _points(batch, path), ends)
+    return IntervalCharts(chart, batch.scheme, batch.h, batch.local(path), ends)

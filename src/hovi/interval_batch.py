@@ -55,12 +55,6 @@ class IntervalBatch:
         """h w_j per point, (B, Q)."""
         return self.h[:, None] * self.scheme.weights
 
-    @cached_property
-    def minus_powers(self) -> Array:
-        """(1, h^-1, h^-2) of every interval, (B, 1, 3, 1)."""
-        powers = self.h[:, None] ** -np.arange(3.0)
-        return np.asarray(powers[:, None, :, None])
-
     def sums(self, values: Array) -> Array:
         """h sum_j w_j L_j of every interval from L at the points, (B,)."""
         return np.asarray(np.vecdot(values.reshape(self.weights.shape), self.weights))
@@ -83,6 +77,12 @@ class IntervalBatch:
         """
         q, v, a = interpolate(self.scheme.table, self.h, self.numbers, path.arrays)
         return q, v, a
+
+    def local(self, path: DiscretePath) -> Array:
+        """(x, x', x'') of q = q0 (+) x at the quadrature points, shape (3, B Q, n)."""
+        still = np.zeros_like(path.v)
+        local = still, path.v, path.z, path.inner
+        return interpolate(self.scheme.table, self.h, self.numbers, local)
 
     def contracted(self, gradient: Array, coordinates: Coordinates) -> Array:
         """Gradient of L_d in the columns of the coordinates from that of L, shape (B, m, n)."""

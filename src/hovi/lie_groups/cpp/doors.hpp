@@ -22,20 +22,20 @@ struct Space {
   const Part* part;
 };
 
-// The charts of intervals of one scheme; everything is in the scaled variables of its table.
+// The charts of intervals of one scheme.
 struct Charts {
   Space space;
   std::size_t intervals, points, columns;  // B, Q, m
   const double* table;                     // (Q, 3, m)
   const double* weights;                   // (Q)
   const double* steps;                     // (B)
-  const double* x;                         // (x, h x', h^2 x''), (B, Q, 3, n)
+  const double* x;                         // (x, x', x''), (3, B, Q, n)
   const double* ends;                      // (x1, h x1'), (B, 2, n)
 };
 
 struct ChartDoors {
   // v = J x' and a = J x'' + J' x' at P points; of q(t) (+) x(t) where carried holds v and a of
-  // q(t), (2, P, n), or nothing. x: (P, 3, n). v, a: (P, n).
+  // q(t), (2, P, n), or nothing. x: (3, P, n). v, a: (P, n).
   void (*rates)(const Space& space, std::size_t points, const double* x, const double* carried,
                 double* v, double* a);
 
@@ -57,7 +57,7 @@ struct ChartDoors {
   void (*pull_gradient)(const Charts& charts, const double* gradient, bool regular, double* workspace,
                double* columns_gradient);
 
-  // Change of (q, h v, h^2 a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n).
+  // Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n).
   void (*push_steps)(const Charts& charts, const double* step, double* workspace, double* change);
 };
 

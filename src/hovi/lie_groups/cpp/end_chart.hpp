@@ -15,7 +15,7 @@ struct EndVariation {
 
   explicit EndVariation(const Vector<Curve>& x) : at_end(x) {
     inverse_J = inverse(at_end.J);
-    x_by[0] = -1.0 * (inverse_J * at_end.carried_back), x_by[1] = inverse_J;
+    x_by[0] = -1.0 * (inverse_J * at_end.back), x_by[1] = inverse_J;
     for (std::size_t i = 0; i < 2; ++i) dx_by[i] = -1.0 * (inverse_J * (at_end.K * x_by[i]));
   }
 };
@@ -49,7 +49,7 @@ struct EndBend {
       for (std::size_t i = 0; i <= j; ++i)
         at[i][j] = -1.0 * (transposed(*x_by[i]) * x + transposed(*dx_by[i]) * dx);
     }
-    at[0][1] = at[0][1] + 0.5 * (transposed(end.at_end.carried_back) * cross(force_q, identity()));
+    at[0][1] = at[0][1] + 0.5 * (transposed(end.at_end.back) * cross(force_q, identity()));
     for (std::size_t j = 0; j < 3; ++j)
       for (std::size_t i = 0; i < j; ++i) at[j][i] = transposed(at[i][j]);
   }

@@ -39,9 +39,9 @@ hovi::Space space_of(const Layout& layout, std::size_t nq, std::size_t nv) {
 }
 
 Charts charts_of(const Layout& layout, const Input<3>& table, const Input<1>& weights,
-                 const Input<1>& steps, const Input<4>& x, const Input<3>& ends) {
-  return {space_of(layout, 0, x.shape(3)), x.shape(0),   x.shape(1), table.shape(2),
-          table.data(),                    weights.data(), steps.data(), x.data(), ends.data()};
+                 const Input<1>& steps, const Input<3>& x, const Input<3>& ends) {
+  return {space_of(layout, 0, x.shape(2)), steps.shape(0),  table.shape(0), table.shape(2),
+          table.data(),                    weights.data(), steps.data(),   x.data(), ends.data()};
 }
 
 void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
@@ -56,7 +56,7 @@ void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
 
 void rates(const Layout& layout, const Input<3>& x, const std::optional<Input<3>>& carried,
            const Output<3>& out) {
-  const std::size_t points = x.shape(0), n = x.shape(2);
+  const std::size_t points = x.shape(1), n = x.shape(2);
   const hovi::Space space = space_of(layout, 0, n);
   const nb::gil_scoped_release released;
   doors().rates(space, points, x.data(), carried ? carried->data() : nullptr, out.data(),
@@ -73,8 +73,8 @@ void local_rates(const Layout& layout, const Input<2>& x, const Input<2>& v, con
 }
 
 void expand(const Layout& layout, const Input<3>& table, const Input<1>& weights,
-            const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
-            const Input<4>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
+            const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
+            const Input<2>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
             const Output<5>& columns_hessian, bool portable) {
   const Charts charts = charts_of(layout, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;
@@ -84,8 +84,8 @@ void expand(const Layout& layout, const Input<3>& table, const Input<1>& weights
 }
 
 void pull_gradient(const Layout& layout, const Input<3>& table, const Input<1>& weights,
-                   const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
-                   const Input<4>& gradient, bool regular, const Output<3>& columns_gradient) {
+                   const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
+                   const Input<2>& gradient, bool regular, const Output<3>& columns_gradient) {
   const Charts charts = charts_of(layout, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;
   const auto work = room(doors().workspace(charts));
@@ -93,7 +93,7 @@ void pull_gradient(const Layout& layout, const Input<3>& table, const Input<1>& 
 }
 
 void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& weights,
-                const Input<1>& steps, const Input<4>& x, const Input<3>& ends,
+                const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
                 const Input<3>& step, const Output<4>& change) {
   const Charts charts = charts_of(layout, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;

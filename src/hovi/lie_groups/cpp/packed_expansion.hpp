@@ -270,7 +270,7 @@ inline void push_ends(const Intervals& intervals, Pack* step) {
   }
 }
 
-// A step in the charts' columns as that of (q, h v, h^2 a) at a point, (3, n) of (4, n).
+// A step in the charts' columns as that of (q, v, a) at a point, (3, n) of (4, n).
 inline void push_point(const Intervals& intervals, std::size_t q, const Pack* step, Pack* change) {
   const std::size_t n = intervals.dof(), m = intervals.charts.columns;
   const double* const table = intervals.charts.table + 3 * q * m;
@@ -294,6 +294,8 @@ inline void push_point(const Intervals& intervals, std::size_t q, const Pack* st
       push<Group>(PointJacobian<Group>(intervals.variation<Group>(q, part.v)), own, n);
     });
   }
+  const Pack over = 1.0 / intervals.h;
+  for (std::size_t i = 0; i < n; ++i) change[n + i] *= over, change[2 * n + i] *= over * over;
 }
 
 void push_steps(const Charts& charts, const double* step, double* workspace, double* change) {

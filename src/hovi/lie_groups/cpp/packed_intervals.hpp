@@ -63,9 +63,12 @@ struct Intervals {
   template <typename Group>
   Variation variation(std::size_t q, std::size_t place) const {
     Pack x[3][Group::k];
-    const std::size_t n = dof(), stride = 3 * charts.points * n;
-    for (std::size_t r = 0; r < 3; ++r)
-      read(charts.x + (3 * q + r) * n + place, stride, rows, Group::k, x[r]);
+    const std::size_t n = dof(), stride = charts.points * n;
+    for (std::size_t r = 0; r < 3; ++r) {
+      const double* const from = charts.x + r * charts.intervals * stride;
+      read(from + q * n + place, stride, rows, Group::k, x[r]);
+    }
+    for (std::size_t i = 0; i < Group::k; ++i) x[1][i] *= h, x[2][i] *= h * h;
     return Variation(curve<Group>(x[0], x[1], x[2]));
   }
 

@@ -84,13 +84,14 @@ inline void rates_of(std::size_t n, const Rows& rows, const double* x, const dou
                      std::size_t points, double* v, double* a) {
   constexpr std::size_t k = Group::k;
   Pack in[3][k], out[k];
-  for (std::size_t r = 0; r < 3; ++r) read(x + r * n, 3 * n, rows, k, in[r]);
-  const Variation at(curve<Group>(in[0], in[1], in[2]));
+  for (std::size_t r = 0; r < 3; ++r) read(x + r * points * n, n, rows, k, in[r]);
+  const Motion at(curve<Group>(in[0], in[1], in[2]));
   Vector<Dual> velocity = at.v, acceleration = at.a;
   if (carried) {
     for (std::size_t r = 0; r < 2; ++r) read(carried + r * points * n, n, rows, k, in[r]);
-    const Vector<Dual> seen = at.carried_back * motion<Group>(in[0]);
-    acceleration = at.carried_back * motion<Group>(in[1]) + acceleration - cross(velocity, seen);
+    const Matrix<Dual> back = at.carried_back();
+    const Vector<Dual> seen = back * motion<Group>(in[0]);
+    acceleration = back * motion<Group>(in[1]) + acceleration - cross(velocity, seen);
     velocity = seen + velocity;
   }
   read<Group>(velocity, out), write(out, k, rows, n, v);
@@ -101,8 +102,8 @@ inline void flat_rates(const Part& part, std::size_t n, std::size_t points, cons
                        const double* carried, double* v, double* a) {
   for (std::size_t p = 0; p < points; ++p)
     for (std::int64_t i = part.v; i < part.v + part.size; ++i) {
-      v[p * n + i] = x[(3 * p + 1) * n + i];
-      a[p * n + i] = x[(3 * p + 2) * n + i];
+      v[p * n + i] = x[(points + p) * n + i];
+      a[p * n + i] = x[(2 * points + p) * n + i];
       if (!carried) continue;
       v[p * n + i] += carried[p * n + i];
       a[p * n + i] += carried[(points + p) * n + i];

@@ -29,26 +29,38 @@ inline auto coefficient(const Array& array) {
   return each(array, [](const auto& number) { return powers<1>(number, power); });
 }
 
-// First variations of (q, v, a), blocks of one group: v = J x', z = J dx, and K = J' + [v, J] is
-// how v depends on x.
-struct Variation {
+// The point itself: J along the curve, v = J x' and a.
+struct Motion {
   Turning turning;
-  Matrix<Dual> J, J1, J2;  // J and its rates
+  Matrix<Curve> jacobian;
+  Matrix<Truncated<2>> J_along;
+  Vector<Truncated<2>> v_along;
+  Matrix<Dual> J;
   Vector<Dual> v, a;
-  Matrix<Dual> K, K1, carried_back;  // K, its rate, and Ad of exp(-x)
 
-  explicit Variation(const Vector<Curve>& x) : turning(x) {
-    const auto head = [](const Curve& number) { return powers<2>(number); };
+  explicit Motion(const Vector<Curve>& x) : turning(x), jacobian(right_jacobian(turning)) {
+    J_along = each(jacobian, [](const Curve& number) { return powers<2>(number); });
+    v_along = J_along * each(x, [](const Curve& number) { return rate(number); });
+    J = coefficient<0>(jacobian);
+    v = coefficient<0>(v_along), a = coefficient<1>(v_along);
+  }
+
+  // Ad of exp(-x).
+  Matrix<Dual> carried_back() const {
+    return identity() + -1.0 * cross(coefficient<0>(turning.x), J);
+  }
+};
+
+// First variations of (q, v, a), blocks of one group: z = J dx, and K = J' + [v, J] is how v
+// depends on x.
+struct Variation : Motion {
+  Matrix<Dual> J1, J2, K, K1, back;  // the rates of J, K and its rate, and carried_back
+
+  explicit Variation(const Vector<Curve>& x) : Motion(x), back(carried_back()) {
     const auto slope = [](const Curve& number) { return rate(number); };
-    const Matrix<Curve> jacobian = right_jacobian(turning);
-    const Matrix<Truncated<2>> along = each(jacobian, head);
-    const Vector<Truncated<2>> velocity = along * each(x, slope);
-    const Matrix<Truncated<2>> bent = each(jacobian, slope) + cross(velocity, along);
-    J = coefficient<0>(jacobian), J1 = coefficient<1>(jacobian);
-    J2 = 2.0 * coefficient<2>(jacobian);
-    v = coefficient<0>(velocity), a = coefficient<1>(velocity);
+    const Matrix<Truncated<2>> bent = each(jacobian, slope) + cross(v_along, J_along);
+    J1 = coefficient<1>(jacobian), J2 = 2.0 * coefficient<2>(jacobian);
     K = coefficient<0>(bent), K1 = coefficient<1>(bent);
-    carried_back = identity() + -1.0 * cross(coefficient<0>(x), J);
   }
 };
 
@@ -62,7 +74,7 @@ struct PointJacobian {
   Square<Group> carried_back, J, K, K1, J1_K;
 
   explicit PointJacobian(const Variation& by)
-      : carried_back(linear<Group>(by.carried_back)),
+      : carried_back(linear<Group>(by.back)),
         J(linear<Group>(by.J)),
         K(linear<Group>(by.K)),
         K1(linear<Group>(by.K1)),
@@ -95,13 +107,13 @@ struct PointBend {
     const Matrix<Dual> z_dz = cross(n_a, by_v);
     const Matrix<Dual> P = 0.5 * (zz + transposed(zz));
     const Matrix<Dual> Q = 0.5 * (cross(n_v, one) + z_dz + transposed(z_dz));
-    const Matrix<Dual> R = 0.5 * cross(n_a, one), back = transposed(by.J);
-    const Matrix<Dual> half = back * (0.5 * (P * by.J) + Q * by.J1 + R * by.J2);
+    const Matrix<Dual> R = 0.5 * cross(n_a, one), J_T = transposed(by.J);
+    const Matrix<Dual> half = J_T * (0.5 * (P * by.J) + Q * by.J1 + R * by.J2);
     x_x = half + transposed(half) + coefficient<2>(M);
-    x_dx = back * (Q * by.J + 2.0 * (R * by.J1)) + coefficient<1>(M);
-    x_ddx = back * (R * by.J) + 0.5 * coefficient<0>(M);
+    x_dx = J_T * (Q * by.J + 2.0 * (R * by.J1)) + coefficient<1>(M);
+    x_ddx = J_T * (R * by.J) + 0.5 * coefficient<0>(M);
     dx_dx = coefficient<0>(M);
-    base_x = -0.5 * (transposed(by.carried_back) * cross(n_q, by.J));
+    base_x = -0.5 * (transposed(by.back) * cross(n_q, by.J));
   }
 };
 
