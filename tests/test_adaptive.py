@@ -9,7 +9,6 @@ from hovi.adaptive import refine_to_tolerance, solve_to_tolerance
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
 from hovi.error_estimate import finer_than
-from hovi.errors import InputError
 from hovi.finer_solution import FinerSolution
 from hovi.grid import Grid
 from hovi.known_error import ROUNDING
@@ -282,8 +281,3 @@ def test_the_tolerance_of_limits_is_not_passed_over(arm_scene: Scene) -> None:
     assert (found.success, accuracy.reached) == (True, False)
     assert accuracy.error >= 1e-4
     assert "stopped early" in found.message
-
-
-def test_a_duration_that_is_free_has_no_tolerance(arm_scene: Scene) -> None:
-    with pytest.raises(InputError, match="find the best duration first"):
-        plan(arm_scene, HANG, REACH_Q, (0.5, 2.0), limits="none", tolerance=1e-6)

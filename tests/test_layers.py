@@ -114,7 +114,7 @@ FLOORS = [
     {"error_estimate"},
     {"known_error", "certificate", "ladder", "inactive_limits"},
     {"next_grid"},
-    {"adaptive"},
+    {"adaptive", "free_to_tolerance"},
     {"planner", "effect_candidates"},
     {"task_plan"},
     {"effect_study"},

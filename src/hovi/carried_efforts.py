@@ -35,9 +35,8 @@ def carried_efforts(
         points = ld.grid.schemes[numbers[0]].points
         P = legendre(2 * points - 1, len(points) - 1).T  # (points, degrees)
         tau = lagrangian.torques.torque(*jet, t).reshape(-1, len(points), lagrangian.nv)
-        series[numbers[:: len(points)], : len(points)] = (
-            np.linalg.pinv(P) @ tau
-        )  # points may coincide
+        inverse = np.linalg.pinv(P)  # points may coincide
+        series[numbers[:: len(points)], : len(points)] = inverse @ tau
     nodes, efforts = ld.grid.t, []
     for t in other.point_times:
         k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, N - 1)

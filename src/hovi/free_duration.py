@@ -54,34 +54,61 @@ class FreeDuration:
         return float(np.sqrt(self.lower * self.upper))
 
 
-def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
+@dataclass(frozen=True, eq=False)
+class BestDuration:
+    """The motion at the best duration, its cost without w T.
+
+    steps: of the optimiser, in all solves. ending: what is to be said before the duration.
+    """
+
+    free: FreeDuration
+    solution: Solution
+    steps: int
+    ending: str
+
+    def with_time(self) -> Solution:
+        """The motion as a solution whose cost includes w T."""
+        best, weight = self.solution, self.free.weight
+        T = best.trajectory.duration
+        cost = best.cost + weight * T
+        message = f"{best.message} {self.ending} {T:.10g} s."
+        if best.success:
+            message = (
+                f"a minimum of cost {cost:.10g}, {weight * T:.6g} of it for time, after "
+                f"{self.steps} steps. {self.ending} {T:.10g} s."
+            )
+        minima = (cost,) if best.success else ()
+        return dataclasses.replace(
+            best, cost=cost, message=message, nit=self.steps, minima=minima, history=()
+        )
+
+
+def best_duration(
+    free: FreeDuration, solve: SolveFor, first: Solution, stride: float = STRIDE
+) -> BestDuration:
     """A motion whose duration is a local minimum of cost + w T between the bounds.
 
     first: a solution for some duration between them; its valley is followed.
-    The cost of the answer includes w T. A motion that is not a minimum is returned as it is.
+    stride: ratio of the first two durations; its square is the next, up to STRIDE.
+    A motion that is not a minimum is returned as it is.
     """
-    search = _Search(free, solve, first)
+    search = _Search(free, solve, first, stride)
     best = search.run()
-    T = best.trajectory.duration
-    cost = best.cost + free.weight * T
-    message = f"{best.message} {search.ending} {T:.10g} s."
-    if best.success:
-        message = (
-            f"a minimum of cost {cost:.10g}, {free.weight * T:.6g} of it for time, after "
-            f"{search.steps} steps. {search.ending} {T:.10g} s."
-        )
-    minima = (cost,) if best.success else ()
-    return dataclasses.replace(
-        best, cost=cost, message=message, nit=search.steps, minima=minima, history=()
-    )
+    return BestDuration(free, best, search.steps, search.ending)
+
+
+def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
+    """As best_duration, with a cost that includes w T."""
+    return best_duration(free, solve, first).with_time()
 
 
 class _Search:
     """A bracket by strides from the first duration, then Brent's root of J' + w."""
 
-    def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution) -> None:
+    def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution, stride: float) -> None:
         self.free = free
         self.solve = solve
+        self.stride = stride
         self.best = first
         self.steps = first.nit
         self.ending = "The best duration is" if first.success else "The duration is"
@@ -95,7 +122,8 @@ class _Search:
             if bound == T:
                 self.ending = "The duration is kept at its bound,"
                 break
-            further = T / STRIDE if slope > 0 else T * STRIDE
+            further = T / self.stride if slope > 0 else T * self.stride
+            self.stride = min(self.stride**2, STRIDE)
             further = float(np.clip(further, self.free.lower, self.free.upper))
             try:
                 next_slope = self.at(further)

@@ -17,7 +17,8 @@ from hovi.blas_threads import one_blas_thread
 from hovi.clearance import MARGIN, Clearance
 from hovi.errors import ChartError, InputError, SceneError
 from hovi.frame_goal import FrameGoal
-from hovi.free_duration import FreeDuration, solve_duration
+from hovi.free_duration import FreeDuration, SolveFor, solve_duration
+from hovi.free_to_tolerance import free_to_tolerance
 from hovi.goals import Via
 from hovi.grid import Grid
 from hovi.inactive_limits import far_from_limits, with_limits_again, without_limits
@@ -116,10 +117,6 @@ def plan(
     free = _free(duration, time_weight, via)
     if free is not None:
         _require_timeless(scene)
-    if wanted is not None and free is not None:
-        raise InputError(
-            "a tolerance is for a given duration: find the best duration first, and plan with it."
-        )
     T = duration if free is None else free.first
     passed = tuple(sorted(via, key=lambda each: each.time))
     if wanted is None:
@@ -200,7 +197,7 @@ class _Search:
         if search.interrupted:
             if job is not self.fine or self.tolerance is not None or self.free is not None:
                 found = _interrupted(found[:1])
-        elif self.tolerance is not None:
+        elif self.tolerance is not None and self.free is None:
             found = self._refine_to(self.tolerance, found)
         elif job is not self.fine:
             found = self._climbed(self.fine, self._refine(found), guess)
@@ -276,21 +273,22 @@ class _Search:
                 break
             which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
             known = dataclasses.replace(solution, problem=_on_grid_of(problem, solution))
-            refine = partial(
-                refine_to_tolerance,
-                tolerance=tolerance,
-                max_iterations=self.fine.max_iterations,
-                told=partial(self._tell, which),
-            )
-            left = self._left()
-            better = None
-            if far_from_limits(known):
-                better = with_limits_again(refine(without_limits(known), time_limit=left), known)
-            if better is None:
-                left = self._left()
-                better = refine(known, time_limit=left)
-            refined.append(better)
+            refined.append(self._refined(tolerance, which, known))
         return distinct(refined)
+
+    def _refined(self, tolerance: Tolerance, which: str, known: Solution) -> Solution:
+        """A minimum that knows its problem to a tolerance; limits that are far do not limit it."""
+        refine = partial(
+            refine_to_tolerance,
+            tolerance=tolerance,
+            max_iterations=self.fine.max_iterations,
+            told=partial(self._tell, which),
+        )
+        better = None
+        if far_from_limits(known):
+            free = refine(without_limits(known), time_limit=self._left())
+            better = with_limits_again(free, known)
+        return refine(known, time_limit=self._left()) if better is None else better
 
     def _tell(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
@@ -303,23 +301,32 @@ class _Search:
     def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
         """Every motion with the duration that is best for it, the cheapest first."""
 
-        def solve_for(T: float, guess: Trajectory) -> Solution:
-            steps = self.fine.grid.steps * (T / self.fine.grid.duration)
-            grid = Grid(steps, self.fine.grid.schemes)
-            problem = dataclasses.replace(self.fine, grid=grid).problem()
-            left = self._left()
-            iterations = self.fine.max_iterations
-            return solve(problem, guess, max_iterations=iterations, time_limit=left)
-
         freed: list[Solution] = []
         for i, solution in enumerate(found):
             late = self.deadline is not None and time.monotonic() > self.deadline
             if freed and (late or freed[-1].status is Status.INTERRUPTED):
                 break
-            self.progress(f"best duration of {i + 1} of {len(found)} motions", 0.9)
+            which = f"{i + 1} of {len(found)} motions"
+            self.progress(f"best duration of {which}", 0.9)
+            solve_for = self._on_grid(self.fine.grid)
             first = solve_for(free.first, solution.trajectory)
-            freed.append(solve_duration(free, solve_for, first))
+            if self.tolerance is None:
+                freed.append(solve_duration(free, solve_for, first))
+                continue
+            refine = partial(self._refined, self.tolerance, f"{which}: ")
+            freed.append(free_to_tolerance(free, self._on_grid, refine, first))
         return distinct(freed)
+
+    def _on_grid(self, grid: Grid) -> SolveFor:
+        """What solves on a grid that is stretched to a duration."""
+
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
+            problem = dataclasses.replace(self.fine, grid=stretched).problem()
+            left = self._left()
+            return solve(problem, guess, max_iterations=self.fine.max_iterations, time_limit=left)
+
+        return solve_for
 
 
 def _check_kinds(scene: Any, via: Any) -> None:

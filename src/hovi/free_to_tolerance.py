@@ -1,0 +1,61 @@
+"""A free duration and a tolerance at once.
+
+By turns, the best duration on a grid, and a grid that is fine enough for the motion of that
+duration: a finer grid hardly moves the duration, and another duration hardly asks for another grid.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+from hovi.free_duration import BestDuration, FreeDuration, SolveFor, best_duration
+from hovi.grid import Grid
+from hovi.solver import Solution
+from hovi.tolerance import Round
+
+OnGrid = Callable[[Grid], SolveFor]
+"""What solves on a grid that is stretched to a duration."""
+Refine = Callable[[Solution], Solution]
+"""The motion within the tolerance, for its duration; on its own grid where that is fine enough."""
+
+TURNS = 4
+"""Grids on which the best duration is looked for."""
+STRIDE = 1.001
+"""Ratio of the first two durations that are tried on a finer grid."""
+
+
+def free_to_tolerance(
+    free: FreeDuration, on_grid: OnGrid, refine: Refine, first: Solution
+) -> Solution:
+    """A motion whose duration is the best one on a grid that brings it within a tolerance.
+
+    first: a solution for some duration between the bounds, on a coarse grid.
+    The accuracy is that of the motion among those of its duration, relative in the cost without
+    w T. That J' + w vanishes on the grid and not in the limit costs the square of a small error.
+    """
+    found = best_duration(free, on_grid(first.trajectory.grid), first)
+    steps, rounds = found.steps, tuple[Round, ...]()
+    for turn in range(TURNS):
+        if not found.solution.success:
+            return dataclasses.replace(found, steps=steps).with_time()
+        refined = refine(found.solution)
+        assert refined.accuracy is not None
+        rounds += refined.accuracy.rounds
+        steps += sum(done.nit for done in refined.accuracy.rounds[1:])
+        settled = refined.trajectory.grid is found.solution.trajectory.grid
+        if settled or not refined.accuracy.reached or turn == TURNS - 1:
+            break
+        grid = refined.trajectory.grid
+        found = best_duration(free, on_grid(grid), refined, STRIDE)
+        steps += found.steps - refined.nit
+    return _told(BestDuration(free, refined, steps, found.ending), rounds)
+
+
+def _told(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
+    """The motion with all rounds, and with its accuracy in the message."""
+    solution = found.with_time()
+    assert solution.accuracy is not None
+    accuracy = dataclasses.replace(solution.accuracy, rounds=rounds)
+    message = f"{solution.message.removesuffix('.')}; {accuracy}"
+    return dataclasses.replace(solution, message=message, accuracy=accuracy)
