@@ -19,6 +19,7 @@ from finite_differences import derivative, derivative_per_point
 from hovi.charted_lagrangian import ChartedLagrangian
 from hovi.cli import main
 from hovi.controllers import FEEDBACKS, controller
+from hovi.coupled_model import Coupling, coupled
 from hovi.dynamics_replay import chart_rates
 from hovi.effects import Effect, Gravity, SceneSymbols, ViscousFriction
 from hovi.errors import InputError
@@ -111,8 +112,15 @@ def off(motion: object, expected: tuple[Array, Array]) -> float:
 # Against SciPy
 
 
+def gripper() -> pin.Model:
+    """A floating body with a finger that turns and one that slides as that turns."""
+    model = chain([pin.JointModelFreeFlyer(), pin.JointModelRX(), pin.JointModelPY()])
+    return coupled(model, [Coupling("j2", "j1", -0.8, 0.1)])
+
+
 CASES = {
     "a free body": lambda: Scene(rigid_body(MOMENTS)),
+    "a floating gripper": lambda: Scene(load_robot(gripper()), [Gravity()]),
     "a heavy top": lambda: Scene(load_robot(chain([pin.JointModelSpherical()])), [Gravity()]),
     **{
         f"an arm on a {base} base": (

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from finite_differences import derivative
+from finite_differences import derivative, derivative_per_point
 from hovi.effects import Gravity
-from hovi.errors import InputError, SceneError
+from hovi.errors import InputError, ModelError
+from hovi.lagrangian import CasadiLagrangian
 from hovi.lagrangians import mechanics, riemannian_cubic, spline
 from hovi.robot import load_robot
 from hovi.scene import Scene
+from manifold_robots import BASES, configurations, half_turning, with_arm
 
 Array = npt.NDArray[np.float64]
 
@@ -73,6 +77,47 @@ def test_a_spline_is_half_the_square_of_the_last_derivative(k: int) -> None:
 def test_what_makes_no_lagrangian_is_refused() -> None:
     with pytest.raises(InputError, match="n >= 1 and k >= 1"):
         spline(0)
-    floating = Scene(load_robot("solo8"))
-    with pytest.raises(SceneError, match="are not vectors"):
-        riemannian_cubic(floating)
+    halfway = Scene(load_robot(half_turning()))
+    for ready_made in (mechanics, riemannian_cubic):
+        with pytest.raises(ModelError, match="cannot be planned on"):
+            ready_made(halfway)
+
+
+@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("make", [mechanics, riemannian_cubic])
+def test_derivatives_on_groups_are_those_along_the_group(
+    make: Callable[[Scene], CasadiLagrangian], base: str
+) -> None:
+    robot = load_robot(with_arm(base))
+    L = make(Scene(robot, [Gravity()]))
+    k, q = L.order, configurations(robot, 3)
+    rates = [*np.random.default_rng(0).normal(size=(k, 3, robot.nv))]
+    _, gradient, hessian = L.evaluate(q, *rates)
+    zero = np.zeros((3, robot.nv))
+
+    def moved(j: int, x: Array) -> list[Array]:
+        jet = [q, *rates]
+        jet[j] = robot.integrate(q, x) if j == 0 else jet[j] + x
+        return jet
+
+    for j in range(k + 1):
+        slope = derivative_per_point(lambda x, j=j: L.value(*moved(j, x)), zero)
+        np.testing.assert_allclose(gradient[:, j], slope, rtol=1e-8, atol=1e-8)
+        bent = derivative_per_point(lambda x, j=j: L.gradient(*moved(j, x))[:, 1:], zero)
+        np.testing.assert_allclose(hessian[:, 1:, :, j], bent, rtol=1e-7, atol=1e-7)
+
+
+def test_the_cubic_of_a_floating_robot_squares_the_force_that_it_takes() -> None:
+    robot = load_robot(with_arm("free-flyer"))
+    q = configurations(robot, 3)
+    v, a = np.random.default_rng(0).normal(size=(2, 3, robot.nv))
+    model = robot.model.copy()
+    model.gravity.linear = np.zeros(3)
+    data = model.createData()
+    for one, value in zip(
+        zip(q, v, a, strict=True), riemannian_cubic(Scene(robot)).value(q, v, a), strict=True
+    ):
+        force = pin.rnea(model, data, *one)
+        upper = np.triu(pin.crba(model, data, one[0]))
+        mass = upper + np.triu(upper, 1).T
+        assert value == pytest.approx(force @ np.linalg.solve(mass, force) / 2, rel=1e-12)

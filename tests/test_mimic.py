@@ -12,10 +12,10 @@ import pytest
 
 from finite_differences import derivative_per_point
 from hovi.clearance import Clearance
-from hovi.coupled_model import Coupling, coupled
+from hovi.coupled_model import Coupling, Pull, coupled, uncoupled
 from hovi.distances import Distances
 from hovi.dynamics_replay import replay_dynamics
-from hovi.effects import Gravity, MovingBase
+from hovi.effects import Drag, Gravity, MovingBase, Payload, Wrench
 from hovi.errors import ModelError, SceneError
 from hovi.limits import urdf_limits
 from hovi.mimic_joints import read_couplings
@@ -111,6 +111,24 @@ def test_a_base_that_rises_faster_and_faster_feels_like_gravity() -> None:
     lifted = Scene(robot, [MovingBase((0.0, 0.0, "4.905*t**2"))])
     q, v, a = points(robot)
     close(lifted.torques.torque(q, v, a), rnea(Scene(robot, [Gravity(9.81)]), q, v, a), 1e-12)
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_effects_reach_what_leads_through_what_follows(name: str) -> None:
+    """The torques of the robot without mimics, added up as virtual work does."""
+    bound, free = mimicking(name), load_robot(chain(CHAINS[name][0]))
+    last = f"b{len(CHAINS[name][0]) - 1}"
+    effects = [
+        Gravity(),
+        Payload(last, 0.7, (0.1, 0.2, 0.3)),
+        Wrench(last, (1.0, 2.0, 3.0), (0.3, 0.2, 0.1)),
+        Drag(last, 0.3, wind=(0.0, 5.0, 0.0)),
+    ]
+    q, v, a = points(bound)
+    pull = Pull.of(bound.model, uncoupled(bound.model))
+    of_all = pull.configurations(q), v @ pull.matrix.T, a @ pull.matrix.T
+    expected = Scene(free, effects).inverse_dynamics(*of_all) @ pull.matrix
+    close(Scene(bound, effects).inverse_dynamics(q, v, a), expected, 1e-13)
 
 
 # Plans

@@ -64,16 +64,17 @@ def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
 
     With D_t v = M^-1 (M a + C(q, v) v), the acceleration that needs no torque taken away.
     Effects count only as far as they change the masses (armature).
-    Raises SceneError for joints whose configurations are not vectors.
+    Raises ModelError for joints of no known kind.
     [NoakesHeinzingerPaden1989; ColomboFerraroMartin2016, equation of special Lagrangians]
     """
     model = scene.model.copy()
     model.gravity.linear = np.zeros(3)
     functions = casadi_functions(model)
-    q, v, a = _symbols(scene, 3)
+    require_known_joints(scene.robot)
+    q, (v, a) = ca.SX.sym("q", scene.robot.nq), (ca.SX.sym(x, scene.robot.nv) for x in "va")
     force = functions.inverse_dynamics(q, v, a)
     covariant = ca.solve(functions.mass_matrix(q), force)
-    return CasadiLagrangian([q, v, a], ca.dot(force, covariant) / 2)
+    return CasadiLagrangian([q, v, a], ca.dot(force, covariant) / 2, _space(scene))
 
 
 class Drive(Protocol):
@@ -274,13 +275,3 @@ class ForcedLagrangian(Lagrangian):
         gradient[:, 0] += f
         hessian[:, 0] += df
         return value, gradient, hessian
-
-
-def _symbols(scene: Scene, count: int) -> list[ca.SX]:
-    if not scene.robot.vector_joints:
-        joints = ", ".join(repr(joint) for joint in scene.robot.manifold_joints)
-        raise SceneError(
-            f"configurations of {joints} are not vectors (nq differs from nv); lock these joints "
-            "with load_robot(..., locked=[...])."
-        )
-    return [ca.SX.sym(f"q{j}", scene.robot.nv) for j in range(count)]

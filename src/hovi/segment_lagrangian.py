@@ -246,6 +246,6 @@ def check_segment(lagrangian: Lagrangian, h: float) -> None:
         raise InputError(f"a step must be positive and finite, got {h} s.")
     if lagrangian.nq != lagrangian.nv:
         raise InputError(
-            "a discrete flow needs joints whose configurations are vectors (nq = nv); lock the "
-            "others with load_robot(..., locked=[...])."
+            "a discrete flow of this Lagrangian needs joints whose configurations are vectors "
+            "(nq = nv): lock the others with load_robot(..., locked=[...]), or take hovi.simulate."
         )
