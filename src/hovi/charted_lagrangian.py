@@ -115,8 +115,7 @@ class ChartedLagrangian:
 
         q0: (N, 1, nq). w, inner: (N, 1, nv) and (N, r, nv).
         """
-        x = self._curve(np.append(w, inner, axis=1)) / self.h ** np.arange(3.0)[:, None]
-        q, v, _ = Chart(self.space).jets_from(q0[:, 0], np.ascontiguousarray(x))
+        q, v, _ = Chart(self.space).jets_from(q0[:, 0], self._curve(np.append(w, inner, axis=1)))
         return q, v
 
     @cached_property
@@ -133,17 +132,17 @@ class ChartedLagrangian:
         return self.scheme.points, self.scheme.weights
 
     def _curve(self, modes: Array) -> Array:
-        """(x, h x', 0) at the points over (w, c), (N, 1 + r, n) -> (N, Q, 3, n)."""
+        """(x, x', 0) at the points, shape (3, N Q, n), of modes (w, c), shape (N, 1 + r, n)."""
         table = np.delete(self._twofold.table, [0, 2], axis=2)  # over (Z0, c)
-        return np.asarray(np.einsum("qri,nia->nqra", table, self.h * modes))
+        table = table * self.h ** (1.0 - np.arange(3.0))[:, None]
+        points: Array = np.einsum("qri,nia->rnqa", table, modes)
+        return points.reshape(3, -1, self.n)
 
     def _expand(self, q0: Array, modes: Array, t0: float) -> tuple[Array, Array]:
         """Derivatives of L_d by (q0, q1, h c): gradient (2 + r, n), Hessian, both indices flat."""
         n, Q = self.n, len(self.scheme.weights)
         charts = self._charts(modes[None])
-        q, v, _ = Chart(self.space).jets_from(
-            q0, np.ascontiguousarray(charts.x / self.h ** np.arange(3.0)[:, None])
-        )
+        q, v, _ = Chart(self.space).jets_from(q0, charts.x)
         _, gradient, hessian = self.lagrangian.evaluate(q, v, t=t0 + self.h * self.scheme.points)
         force = np.append(gradient, np.zeros((Q, 1, n)), axis=1)
         # the work of a force has no symmetric Hessian, so that the chart's part stands alone
@@ -167,17 +166,16 @@ class ChartedLagrangian:
             charts.chart,
             charts.scheme,
             np.full(C, self.h),
-            np.repeat(charts.x, C, axis=0),
+            np.tile(charts.x, (1, C, 1)),
             np.repeat(charts.ends, C, axis=0),
         )
-        moved = many.point_steps(step)[:, :, :2] / self.h ** np.arange(2.0)[:, None]
-        return np.asarray(moved.reshape(C, -1, 2 * n))
+        return many.point_steps(step)[:, :, :2].reshape(C, -1, 2 * n)
 
     def _charts(self, modes: Array) -> IntervalCharts:
         x1 = self.h * modes[:, 0]
         ends = np.stack([x1, np.zeros_like(x1)], axis=1)
-        h, x = np.array([self.h]), np.ascontiguousarray(self._curve(modes))
-        return IntervalCharts(Chart(self.space), self._twofold, h, x, ends)
+        h = np.array([self.h])
+        return IntervalCharts(Chart(self.space), self._twofold, h, self._curve(modes), ends)
 
     def _jacobian(self, x1: Array) -> Array:
         """J of dq1 = J(x1) dx1, in the tangent space at q1, shape (n, n)."""
