@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hovi.lie_groups import GROUPS, SE2, Group, half_cotangent
+from hovi.lie_groups import GROUPS, SE2, Group
 
 JOINTS = {
     "SO(2)": pin.JointModelRUBZ(),
@@ -73,6 +73,26 @@ def test_a_quaternion_and_its_negative_are_the_same_rotation() -> None:
     np.testing.assert_allclose(group.difference(g0, -g1), group.difference(g0, g1), atol=1e-15)
 
 
-def test_series_and_closed_forms_meet() -> None:
-    below, above = half_cotangent(np.array([1.0 - 1e-12, 1.0 + 1e-12]))
-    assert above == pytest.approx(below, rel=3e-12)
+@pytest.mark.parametrize("size", [1.0 - 1e-12, 1.0 + 1e-12])
+@pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
+def test_series_and_closed_forms_meet(group: Group, size: float) -> None:
+    g, d = samples(group, 50), np.random.default_rng(1).normal(size=(50, group.nv))
+    turn = list(group.angular)
+    d[:, turn] *= size / np.linalg.norm(d[:, turn], axis=1, keepdims=True)
+    moved, model = group.integrate(g, d), model_of(group)
+    expected = [pin.integrate(model, x, y) for x, y in zip(g, d, strict=True)]
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=4e-15)
+    np.testing.assert_allclose(group.difference(g, moved), d, rtol=0, atol=2e-14)
+
+
+@pytest.mark.parametrize("turns", [-2, -1, 0, 1, 3])
+@pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
+def test_full_turns_are_those_that_are_expected(group: Group, turns: int) -> None:
+    g, d = samples(group, 50), np.random.default_rng(1).normal(size=(50, group.nv))
+    turn = list(group.angular)
+    size = np.linalg.norm(d[:, turn], axis=1, keepdims=True)
+    d[:, turn] *= (1.5 + 2 * np.pi * turns) / size
+    found = group.difference_near(g, group.integrate(g, d), 1.01 * d)
+    np.testing.assert_allclose(found, d, rtol=0, atol=1e-12)
+    still = group.difference_near(g, g, 2 * np.pi * d / np.linalg.norm(d[:, turn], axis=1)[:, None])
+    np.testing.assert_allclose(np.linalg.norm(still[:, turn], axis=1), 2 * np.pi, rtol=1e-14)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import InputError
-from hovi.lie_groups import GROUPS, SE2, SE3, SO2, SO3, Group, Layout, integrated
+from hovi.lie_groups import GROUPS, SE2, SE3, SO2, SO3, Group, Layout, differenced, integrated
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -136,25 +136,16 @@ class ConfigurationSpace:
         q0, q1 = np.asarray(q0, dtype=np.float64), np.asarray(q1, dtype=np.float64)
         if self.vector:
             return q1 - q0
-        lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
-        q0, q1 = (np.broadcast_to(x, (*lead, self.nq)) for x in (q0, q1))
-        result = np.empty((*lead, self.nv))
-        iq, iv = self.plain
-        result[..., iv] = q1[..., iq] - q0[..., iq]
-        for group, rows, columns in self._grouped:
-            result[..., columns] = group.difference(q0[..., rows], q1[..., rows])
-        return result
+        return differenced(self.layout, self.nv, q0, q1)
 
     def difference_near(self, q0: Array, q1: Array, expected: Array) -> Array:
         """As `difference`, with the full turns that come nearest to an expected answer, (..., nv).
 
         Orientations are followed so beyond half a turn, where `difference` would jump.
         """
-        result = self.difference(q0, q1)
-        for group, rows, columns in self._grouped:
-            parts = q0[..., rows], q1[..., rows], expected[..., columns]
-            result[..., columns] = group.difference_near(*parts)
-        return result
+        if self.vector:
+            return q1 - q0
+        return differenced(self.layout, self.nv, q0, q1, expected)
 
     def normalized(self, q: Array) -> Array:
         """Configurations (..., nq) with quaternions and (cos, sin) of unit norm."""

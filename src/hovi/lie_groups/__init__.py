@@ -8,7 +8,7 @@ from hovi.lie_groups.groups import (
     SO3,
     Group,
     Layout,
-    half_cotangent,
+    differenced,
     integrated,
 )
 
@@ -20,6 +20,6 @@ __all__ = [
     "SO3",
     "Group",
     "Layout",
-    "half_cotangent",
+    "differenced",
     "integrated",
 ]

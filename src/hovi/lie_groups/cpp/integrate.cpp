@@ -1,6 +1,5 @@
-#include "integrate.hpp"
-
-#include <cmath>
+#include "configurations.hpp"
+#include "plane_and_space.hpp"
 
 namespace hovi {
 namespace {
@@ -20,23 +19,9 @@ double sine_defect(double square) {
   return sum;
 }
 
-void cross(const double* x, const double* y, double* out) {
-  const double z[] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
-                      x[0] * y[1] - x[1] * y[0]};
-  for (int i = 0; i < 3; ++i) out[i] = z[i];
-}
-
 void normalize(double* x, int size) {
-  double square = 0.0;
-  for (int i = 0; i < size; ++i) square += x[i] * x[i];
-  const double norm = std::sqrt(square);
+  const double norm = std::sqrt(dot(x, x, size));
   for (int i = 0; i < size; ++i) x[i] /= norm;
-}
-
-// The product of complex numbers (real, imaginary): p turned by c.
-void turn(const double* c, const double* p, double* out) {
-  const double real = c[0] * p[0] - c[1] * p[1], imaginary = c[1] * p[0] + c[0] * p[1];
-  out[0] = real, out[1] = imaginary;
 }
 
 void integrate_so2(const double* q, double angle, double* result) {
@@ -57,30 +42,23 @@ void integrate_se2(const double* q, const double* x, double* result) {
 }
 
 void integrate_so3(const double* q, const double* w, double* result) {
-  const double half = 0.5 * std::sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2]);
-  const double size = 0.5 * sinc(half), scalar = std::cos(half);
-  const double u[] = {size * w[0], size * w[1], size * w[2]};
-  double across[3];
-  cross(q, u, across);
-  const double real = q[3] * scalar - (q[0] * u[0] + q[1] * u[1] + q[2] * u[2]);
-  for (int i = 0; i < 3; ++i) result[i] = q[3] * u[i] + scalar * q[i] + across[i];
-  result[3] = real;
+  const double half = 0.5 * std::sqrt(dot(w, w)), size = 0.5 * sinc(half);
+  const double step[] = {size * w[0], size * w[1], size * w[2], std::cos(half)};
+  multiply(q, step, result);
   normalize(result, 4);
 }
 
 void integrate_se3(const double* q, const double* x, double* result) {
-  const double *const v = x, *const w = x + 3, *const u = q + 3;
-  const double square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2];
-  const double half = sinc(0.5 * std::sqrt(square)), defect = sine_defect(square);
+  const double *const v = x, *const w = x + 3;
+  const double square = dot(w, w), half = sinc(0.5 * std::sqrt(square));
   double once[3], twice[3], local[3];
   cross(w, v, once);
   cross(w, once, twice);
-  for (int i = 0; i < 3; ++i) local[i] = v[i] + 0.5 * half * half * once[i] + defect * twice[i];
-  // turned by the quaternion: local + 2 s u x local + 2 u x (u x local)
-  cross(u, local, once);
-  cross(u, once, twice);
-  for (int i = 0; i < 3; ++i) result[i] = q[i] + local[i] + 2.0 * (u[3] * once[i] + twice[i]);
-  integrate_so3(u, w, result + 3);
+  for (int i = 0; i < 3; ++i)
+    local[i] = v[i] + 0.5 * half * half * once[i] + sine_defect(square) * twice[i];
+  rotate(q + 3, local, local);
+  for (int i = 0; i < 3; ++i) result[i] = q[i] + local[i];
+  integrate_so3(q + 3, w, result + 3);
 }
 
 }  // namespace

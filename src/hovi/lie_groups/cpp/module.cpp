@@ -6,8 +6,8 @@
 #include <nanobind/stl/optional.h>
 
 #include "arrays.hpp"
+#include "configurations.hpp"
 #include "doors.hpp"
-#include "integrate.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -52,6 +52,16 @@ void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
   for (std::size_t p = 0; p < points; ++p)
     hovi::integrate(space, q.data() + p * space.nq, x.data() + p * space.nv,
                     result.data() + p * space.nq);
+}
+
+void difference(const Layout& layout, const Input<2>& q0, const Input<2>& q1,
+                const std::optional<Input<2>>& expected, const Output<2>& result) {
+  const hovi::Space space = space_of(layout, q0.shape(1), result.shape(1));
+  const double* const turned = expected ? expected->data() : nullptr;
+  const nb::gil_scoped_release released;
+  for (std::size_t p = 0; p < result.shape(0); ++p)
+    hovi::difference(space, q0.data() + p * space.nq, q1.data() + p * space.nq,
+                     turned ? turned + p * space.nv : nullptr, result.data() + p * space.nv);
 }
 
 void rates(const Layout& layout, const Input<3>& x, const std::optional<Input<3>>& carried,
@@ -105,6 +115,7 @@ void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& wei
 
 NB_MODULE(_charts, m) {
   m.def("integrate", &integrate, "layout"_a, "q"_a, "x"_a, "result"_a);
+  m.def("difference", &difference, "layout"_a, "q0"_a, "q1"_a, "expected"_a.none(), "result"_a);
   m.def("rates", &rates, "layout"_a, "x"_a, "carried"_a.none(), "out"_a);
   m.def("local_rates", &local_rates, "layout"_a, "x"_a, "v"_a, "a"_a, "out"_a);
   m.def("expand", &expand, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
