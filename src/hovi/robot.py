@@ -258,13 +258,19 @@ class Robot:
 
         name: what the argument is called, for the message. Raises InputError.
         """
-        entries = configuration.entry_names(self.model, "nq")
-        hint = configuration.manifold_hint(self.model)
-        checked = configuration.check_vector(q, name, entries, hint)
+        checked = configuration.check_vector(q, name, *self._entries)
         if self.vector_joints:
             return checked
         configuration.check_unit_norms(self.model, checked, name)
         return np.array(pin.normalize(self.model, checked), dtype=float)
+
+    @cached_property
+    def _entries(self) -> tuple[tuple[str, ...], str]:
+        """What the entries of q are called, and a hint where joints have several."""
+        return (
+            configuration.entry_names(self.model, "nq"),
+            configuration.manifold_hint(self.model),
+        )
 
     def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
         """`v` as a finite float array (nv,). Raises InputError naming the joint."""

@@ -114,15 +114,16 @@ def check_mass_matrix(model: pin.Model) -> None:
     the neutral one a sound robot may be singular: a bob that hangs straight down resists no
     turn about the vertical). Raises ModelError naming the joints that nothing resists.
     """
+    if model.nv == 0:
+        return
     data = model.createData()
-    for q in _sample_configurations(model) if model.nv else ():
-        upper = np.triu(pin.crba(model, data, q))
-        mass = upper + np.triu(upper, 1).T  # (nv, nv)
-        values, vectors = np.linalg.eigh(mass)
-        free = values <= 10.0 * model.nv * np.finfo(float).eps * values[-1]
-        if free.any():
-            share = np.sum(vectors[:, free] ** 2, axis=1)  # (nv,)
-            raise ModelError(_singular_mass_sentence(model, share))
+    samples = [pin.crba(model, data, q).copy() for q in _sample_configurations(model)]
+    values, vectors = np.linalg.eigh(samples, UPLO="U")  # crba fills the upper triangle
+    free = values <= 10.0 * model.nv * np.finfo(float).eps * values[:, -1:]
+    if free.any():
+        first = int(np.argmax(free.any(axis=1)))
+        share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
+        raise ModelError(_singular_mass_sentence(model, share))
 
 
 def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:

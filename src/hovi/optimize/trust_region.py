@@ -27,6 +27,8 @@ MOST_FACTORS = 30
 """Factorisations that one subproblem may take."""
 NEAR = 1e-5
 """Relative decrease in a Newton step after which models are exact, where the last one shall be."""
+LONG = 1e-4
+"""Share of the first radius beyond which a step is too long to be asked for its relative size."""
 LAST, LEFT = 1e-14, 1e-26
 """Relative decrease that the last exact step may predict where it bends sharply, and what it may
 leave elsewhere: steps are like the square root of what they leave."""
@@ -221,6 +223,8 @@ def _is_stationary(
         return False
     if trial.decrease <= options.decrease * abs(outcome.value):
         return True
+    if trial.norm > LONG * options.radius:
+        return False
     return objective.relative_size(outcome.x, trial.step, model) <= options.step
 
 
