@@ -1,19 +1,26 @@
 """Time per quadrature point where configurations are no vectors, beside ordinary joints.
 
-Of RNEA's kernel alone, and of the discrete Lagrangian with the charts of its intervals.
+Of RNEA's kernel alone, and of the discrete Lagrangian with the charts of its intervals. Each robot
+and the one beside it are timed by turns, so that what else the machine does meets both.
 """
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
-from measuring import alone, best_time, print_machine, print_table
+from measuring import alone, print_machine, print_table
 
 import hovi
 from hovi.rigid_body import InverseDynamicsKernel
 from hovi.solver import guess_path
 
 INTERVALS = (16, 256)
+BESIDE = {"kinova": "kinova, revolute", "free-flyer, 3 joints": "nine joints"}
+"""Robots on groups, and those of ordinary joints that they are compared with."""
+ROUNDS, SECONDS = 5, 0.5
 
 
 def robots(name: str) -> hovi.Robot:
@@ -49,8 +56,8 @@ def _chain(joints: list[pin.JointModel]) -> pin.Model:
     return model
 
 
-def measure(name: str, intervals: int) -> tuple[float, ...]:
-    """Microseconds per point of the kernel, of the action's expansion and of the action."""
+def works(name: str, intervals: int) -> tuple[Callable[[], object], ...]:
+    """The kernel at all points of a motion, the action's expansion and the action."""
     robot = robots(name)
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     lagrangian = scene.effort_lagrangian()
@@ -59,27 +66,59 @@ def measure(name: str, intervals: int) -> tuple[float, ...]:
     start = robot.neutral()
     goal = robot.integrate(start, np.full(robot.nv, 0.3))
     path = guess_path(hovi.TrajectoryProblem(ld, hovi.State(start), hovi.State(goal)), "cubic")
-    points = 4 * intervals
     kernel = InverseDynamicsKernel(scene.model)
-    d, v, a, curvature = np.random.default_rng(0).uniform(-1, 1, (4, points, robot.nv))
+    d, v, a, curvature = np.random.default_rng(0).uniform(-1, 1, (4, 4 * intervals, robot.nv))
     q, weight = robot.integrate(start, d), np.ones(robot.nv)
-    work = (
+    return (
         lambda: kernel.expand(q, v, a, weight, curvature),
         lambda: ld.expand(path),
         lambda: ld.action(path),
     )
-    return tuple(1e6 * best_time(each) / points for each in work)
+
+
+def measure(names: tuple[str, ...], intervals: int) -> list[list[list[float]]]:
+    """Microseconds per point of each work, in every round: (works, robots, rounds)."""
+    by_robot = [works(name, intervals) for name in names]
+    return [
+        list(zip(*(by_turns(pair) for _ in range(ROUNDS)), strict=True))
+        for pair in zip(*by_robot, strict=True)
+    ]
+
+
+def by_turns(pair: tuple[Callable[[], object], ...]) -> list[float]:
+    """The shortest processor time of each in one round, taken by turns, in [s]."""
+    times: list[list[float]] = [[] for _ in pair]
+    while sum(map(sum, times)) < SECONDS or len(times[0]) < 3:
+        for work, found in zip(pair, times, strict=True):
+            began = time.process_time()
+            work()
+            found.append(time.process_time() - began)
+    return [min(found) for found in times]
+
+
+def rows_of(name: str, intervals: int) -> list[list[object]]:
+    """A row of the robot beside, and one of the robot with the factors between them."""
+    names = BESIDE[name], name
+    first: list[object] = [names[0], intervals]
+    second: list[object] = [names[1], intervals]
+    for digits, work in zip((2, 1, 2), alone(measure, names, intervals), strict=True):
+        per_point = 1e6 * np.array(work) / (4 * intervals)  # (robots, rounds)
+        beside, own = np.median(per_point, axis=1)
+        factors = np.sort(per_point[1] / per_point[0])
+        first.append(f"{beside:.{digits}f}")
+        middle = f"{np.median(factors):.1f}"
+        spread = f"{factors[0]:.1f} to {factors[-1]:.1f}"
+        second.append(f"{own:.{digits}f} ({middle} times; {spread})")
+    return [first, second]
 
 
 def main() -> None:
     """One table."""
-    print("Microseconds per quadrature point, `galerkin-2`, one thread.\n")
-    rows = []
-    for N in INTERVALS:
-        names = ("kinova, revolute", "kinova", "nine joints", "free-flyer, 3 joints")
-        for name in names:
-            kernel, expand, action = alone(measure, name, N)
-            rows.append([name, N, f"{kernel:.2f}", f"{expand:.1f}", f"{action:.2f}"])
+    print(
+        "Microseconds of processor time per quadrature point, `galerkin-2`, one thread: medians of "
+        f"{ROUNDS} rounds, and how many times those of the row above, with the rounds' range.\n"
+    )
+    rows = [row for N in INTERVALS for name in BESIDE for row in rows_of(name, N)]
     print_table(["robot", "N", "kernel alone", "value, gradient, Hessian", "value"], rows)
     print_machine()
 
