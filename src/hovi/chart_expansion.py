@@ -48,7 +48,7 @@ class IntervalCharts:
     def expand(self, gradient: Array, hessian: Array) -> tuple[Array, Array]:
         """Gradient (B, m, n) and Hessian (B, m, m, n, n) of L_d in nodal columns.
 
-        gradient (P, 3 n), hessian (P, 3 n, 3 n): those of the Lagrangian at the points.
+        gradient (P, 3 n), hessian (P, 3 n, 3 n), symmetric: of the Lagrangian at the points.
         """
         B, n, m = len(self.h), self.x.shape[2], 4 + self.scheme.inner_modes
         H = np.ascontiguousarray(hessian.reshape(-1, 3 * n, 3 * n))
