@@ -27,7 +27,7 @@ def carried_momenta(derivatives: Array) -> Array:
     evaluated = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
     p = evaluated[:, 0]
     sums = np.zeros_like(p)
-    np.cumsum(derivatives[:, 0] + derivatives[:, 2], axis=0, out=sums[1:])
+    np.add.accumulate(derivatives[:, 0] + derivatives[:, 2], axis=0, out=sums[1:])
     carried = sums + (p - sums).sum(axis=0) / (N + 1)
     if np.abs(carried - p).max() <= ROUNDING * N * np.abs(p).max():
         evaluated[:, 0] = carried

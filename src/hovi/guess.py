@@ -190,16 +190,11 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
 def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
     """A path plus the cubic that carries its ends to other boundary data."""
     q0, v0, q1, v1 = boundary
-    ends = np.stack(
-        [
-            robot.difference(path.q[0], q0),
-            v0 - path.v[0],
-            robot.difference(path.q[-1], q1),
-            v1 - path.v[-1],
-        ]
-    )  # (4, n)
-    if not ends.any():
+    old = path.q[0], path.v[0], path.q[-1], path.v[-1]
+    if all((a == b).all() for a, b in zip(old, boundary, strict=True)):
         return path
+    dq0, dq1 = robot.difference(old[0], q0), robot.difference(old[2], q1)
+    ends = np.stack([dq0, v0 - old[1], dq1, v1 - old[3]])  # (4, n)
     T, s = grid.duration, grid.t / grid.duration
     local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
     dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each
