@@ -42,6 +42,7 @@ FLOORS = [
     },
     {
         "clearance",
+        "mass_matrix",
         "configuration_space",
         "point_function",
         "rigid_body",

@@ -18,6 +18,7 @@ from hovi.dynamics_replay import replay_dynamics
 from hovi.effects import Drag, Gravity, MovingBase, Payload, Wrench
 from hovi.errors import ModelError, SceneError
 from hovi.limits import urdf_limits
+from hovi.mass_matrix import MassMatrix
 from hovi.mimic_joints import read_couplings
 from hovi.obstacles import Box
 from hovi.planner import plan
@@ -36,6 +37,7 @@ CHAINS = {
     "two followers": ([RX(), PZ(), RY(), RX()], [("j0", 2, -1.5, 0.3), ("j0", 3, 0.5, 0.0)]),
     "sliding": ([PZ(), RX(), PZ()], [("j0", 2, -1.0, 0.02)]),
     "floating": ([pin.JointModelFreeFlyer(), RX(), RY(), PZ()], [("j1", 2, -2.0, 0.1)]),
+    "a body between": ([RX(), pin.JointModelSpherical(), RY()], [("j0", 2, -0.7, 0.1)]),
     "continuous": ([RUB(), RX(), RUB()], [("j0", 2, -2.0, 0.7)]),
 }
 
@@ -104,6 +106,19 @@ def test_second_derivatives_are_those_of_casadi(name: str) -> None:
             scene.torques.expand(*at, None, R, lent), slow.expand(*at, None, R, lent), strict=True
         ):
             close(fast, sure, 1e-11)
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_the_mass_matrix_is_that_of_rnea(name: str) -> None:
+    """Column by column: CRBA itself is wrong with a spherical joint between leader and follower."""
+    robot = mimicking(name)
+    q, v, _ = points(robot)
+    scene, still = Scene(robot), np.zeros_like(v)
+    columns = [rnea(scene, q, still, still + e) for e in np.eye(robot.nv)]
+    mass = MassMatrix(robot.model)(q)
+    close(mass, np.stack(columns, axis=2), 1e-13)
+    assert np.linalg.eigvalsh(mass).min() > 0.0
+    robot.check_mass_matrix()
 
 
 def test_a_base_that_rises_faster_and_faster_feels_like_gravity() -> None:
@@ -197,7 +212,7 @@ def test_a_plan_of_the_panda_with_its_gripper_moves_it_as_planned(tmp_path: Path
     solution = plan(Scene(robot, [Gravity()]), start, goal, 1.5, limits="none", intervals=8)
     assert solution.success
     replayed = replay_dynamics(solution.trajectory)
-    assert max(replayed.angle, replayed.slide, replayed.largest_tip) < 1e-9
+    assert max(replayed.angle, replayed.slide, replayed.largest_tip) < 1e-7
     solution.trajectory.save(tmp_path / "motion.npz")
     again = Trajectory.load(tmp_path / "motion.npz")
     assert again.robot is not None

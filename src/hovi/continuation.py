@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-import pinocchio as pin
 
 from hovi.easing import HeavierRotors, WeakerGravity
 from hovi.effects import Effect
@@ -21,6 +20,7 @@ from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
 from hovi.grid import Grid
 from hovi.limits import Limits
+from hovi.mass_matrix import MassMatrix
 from hovi.multistart import Job
 from hovi.scene import Scene
 from hovi.schemes import galerkin
@@ -62,8 +62,7 @@ def lighter_rotors(job: Job) -> list[Rung]:
     """
     robot = job.scene.robot
     q, _ = job.start.on(robot, "start")
-    upper = np.triu(pin.crba(job.scene.model, job.scene.model.createData(), q))
-    M = upper + np.triu(upper, 1).T
+    M = MassMatrix(job.scene.model)(q[None])[0]
     inertia = HEAVIEST * float(M.diagonal().max())
     least = LIGHTEST * float(np.linalg.eigvalsh(M)[0])
     free = _without_torque_limits(job)

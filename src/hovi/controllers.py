@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from hovi.chart import Chart
 from hovi.errors import InputError, nearest
+from hovi.mass_matrix import MassMatrix
 from hovi.robot import Robot
 from hovi.scene import Scene
 from hovi.trajectory import Sample, Trajectory
@@ -66,8 +66,7 @@ class ProportionalDerivative(Controller):
 
         omega: what each joint would have alone, critically damped, in [rad/s].
         """
-        model = robot.model.copy()
-        mass = np.diag(pin.crba(model, model.createData(), plan.q[0])).copy()
+        mass = np.diagonal(MassMatrix(robot.model)(plan.q[:1])[0])
         return cls(plan, mass * omega**2, 2 * mass * omega)
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:

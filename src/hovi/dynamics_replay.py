@@ -17,6 +17,7 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from hovi.errors import InputError
+from hovi.mass_matrix import MassMatrix
 from hovi.motion_error import sliding_coordinates
 from hovi.robot import Robot
 from hovi.scene import Scene
@@ -123,6 +124,7 @@ class _ForwardDynamics:
         self.scene = scene
         self.data = scene.model.createData()
         self.passive = scene.passive_coordinates
+        self._mass = MassMatrix(scene.model) if scene.robot.couplings else None
         motion = trajectory.sample_intervals(
             np.arange(trajectory.grid.intervals), np.full(trajectory.grid.intervals, 0.5)
         )
@@ -143,22 +145,17 @@ class _ForwardDynamics:
         if not self.plain:
             tau = tau - self._added(q, v, np.zeros_like(v), t)
         model, data = self.scene.model, self.data
-        rows = zip(q, v, tau, strict=True)
-        solve = _solved if self.scene.robot.couplings else pin.aba
-        return np.array([solve(model, data, *row) for row in rows])
+        if self._mass is None:
+            rows = zip(q, v, tau, strict=True)
+            return np.array([pin.aba(model, data, *row) for row in rows])
+        bias = [pin.nonLinearEffects(model, data, *row).copy() for row in zip(q, v, strict=True)]
+        force = (tau - np.array(bias))[..., None]
+        return np.asarray(np.linalg.solve(self._mass(q), force)[..., 0])
 
     def _added(self, q: Array, v: Array, a: Array, t: Array) -> Array:
         model, data = self.scene.model, self.data
         rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
         return np.asarray(self.scene.inverse_dynamics(q, v, a, t) - rigid)
-
-
-def _solved(model: pin.Model, data: pin.Data, q: Array, v: Array, tau: Array) -> Array:
-    """a of M(q) a + b(q, v) = tau, shape (nv,)."""
-    mass = np.triu(pin.crba(model, data, q))
-    mass += np.triu(mass, 1).T
-    bias = pin.nonLinearEffects(model, data, q, v)
-    return np.asarray(np.linalg.solve(mass, tau - bias))
 
 
 def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:

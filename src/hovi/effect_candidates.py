@@ -22,6 +22,7 @@ from hovi.effects import (
     ViscousFriction,
     Wrench,
 )
+from hovi.mass_matrix import MassMatrix
 from hovi.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -92,7 +93,7 @@ def _efforts(robot: Robot) -> Array:
 def _inertia(robot: Robot) -> Array:
     model = robot.model.copy()
     model.armature = np.zeros(model.nv)
-    return np.diag(pin.crba(model, model.createData(), pin.neutral(model))).copy()
+    return np.diagonal(MassMatrix(model)(pin.neutral(model)[None])[0])
 
 
 def _rounded(values: npt.ArrayLike) -> tuple[float, ...]:

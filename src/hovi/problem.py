@@ -9,7 +9,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
 from hovi.action_structure import ActionStructure
 from hovi.clearance import Clearance
@@ -24,6 +23,7 @@ from hovi.grid import DiscretePath, Grid
 from hovi.guess import Boundary, Curve, path_on_grid
 from hovi.lagrangian import EffortLagrangian
 from hovi.limits import Limits
+from hovi.mass_matrix import MassMatrix
 from hovi.robot import Robot
 from hovi.robot_model import check_mass_matrix
 from hovi.scene import Scene, require_known_joints
@@ -143,8 +143,7 @@ class TrajectoryProblem:
     @cached_property
     def inertial_torque(self) -> float:
         """The largest inertia of a joint at the start, over T^2: one [rad/s^2] or [m/s^2] T^2."""
-        model = self.scene.model
-        mass = pin.crba(model, model.createData(), self.boundary[0])
+        mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]
         return float(np.max(np.diag(mass))) / self.grid.duration**2
 
     @property

@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from hovi.coupled_model import Coupling
 from hovi.errors import ModelError, nearest
+from hovi.mass_matrix import MassMatrix
 from hovi.mimic_joints import held_values, leaders_first, read_couplings, with_mimics
 from hovi.plain_urdf import plain_urdf
 from hovi.robot_source import RobotSource
@@ -116,9 +117,8 @@ def check_mass_matrix(model: pin.Model) -> None:
     """
     if model.nv == 0:
         return
-    data = model.createData()
-    samples = [pin.crba(model, data, q).copy() for q in _sample_configurations(model)]
-    values, vectors = np.linalg.eigh(samples, UPLO="U")  # crba fills the upper triangle
+    samples = np.array(list(_sample_configurations(model)))
+    values, vectors = np.linalg.eigh(MassMatrix(model)(samples))
     free = values <= 10.0 * model.nv * np.finfo(float).eps * values[:, -1:]
     if free.any():
         first = int(np.argmax(free.any(axis=1)))
@@ -146,7 +146,7 @@ def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
     joints = [
         index
         for index, joint in enumerate(model.joints[1:], start=1)
-        if share[joint.idx_v : joint.idx_v + joint.nv].max() >= 0.5 * share.max()
+        if share[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * share.max()
     ]
     names = [str(model.names[joint]) for joint in joints]
     moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
