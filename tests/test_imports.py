@@ -19,3 +19,11 @@ def test_a_first_plan_imports_nothing_that_it_does_not_use() -> None:
     loaded = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
     assert "pinocchio" in loaded
     assert not {"scipy", "joblib", "matplotlib", "meshcat", "typer"} & set(loaded)
+
+
+def test_a_report_in_the_terminal_draws_nothing() -> None:
+    code = "import sys, hovi.cli.report; print(*sys.modules)"
+    run = [sys.executable, "-c", code]
+    loaded = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
+    assert "hovi.cli.report" in loaded
+    assert not {"matplotlib", "meshcat", "scipy"} & set(loaded)

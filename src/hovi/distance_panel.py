@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
 
 from hovi.clearance import Clearance
 from hovi.clearance_check import distances_over_time
@@ -12,6 +13,9 @@ from hovi.distances import Distances, distances_between
 from hovi.errors import HoviError
 from hovi.imposed_clearance import imposed_clearance
 from hovi.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = npt.NDArray[np.float64]
 

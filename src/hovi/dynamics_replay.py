@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
-from scipy.integrate import solve_ivp
 
 from hovi.errors import InputError
 from hovi.mass_matrix import MassMatrix
@@ -70,6 +69,8 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
     frame: whose miss is told, by default the robot's tip_frame.
     Raises InputError where this cannot be done, with the reason.
     """
+    from scipy.integrate import solve_ivp  # a quarter of a second, for replays alone
+
     scene, robot = _scene_of(trajectory)
     name = robot.tip_frame if frame is None else frame
     N, n = trajectory.v[:-1].shape
