@@ -11,7 +11,7 @@ from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
 from hovi.error_estimate import estimate_error, finer_than
 from hovi.errors import InputError
-from hovi.finer_solution import MORE_MODES, finer_grid
+from hovi.finer_grid import MORE_MODES, finer_grid
 from hovi.grid import Grid
 from hovi.motion_error import MotionError, deviation, relative_difference, sliding_coordinates
 from hovi.problem import TrajectoryProblem

@@ -57,6 +57,7 @@ FLOORS = [
         "interval_batch",
         "plain_urdf",
         "stored_torque",
+        "finer_grid",
         "trajectory_file",
         "effort_term",
         "segment",

@@ -9,7 +9,7 @@ from hovi.carried_efforts import carried_efforts
 from hovi.certificate import momentum_jump
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
-from hovi.finer_solution import finer_grid, prolonged
+from hovi.finer_solution import prolonged
 from hovi.grid import Grid
 from hovi.guess import moved
 from hovi.model_files import example
@@ -39,7 +39,7 @@ def ur5() -> Solution:
 
 def finer(solution: Solution) -> TrajectoryProblem:
     assert solution.problem is not None
-    return solution.problem.on(finer_grid(solution.problem.grid))
+    return solution.problem.finer
 
 
 def approached(solution: Solution, problem: TrajectoryProblem) -> NearbyMinimum | None:

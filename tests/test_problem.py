@@ -43,6 +43,22 @@ def test_a_problem_knows_its_grid_scene_robot_and_ends(two_link: Robot) -> None:
         np.testing.assert_array_equal(end, numbers)
 
 
+def test_on_another_grid_it_is_the_problem_that_would_be_built_there(two_link: Robot) -> None:
+    first = problem(two_link, State([1, 2], free_velocity="all"), State([3.0, 1.0]))
+    assert first.structure.layout.size > 0
+    steps = np.array([0.3, 0.3, 0.4])
+    for grid in (Grid(steps, (galerkin(2),) * 3), Grid(2 * steps, (galerkin(2),) * 3)):
+        found = first.on(grid)
+        anew = TrajectoryProblem(found.ld, first.start, first.goal)
+        assert found.grid is grid
+        assert found.structure.layout.size == anew.structure.layout.size
+        np.testing.assert_array_equal(found.free_ends, anew.free_ends)
+        assert found.inertial_torque == anew.inertial_torque
+        assert found.finer.grid.inner_modes == 4
+    with pytest.raises(SchemeError, match="not regular"):
+        first.on(Grid(steps, (by_name("mean-difference"),) * 3))
+
+
 def test_the_ends_do_not_change_behind_ones_back(two_link: Robot) -> None:
     q = np.array([1.0, 2.0])
     found = problem(two_link, State(q))

@@ -32,11 +32,10 @@ def carried_efforts(
     series = np.zeros((N, Q, lagrangian.nv))
     parts = zip(ld.jets(path), ld.point_times, ld.point_intervals, strict=True)
     for jet, t, numbers in parts:
-        points = ld.grid.schemes[numbers[0]].points
-        P = legendre(2 * points - 1, len(points) - 1).T  # (points, degrees)
-        tau = lagrangian.torques.torque(*jet, t).reshape(-1, len(points), lagrangian.nv)
-        inverse = np.linalg.pinv(P)  # points may coincide
-        series[numbers[:: len(points)], : len(points)] = inverse @ tau
+        scheme = ld.grid.schemes[numbers[0]]
+        points = len(scheme.points)
+        tau = lagrangian.torques.torque(*jet, t).reshape(-1, points, lagrangian.nv)
+        series[numbers[::points], :points] = scheme.series @ tau
     nodes, efforts = ld.grid.t, []
     for t in other.point_times:
         k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, N - 1)

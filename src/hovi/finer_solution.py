@@ -17,23 +17,16 @@ import numpy.typing as npt
 
 from hovi.carried_efforts import carried_efforts
 from hovi.discrete_lagrangian import Expansion
-from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
 from hovi.motion_error import places
 from hovi.nearby_minimum import nearby_minimum
 from hovi.problem import TrajectoryProblem
-from hovi.schemes import galerkin
-from hovi.schemes.galerkin_table import MAX_INNER_MODES
 from hovi.solver import Solution, solve
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
 
 Array = npt.NDArray[np.float64]
-
-MORE_MODES = 2
-"""Inner modes that the finer solution has more: with one more the costs of both may be off by as
-much to the same side, and their difference would say nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +61,7 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
         halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
         curve = stretched(motion(problem, path), problem.grid.duration)
         return _solved(halves, halves.path(curve), problem, path)
-    fine = problem.on(finer_grid(problem.grid))
+    fine = problem.finer
     start = prolonged(path, fine.grid)
     if problem.constrained:
         return _solved(fine, start, problem, path)
@@ -110,19 +103,6 @@ def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
     """A path as a trajectory, without its momenta, for sampling."""
     momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
     return Trajectory(problem.grid, path, momenta, problem.scene)
-
-
-def finer_grid(grid: Grid) -> Grid:
-    """The same intervals, each with two more inner modes than its scheme has.
-
-    Raises InputError where the scheme has too many already.
-    """
-    if grid.inner_modes + MORE_MODES > MAX_INNER_MODES:
-        raise InputError(
-            f"errors are estimated for schemes of up to {MAX_INNER_MODES - MORE_MODES} inner "
-            f"modes, not {grid.inner_modes}; use more intervals instead."
-        )
-    return Grid(grid.steps, tuple(galerkin(s.inner_modes + MORE_MODES) for s in grid.schemes))
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:

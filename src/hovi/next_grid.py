@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.error_estimate import estimate_against
-from hovi.finer_solution import MORE_MODES, FinerSolution, finer_grid
+from hovi.finer_grid import MORE_MODES, finer_grid
+from hovi.finer_solution import FinerSolution
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import stretched
 from hovi.known_error import Candidate, contributions

@@ -16,6 +16,7 @@ from hovi.conditions import NodeCondition
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.distances import Distances, distances_between
 from hovi.errors import InputError, ModelError
+from hovi.finer_grid import finer_grid
 from hovi.frame_goal import FrameGoal
 from hovi.free_fall import free_fall_contradiction, without_redundancy
 from hovi.goals import Via, met, via_conditions
@@ -104,14 +105,21 @@ class TrajectoryProblem:
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         ld = DiscreteLagrangian(self.ld.lagrangian, grid)
-        if self.conditions or not np.isclose(grid.duration, self.grid.duration, rtol=1e-12, atol=0):
+        T = self.grid.duration
+        if self.conditions or abs(grid.duration - T) > 1e-12 * T:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)
         problem = copy.copy(self)  # nothing else depends on the grid, and was checked already
         object.__setattr__(problem, "ld", ld)
-        problem.__dict__.pop("structure", None)
+        for name in ("structure", "finer"):
+            problem.__dict__.pop(name, None)
         return problem
+
+    @cached_property
+    def finer(self) -> TrajectoryProblem:
+        """The same problem with more inner modes, by which errors are estimated."""
+        return self.on(finer_grid(self.grid))
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""

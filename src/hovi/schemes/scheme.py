@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.schemes.jets import jet_rows
-from hovi.schemes.polynomials import interval_rows
+from hovi.schemes.polynomials import interval_rows, legendre
 
 Array = npt.NDArray[np.float64]
 
@@ -76,6 +76,14 @@ class Scheme:
     def nodal_table(self) -> Array:
         """The table for (q0, h v0, q1, h v1, c), shape (Q, 3, 4 + r)."""
         return self.regular_table @ regular_from_nodal(self.inner_modes)
+
+    @cached_property
+    def series(self) -> Array:
+        """Legendre coefficients of the polynomial through values at the points, (Q, Q).
+
+        Degree by value; points may coincide.
+        """
+        return np.asarray(np.linalg.pinv(legendre(2 * self.points - 1, len(self.points) - 1).T))
 
     def rows(self, s: Array) -> Array:
         """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).
