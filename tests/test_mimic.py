@@ -12,11 +12,14 @@ import pytest
 
 from finite_differences import derivative_per_point
 from hovi.clearance import Clearance
+from hovi.cli import main
 from hovi.coupled_model import Coupling, Pull, coupled, uncoupled
 from hovi.distances import Distances
 from hovi.dynamics_replay import replay_dynamics
-from hovi.effects import Drag, Gravity, MovingBase, Payload, Wrench
+from hovi.effect_study import study_effects
+from hovi.effects import Drag, Gravity, MovingBase, Payload, ViscousFriction, Wrench
 from hovi.errors import ModelError, SceneError
+from hovi.highlights import Highlights
 from hovi.limits import urdf_limits
 from hovi.mass_matrix import MassMatrix
 from hovi.mimic_joints import read_couplings
@@ -24,7 +27,8 @@ from hovi.obstacles import Box
 from hovi.planner import plan
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
-from hovi.task_file import load_task, save_task
+from hovi.state import State
+from hovi.task_file import Task, load_task, save_task
 from hovi.torque_model import CasadiTorque
 from hovi.trajectory import Trajectory
 from manifold_robots import chain, configurations
@@ -356,9 +360,37 @@ def test_without_mimic_every_joint_moves_and_the_description_says_so(tmp_path: P
     assert "<mimic>" not in bound.describe()
 
 
+def test_the_command_tells_of_what_follows(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", "panda", "--mimic"]) == 0
+    told = capsys.readouterr().out
+    assert "nq = 8" in told
+    assert "= panda_finger_joint1" in told
+
+
+def test_what_follows_stands_out_with_its_leader(tmp_path: Path) -> None:
+    robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
+    limits = {"v": {"b": 1.2}}
+    motion = plan(Scene(robot, [Gravity()]), [0.0], [1.0], 1.0, limits=limits).trajectory
+    shown = Highlights.of(motion, robot, np.linspace(0.0, 1.0, 200))
+    assert shown is not None
+    flags = {name: shown.flags[:, robot.model.getJointId(name)] for name in "ab"}
+    assert 0 < flags["a"].sum() < 200
+    np.testing.assert_array_equal(flags["a"], flags["b"])
+
+
+def test_a_study_of_effects_takes_what_follows_along(tmp_path: Path) -> None:
+    robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
+    task = Task(Scene(robot, [Gravity()]), State([0.0]), State([0.5]), 0.5, limits="none")
+    study = study_effects(task, [Payload("right", 0.5), ViscousFriction(0.3)])
+    assert all(trial.success and trial.held is not None for trial in study.trials)
+    rubbed = study.trials[1]
+    speed = np.abs(study.solution.trajectory.sample(np.linspace(0.0, 0.5, 2001)).v).max()
+    assert rubbed.torque == pytest.approx(0.3 * speed, rel=1e-2)
+
+
 def test_what_follows_cannot_be_named_as_if_it_moved_alone(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b")))
-    with pytest.raises(SceneError, match="no joint 'a'"):
+    with pytest.raises(SceneError, match="no joint 'a': it mimics 'b'; name that joint"):
         Scene(robot, passive=["a"])
 
 

@@ -177,7 +177,7 @@ def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]
             if name not in names:
                 raise InputError(
                     f"limits.{kind}: robot {robot.name!r} has no joint {name!r}: "
-                    f"{nearest(str(name), names)}"
+                    f"{robot.hint(str(name), names)}"
                 )
         return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
     if isinstance(given, float | int | np.number):

@@ -102,6 +102,16 @@ class Robot:
     def _space(self) -> tuple[ConfigurationSpace, tuple[str, ...]]:
         return configuration_space(self.model)
 
+    def hint(self, name: str, valid: Iterable[str] | None = None) -> str:
+        """The end of a sentence about a joint that does not move on its own, or does not exist.
+
+        valid: what would have been accepted; `joint_names` when None.
+        """
+        for coupling in self.couplings:
+            if coupling.follower == name:
+                return f"it mimics {coupling.leader!r}; name that joint."
+        return nearest(name, self.joint_names if valid is None else valid)
+
     def joint_at(self, place: int) -> str:
         """The joint to which a place in v belongs."""
         pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)

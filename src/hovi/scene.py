@@ -279,8 +279,7 @@ def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if name not in robot.joint_names:
             raise SceneError(
-                f"passive: robot {robot.name!r} has no joint {name!r}: "
-                f"{nearest(str(name), robot.joint_names)}"
+                f"passive: robot {robot.name!r} has no joint {name!r}: {robot.hint(str(name))}"
             )
     chosen = tuple(name for name in robot.joint_names if name in names)
     if chosen and len(chosen) == len(robot.joint_names):

@@ -122,7 +122,7 @@ def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
             chosen[robot.coordinate_names.index(joint)] = True
             continue
         if joint not in robot.joint_names:
-            hint = nearest(str(joint), (*robot.joint_names, ALL))
+            hint = robot.hint(str(joint), (*robot.joint_names, ALL))
             raise InputError(f"{state}.{key}: robot {robot.name!r} has no joint {joint!r}: {hint}")
         place = robot.model.joints[robot.model.getJointId(joint)]
         chosen[place.idx_v : place.idx_v + place.nv] = True

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import SceneError, nearest
+from hovi.errors import SceneError
 
 if TYPE_CHECKING:
     from hovi.robot import Robot
@@ -83,6 +83,4 @@ def _coordinates(robot: Robot, what: str, joint: str) -> list[int]:
     if joint in robot.joint_names:
         member = robot.model.joints[robot.model.getJointId(joint)]
         return list(range(member.idx_v, member.idx_v + member.nv))
-    raise SceneError(
-        f"{what}: robot {robot.name!r} has no joint {joint!r}: {nearest(joint, robot.joint_names)}"
-    )
+    raise SceneError(f"{what}: robot {robot.name!r} has no joint {joint!r}: {robot.hint(joint)}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hovi.errors import HoviError, nearest
+from hovi.errors import HoviError
 from hovi.robot import Robot
 from hovi.task_file.sentences import Keys, TomlText, spelled
 
@@ -55,7 +55,7 @@ def _check_joints(by_joint: dict[str, Any], keys: Keys, robot: Robot, toml: Toml
     for joint in by_joint:
         if joint not in robot.joint_names:
             sentence = f"`{spelled(keys)}` names a joint {joint!r} that the robot does not have; "
-            raise toml.error((*keys, joint), sentence + nearest(joint, robot.joint_names))
+            raise toml.error((*keys, joint), sentence + robot.hint(joint))
 
 
 def _numbers(value: Any, size: int, keys: Keys, toml: TomlText) -> list[float]:
