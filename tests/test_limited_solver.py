@@ -197,3 +197,15 @@ def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: 
     solution = plan(scene, start, goal, 1.9125, **options)
     assert solution.success, solution.message
     assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
+
+
+@pytest.mark.long
+def test_a_light_wrist_that_needs_many_steps_goes_on_with_finer_intervals() -> None:
+    """The last joint weighs next to nothing, and coarse intervals leave it free to whirl."""
+    robot = hovi.load_robot("xarm7")
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    start = [-2.028, -0.447, -2.746, 2.798, -2.59, 0.217, 2.347]
+    goal = [-0.174, 1.731, 1.671, 3.578, -2.341, -1.337, -2.7]
+    solution = plan(scene, start, goal, 4.822, continuation=False)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6

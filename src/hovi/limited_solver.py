@@ -40,7 +40,7 @@ ROUNDS = 40
 """Times that limits are tightened or intervals halved before giving up."""
 PATIENCE = 9
 """Times that limits are tightened on one grid."""
-HALVINGS = 8
+HALVINGS = 14
 """Times that intervals are halved when limits do not hold between their points."""
 SPLIT = 0.05
 """Excess, as a share of the range, beyond which intervals are halved instead of tightened."""
@@ -111,7 +111,7 @@ def solve_limited(
     search = _Search(problem, limits, options, deadline, report, path)
     outcome, reason = search.found(path)
     reason = reason or search.unmet
-    if reason or outcome.stop is not Stop.STATIONARY:
+    if reason or not _usable(outcome):
         return search.finished(outcome, reason, 0.0)
     return search.tightened(outcome)
 
@@ -278,15 +278,16 @@ class _Search:
             if excess <= tolerance or rounds == ROUNDS:
                 break
             tightened += 1
-            coarse = excess > SPLIT or tightened > PATIENCE
+            finer = self.halvings < HALVINGS
+            coarse = excess > SPLIT or (finer and tightened > PATIENCE)
             again = None if coarse else self._again(outcome, sides)
-            lost = again is None or not (_solved(again) or again.stop in ENDED)
-            if lost and self.halvings < HALVINGS:
+            lost = again is None or not (_usable(again) or again.stop in ENDED)
+            if lost and finer:
                 (again, reason), tightened = self._halved(sides), 0
             if again is None:
                 break
             outcome = again
-            if not _solved(again):
+            if not _usable(again):
                 break
         if not reason and excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
             reason = (
@@ -442,8 +443,9 @@ class PenalisedAction(Objective[DiscretePath]):
         return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
 
 
-def _solved(outcome: BoundedOutcome[DiscretePath]) -> bool:
-    return outcome.feasible and outcome.stop is Stop.STATIONARY
+def _usable(outcome: BoundedOutcome[DiscretePath]) -> bool:
+    """Whether it tells which intervals to halve: between bounds at the points, if unfinished."""
+    return outcome.feasible and outcome.stop in (Stop.STATIONARY, Stop.ITERATION_LIMIT)
 
 
 def _density(outcome: BoundedOutcome[DiscretePath], objective: LimitedAction) -> float:

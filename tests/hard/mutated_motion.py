@@ -141,7 +141,7 @@ def _edit(entries: Entries, change: Callable[[dict[str, Any]], object]) -> None:
     try:
         header = json.loads(entries["header"])
         change(header)
-    except (ValueError, AttributeError, LookupError, TypeError):
+    except (ValueError, AttributeError, LookupError, TypeError, RecursionError):
         return  # an earlier change has left nothing to change
     entries["header"] = json.dumps(header).encode()
 
