@@ -11,6 +11,7 @@ What `SchemeLagrangian` is for k = 1 where configurations are vectors. [MarsdenP
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -95,7 +96,7 @@ class ChartedLagrangian:
             modes = u.reshape(1 + r, n)
             g, H = self._expand(q0, modes, t0)
             H = h * H[np.r_[:n, 2 * n : len(H)], n:]  # rows p0 and c by columns q1 and c
-            H[:, :n] = H[:, :n] @ self._jacobian(h * modes[0])
+            H[:, :n] = H[:, :n] @ self._jacobian(q0, h * modes[0])
             F = np.concatenate([-g[0] - p0[0, 0], g[2:].ravel()])
             H[:n] *= -1.0
             return F[None], H[None]
@@ -125,11 +126,7 @@ class ChartedLagrangian:
         table = np.zeros((len(first), 3, first.shape[2] + 2))
         table[:, :2, 0] = table[:, :2, 1] = first[:, :, 0]  # q1 - q0 = h v0 + Z0
         table[:, :2, 3:] = first[:, :, 1:]
-        return Scheme(self.scheme.name, self.scheme.order, *self._points, table)
-
-    @property
-    def _points(self) -> tuple[Array, Array]:
-        return self.scheme.points, self.scheme.weights
+        return dataclasses.replace(self.scheme, table=table)
 
     def _curve(self, modes: Array) -> Array:
         """(x, x', 0) at the points, shape (3, N Q, n), of modes (w, c), shape (N, 1 + r, n)."""
@@ -177,11 +174,11 @@ class ChartedLagrangian:
         h = np.array([self.h])
         return IntervalCharts(Chart(self.space), self._twofold, h, self._curve(modes), ends)
 
-    def _jacobian(self, x1: Array) -> Array:
+    def _jacobian(self, q0: Array, x1: Array) -> Array:
         """J of dq1 = J(x1) dx1, in the tangent space at q1, shape (n, n)."""
-        x, turned = np.tile(x1, (self.n, 1)), np.eye(self.n)
-        origin = np.zeros((self.n, self.space.nq))
-        return np.asarray(Chart(self.space).jet(origin, x, turned, np.zeros_like(x))[1].T)
+        each, still = np.eye(self.n), np.zeros((self.n, self.n))
+        moved = Chart(self.space).jets_from(q0, np.stack([still + x1, each, still]))
+        return moved[1].T
 
     def _check(self, w: Array, found: bool) -> None:
         turns = [w[f.v][list(f.group.angular)] for f in self.space.curved]

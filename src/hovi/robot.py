@@ -21,10 +21,9 @@ import pinocchio as pin
 from hovi import configuration, robot_model
 from hovi.chart import Chart
 from hovi.configuration_space import ConfigurationSpace, configuration_space
-from hovi.coupled_model import Coupling, PortableModel, couplings_of, uncoupled
+from hovi.coupled_model import Coupling, PortableModel, couplings_of
 from hovi.errors import InputError, ModelError, nearest
 from hovi.example_robots import BUILT_IN_CODE, build_in_code
-from hovi.mimic_joints import leaders_first
 from hovi.robot_geometry import Shapes, load_shapes
 from hovi.robot_reading import example_source, file_source, is_path
 from hovi.robot_report import describe
@@ -389,12 +388,7 @@ def _from_model(
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]
-    couplings = couplings_of(model)
-    again = bool(couplings and locked)
-    free = leaders_first(uncoupled(model), couplings) if again else model.copy()
-    reduced, shapes = robot_model.locked_and_coupled(
-        free, shapes, locked, couplings if again else ()
-    )
+    reduced, shapes = robot_model.locked_model(model.copy(), shapes, locked)
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.coupled_model import Coupling
+from hovi.coupled_model import Coupling, couplings_of, uncoupled
 from hovi.errors import ModelError, nearest
 from hovi.mass_matrix import MassMatrix
 from hovi.mimic_joints import held_values, leaders_first, read_couplings, with_mimics
@@ -83,6 +83,16 @@ def locked_and_coupled(
             model = pin.buildReducedModel(model, ids, q)
     moving = _moving(couplings, locked)
     return with_mimics(model, moving) if moving else model, shapes
+
+
+def locked_model(
+    model: pin.Model, geometry: list[pin.GeometryModel], locked: Sequence[str]
+) -> tuple[pin.Model, list[pin.GeometryModel]]:
+    """As `locked_and_coupled` for a model with couplings of its own, which stay."""
+    couplings = couplings_of(model) if locked else ()
+    if couplings:  # Pinocchio does not take a leader out
+        model = leaders_first(uncoupled(model), couplings)
+    return locked_and_coupled(model, geometry, locked, couplings)
 
 
 def _moving(couplings: Sequence[Coupling], locked: Sequence[str]) -> tuple[Coupling, ...]:
