@@ -19,12 +19,16 @@ import pinocchio as pin
 import pytest
 
 from cubic_motion import cubic_motion
+from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
 from hovi.errors import InputError, TrajectoryFileError
-from hovi.grid import DiscretePath
+from hovi.grid import DiscretePath, Grid
+from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
-from hovi.schemes import by_name
+from hovi.schemes import by_name, galerkin
+from hovi.solver import solve
+from hovi.state import State
 from hovi.stored_torque import StoredTorque, chebyshev_points
 from hovi.trajectory import Trajectory
 
@@ -469,3 +473,14 @@ def test_stored_torques_hit_their_points_and_keep_jumps() -> None:
     torque, s = StoredTorque(values), chebyshev_points(9)
     for k in range(3):
         np.testing.assert_array_equal(torque(np.full(9, k), s), values[k])
+
+
+def test_the_whole_duration_may_be_asked_for_on_uneven_grids(scene: Scene) -> None:
+    # seven of ten intervals in thirteen pieces: their sum lacks ten units of rounding
+    grid = Grid(np.repeat([0.15, 0.15 / 13], [3, 91]), (galerkin(2),) * 94)
+    assert grid.duration < 1.5 * (1 - 9 * np.finfo(float).eps)
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    uneven = solve(TrajectoryProblem(ld, State([0.0, 0.0]), State([0.3, 0.1]))).trajectory
+    np.testing.assert_allclose(uneven.sample(1.5).q[0], [0.3, 0.1], atol=1e-12)
+    with pytest.raises(InputError, match="the motion lasts from 0 to"):
+        uneven.sample(1.5 + 1e-12)

@@ -37,15 +37,19 @@ MOST_POINTS = 400_000
 """Quadrature points of the finest grid."""
 
 
-def first_grid(duration: float, intervals: int) -> Grid:
-    """The grid to begin with: two thirds of the intervals, with twice the inner modes.
+def first_grid(duration: float, intervals: int, smooth: bool = True) -> Grid:
+    """The grid to begin with: galerkin-2 on the intervals, or two thirds of them with more modes.
 
-    It has as many quadrature points as galerkin-2 on all of them, and smaller errors where the
-    motion is smooth; and its modes tell how fast they decay.
-    duration: T, in [s]. Raises InputError as Grid.uniform does.
+    These have as many quadrature points, and smaller errors where the motion is smooth; and their
+    modes tell how fast they decay.
+    duration: T, in [s]. intervals: those beyond FIRST_INTERVALS do not count. smooth: whether
+        nothing is known that makes kinks, as limits and via points do.
+    Raises InputError as Grid.uniform does.
     """
-    number = max(2 * min(intervals, FIRST_INTERVALS) // 3, 1)
-    return Grid.uniform(duration, number, galerkin(4))
+    number = min(intervals, FIRST_INTERVALS)
+    if not smooth:
+        return Grid.uniform(duration, number, galerkin(2))
+    return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4))
 
 
 def solve_to_tolerance(

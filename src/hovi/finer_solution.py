@@ -92,7 +92,7 @@ def _solved(
         return None
     coarse, finer = motion(problem, path), solution.trajectory
     k, s = places(coarse)
-    t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, coarse.duration)
+    t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, finer.duration)
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
     known, cost = problem.ld.action(path), solution.cost

@@ -32,8 +32,8 @@ def next_grid(candidate: Candidate) -> Grid:
         return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
     demands, rho = _demands(candidate, finer), _decay(candidate, finer)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
-    change = rho**MORE_MODES if same_steps else 0.5
-    if all(demand.left(change) <= HOPED for demand in demands):
+    # halved everywhere, as under limits, its own error would take twice as many intervals again
+    if same_steps and all(demand.left(rho**MORE_MODES) <= HOPED for demand in demands):
         return finer.problem.grid
     grid = refined(problem.grid, rho, demands, problem.robot.nv)
     return finer_grid(grid) if _same(grid, problem.grid) else grid

@@ -154,7 +154,8 @@ class Trajectory:
     def _locate(self, t: npt.ArrayLike) -> tuple[Index, Array]:
         """The interval of each time, and the place in [0, 1] within it."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        slack = 4 * np.finfo(float).eps * self.duration
+        # the nodes' times are sums of so many steps
+        slack = (4 + self.grid.intervals) * np.finfo(float).eps * self.duration
         if times.ndim != 1 or not np.isfinite(times).all():
             raise InputError(f"times must be finite and of shape (M,), not {times.shape}.")
         if times.size and not (-slack <= times.min() and times.max() <= self.duration + slack):
