@@ -19,6 +19,7 @@ from hovi.grid import DiscretePath, Grid
 from hovi.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.lagrangian import EffortLagrangian, Lagrangian, PointTerms
 from hovi.optimize.contraction import contract
+from hovi.optimize.least_squares import predict
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
@@ -165,12 +166,10 @@ class DiscreteLagrangian:
         """
         if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
             return None
-        multipliers = []
         steps = self.point_steps(step, coordinates, expansion)
-        for dx, (tau, J) in zip(steps, expansion.torque, strict=True):
-            predicted = tau + np.matmul(J, dx[:, :, None])[:, :, 0]
-            multipliers.append(self.lagrangian.weight * predicted)
-        return multipliers
+        weight = self.lagrangian.weight
+        pairs = zip(expansion.torque, steps, strict=True)
+        return [predict(tau, weight, J, dx) for (tau, J), dx in pairs]
 
     def point_steps(
         self, step: Array, coordinates: Coordinates, expansion: Expansion

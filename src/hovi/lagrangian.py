@@ -16,6 +16,7 @@ import numpy.typing as npt
 from hovi import tangent
 from hovi.configuration_space import ConfigurationSpace
 from hovi.effort_term import EffortTerm
+from hovi.optimize.least_squares import expand_squares, weighted_square
 from hovi.point_function import PointFunction
 from hovi.robot import Robot
 from hovi.tangent import Symbols
@@ -148,16 +149,23 @@ class EffortLagrangian(Lagrangian):
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """1/2 tau^T diag(R) tau + V + phi, shape (P,)."""
         tau = self.torques.torque(jet[0], jet[1], jet[2], t)
-        return self.value_of(tau, jet, t)
-
-    def value_of(self, tau: Array, jet: tuple[Array, ...], t: Array | None = None) -> Array:
-        """The value where the torque is known already, shape (P,)."""
         value = 0.5 * np.vecdot(tau, self.weight * tau)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
         if self.effort_term is not None:
             value = value + self.effort_term.value(tau, jet[1])
         return np.asarray(value)
+
+    def integral(
+        self, tau: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
+    ) -> float:
+        """sum_p w_p L at points where the torque is known; weights: w, shape (P,)."""
+        total = weighted_square(tau, self.weight, weights)
+        if self.potential is not None:
+            total += float(weights @ self.potential.value(*jet, t=t))
+        if self.effort_term is not None:
+            total += float(weights @ self.effort_term.value(tau, jet[1]))
+        return total
 
     def gradient(
         self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
@@ -168,10 +176,8 @@ class EffortLagrangian(Lagrangian):
         """
         q, v, a = jet
         tau, J = self.torques.linearize(q, v, a, t)
-        effort = self.weight * tau
-        if terms is not None:
-            effort = effort + terms.effort_gradient
-        gradient = np.matmul(effort[:, None], J)[:, 0]
+        force = None if terms is None else terms.effort_gradient
+        _, gradient = expand_squares(tau, self.weight, J, force)
         if self.effort_term is not None:
             gradient = gradient + self.effort_term.expand(tau, v, J)[1]
         if terms is not None:
@@ -207,11 +213,8 @@ class EffortLagrangian(Lagrangian):
             given = self.weight * tau if multiplier is None else multiplier
             multiplier = given + self.effort_term.slope(tau, v)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
-        effort = self.weight * tau
-        value = 0.5 * np.vecdot(tau, effort)
-        if terms is not None:
-            effort = effort + terms.effort_gradient
-        gradient = np.matmul(effort[:, None], J)[:, 0]
+        force = None if terms is None else terms.effort_gradient
+        value, gradient = expand_squares(tau, self.weight, J, force)
         if terms is not None:
             gradient += terms.jet_gradient
             diagonal = np.arange(hessian.shape[1])

@@ -104,10 +104,9 @@ class ActionObjective(Objective[DiscretePath]):
         for i, (jet, t, weights) in enumerate(
             zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)
         ):
-            density = self.lagrangian.value_of(torques[i], jet, t)
+            value += self.lagrangian.integral(torques[i], jet, t, weights)
             if self.multipliers is not None:
-                density = density + np.vecdot(self.multipliers.torque[i], torques[i])
-            value += float(weights @ density)
+                value += float(weights @ np.vecdot(self.multipliers.torque[i], torques[i]))
         if self.multipliers is not None:
             rho = self.multipliers.node_penalty
             residuals = node_residuals(self.problem, x)

@@ -9,6 +9,7 @@
 #include "band_product.hpp"
 #include "doors.hpp"
 #include "interval_paths.hpp"
+#include "least_squares.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -106,6 +107,29 @@ void move(const Input<3>& step, const Input<1>& steps, bool nodal, const Input<2
              new_z.data(), new_inner.data());
 }
 
+double weighted_square(const Input<2>& residuals, const Input<1>& metric,
+                       const Input<1>& weights) {
+  const nb::gil_scoped_release released;
+  return hovi::weighted_square(
+      {residuals.shape(0), residuals.shape(1), residuals.data(), metric.data()}, weights.data());
+}
+
+void expand_squares(const Input<2>& residuals, const Input<1>& metric, const Input<3>& jacobian,
+                    const std::optional<Input<2>>& force, const Output<1>& values,
+                    const Output<2>& gradient) {
+  const nb::gil_scoped_release released;
+  hovi::expand_squares({residuals.shape(0), residuals.shape(1), residuals.data(), metric.data()},
+                       jacobian.data(), jacobian.shape(2), force ? force->data() : nullptr,
+                       values.data(), gradient.data());
+}
+
+void predict(const Input<2>& residuals, const Input<1>& metric, const Input<3>& jacobian,
+             const Input<2>& change, const Output<2>& out) {
+  const nb::gil_scoped_release released;
+  hovi::predict({residuals.shape(0), residuals.shape(1), residuals.data(), metric.data()},
+                jacobian.data(), change.data(), change.shape(1), out.data());
+}
+
 }  // namespace
 
 NB_MODULE(_packed, m) {
@@ -121,5 +145,9 @@ NB_MODULE(_packed, m) {
         "inner"_a, "out"_a);
   m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
         "new_z"_a, "new_inner"_a);
+  m.def("weighted_square", &weighted_square, "residuals"_a, "metric"_a, "weights"_a);
+  m.def("expand_squares", &expand_squares, "residuals"_a, "metric"_a, "jacobian"_a,
+        "force"_a.none(), "values"_a, "gradient"_a);
+  m.def("predict", &predict, "residuals"_a, "metric"_a, "jacobian"_a, "change"_a, "out"_a);
   m.def("solve", &solve, "factor"_a, "rows"_a, "rhs"_a, "out"_a, "portable"_a = false);
 }
