@@ -21,8 +21,9 @@ def test_control_characters_are_spelled_out(strange: str) -> None:
     assert sentence.startswith("there is no ")
 
 
-def test_long_words_are_cut_in_the_middle() -> None:
-    sentence = str(HoviError("there is no " + "x" * 10**6 + "end of it."))
+@pytest.mark.parametrize("letter", ["x", " "])
+def test_long_words_and_gaps_are_cut_in_the_middle(letter: str) -> None:
+    sentence = str(HoviError("there is no " + letter * 10**6 + "end of it."))
     assert len(sentence) < 200
     assert sentence.endswith("end of it.")
 

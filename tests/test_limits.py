@@ -59,6 +59,8 @@ def test_limits_survive_their_dictionary(ur5: Robot) -> None:
         {"base": 3},
         {"base": ["urdf"]},
         {"v": None},
+        {"tau": 1e-308},
+        {"q": [[1e300, 1e308], [0.0, 1.0]]},
         3,
     ],
 )
@@ -66,6 +68,13 @@ def test_bad_limits_are_refused_in_one_sentence(two_link: Robot, bad: Any) -> No
     with pytest.raises(InputError) as caught:
         as_limits(two_link, bad)
     assert str(caught.value).count("\n") == 0
+
+
+def test_bounds_beyond_all_measure_are_none(two_link: Robot) -> None:
+    limits = as_limits(two_link, {"base": "none", "q": {"elbow": [0.0, 1e308]}, "tau": 1e200})
+    assert np.isinf(limits.upper).all()
+    assert list(limits.lower[0]) == [-np.inf, 0.0]
+    assert np.isinf(limits.lower[3]).all()
 
 
 def test_limits_that_leave_no_room_are_refused(two_link: Robot) -> None:

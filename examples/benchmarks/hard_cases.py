@@ -1,12 +1,16 @@
 """Hard cases: what a literal implementation of the paper does on each, what hovi does, and the bar.
 
 The cases are those of tests/hard, which are run here together with what breaks on them. With the
-word `long` those that take minutes: a million steps, 100,000 intervals, thirty links.
+word `long` those that take minutes: a million steps, 100,000 intervals, thirty links. They take an
+hour together, so that `--table FILE` writes every row as soon as it is measured and leaves the
+others as they are; `--only 3b 22b` runs some.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib
+import itertools
 import sys
 import time
 import traceback
@@ -14,7 +18,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from measuring import print_machine
+from measuring import machine, print_machine
 from threadpoolctl import threadpool_limits
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
@@ -64,22 +68,42 @@ def _attempted(work: Any) -> str:
         return f"{type(error).__name__}: {error}"
 
 
-def main() -> None:
-    long = "long" in sys.argv[1:]
-    good = True
+def rows_of(path: Path | None) -> dict[str, str]:
+    """Rows of an earlier table, by the numbers of their cases."""
+    if path is None or not path.exists():
+        return {}
+    lines = (line for line in path.read_text().splitlines() if line.startswith("| "))
+    return {line.split("|")[1].strip(): line for line in lines}
+
+
+def table(rows: dict[str, str]) -> str:
+    """All rows that there are, by families and in their order."""
     columns = ["case", "claim", "a literal implementation", "hovi", "the bar", "", "s"]
+    head = ["| " + " | ".join(columns) + " |", "|" + "---|" * (len(columns) - 1) + "---:|"]
+    parts = []
+    for family, cases in families().items():
+        lines = [rows[case.number] for case in cases if case.number in rows]
+        if lines:
+            parts.append("\n".join([f"**{family.capitalize()}**\n", *head, *lines]))
+    return "\n\n".join(parts)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("long", nargs="?", choices=["long"], help="the cases that take minutes")
+    parser.add_argument("--only", nargs="+", metavar="NUMBER", help="these cases")
+    parser.add_argument("--table", type=Path, metavar="FILE", help="where rows are kept")
+    given = parser.parse_args()
+    good, rows = True, rows_of(given.table)
     with threadpool_limits(1):
-        for family, cases in families().items():
-            rows = [row(case) for case in cases if case.long == long]
-            if not rows:
+        for case in itertools.chain(*families().values()):
+            if case.long != bool(given.long) or case.number not in (given.only or [case.number]):
                 continue
-            good = good and all(fine for fine, _ in rows)
-            print(f"**{family.capitalize()}**\n")
-            print("| " + " | ".join(columns) + " |")
-            print("|" + "---|" * (len(columns) - 1) + "---:|")
-            for _, cells in rows:
-                print("| " + " | ".join(cells) + " |")
-            print(flush=True)
+            fine, cells = row(case)
+            good, rows[case.number] = good and fine, "| " + " | ".join(cells) + " |"
+            if given.table is not None:
+                given.table.write_text(f"{table(rows)}\n\n{machine(threads=1)}\n")
+    print(f"{table(rows)}\n")
     print_machine(threads=1)
     sys.exit(0 if good else 1)
 

@@ -69,6 +69,11 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 def print_machine(threads: int | None = None) -> None:
     """One line on what the numbers above were measured with."""
+    print(f"{machine(threads)}\n")
+
+
+def machine(threads: int | None = None) -> str:
+    """That line: processor, threads, and the packages that count."""
     processor = platform.processor() or platform.machine()
     cpu = Path("/proc/cpuinfo")
     if cpu.exists():
@@ -77,4 +82,4 @@ def print_machine(threads: int | None = None) -> None:
     cores = len(os.sched_getaffinity(0))
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "pin", "casadi"))
     said = "" if threads is None else f", {threads} thread{'s' if threads > 1 else ''}"
-    print(f"*{processor}, {cores} cores{said}; Python {platform.python_version()}, {packages}.*\n")
+    return f"*{processor}, {cores} cores{said}; Python {platform.python_version()}, {packages}.*"

@@ -8,6 +8,8 @@ by continuation, and what does not end in one then is tried again from four gues
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 from measuring import alone, print_machine, print_table
 
@@ -56,6 +58,9 @@ def measure(name: str) -> list[dict[str, object]]:
             more = hovi.plan(scene, start, goal, duration, starts=STARTS, **settings)
             row["again"] = _said(more)
         rows.append(row)
+        print(
+            f"{name} {number}: {first.status} after {first.nit} steps", file=sys.stderr, flush=True
+        )
     return rows
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 _LONGEST = 256  # characters that are compared: the time grows with their square
 _MOST = 60  # names that are listed
-_WORD = re.compile(r"\S{160,}")
+_WORD = re.compile(r"\S{160,}|\s{160,}")
 
 
 class HoviError(Exception):

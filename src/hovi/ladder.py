@@ -35,7 +35,7 @@ LIMITED = "the limits", "the duration", "the intervals", "inertia", "gravity"
 """Ways in the order in which they are tried, the most promising first."""
 INFEASIBLE = "the limits", "the duration"
 """Ways when no motion within the limits was found: the others change none of them."""
-AGAIN = 4
+AGAIN = 12
 """Solves that go on from the best motion so far."""
 ENDED = Status.TIME_LIMIT, Status.INTERRUPTED
 """What ends a climb whatever is left to try."""

@@ -22,6 +22,8 @@ _SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
 _TRANSLATIONS = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2, "JointModelTranslation": 3}
 UNLIMITED = 1e15
 """Bounds beyond this mean that there is none."""
+LEAST_ROOM = 1e-12
+"""Least range of a limit, relative to its bounds where they are larger than one."""
 TOLERANCE = 1e-6
 """Share of its range by which a limit may be exceeded between the quadrature points."""
 
@@ -33,7 +35,7 @@ class Limits:
     lower, upper: shape (4, nv), one row per kind, in [rad], [rad/s], [rad/s^2] and [N m] (metres
         and newtons for sliding joints).
     tolerance: by which share of its range a limit may be exceeded anywhere.
-    Raises InputError for a range that is empty or not a number.
+    Raises InputError for a range that is empty, to rounding, or not a number.
     """
 
     lower: Array
@@ -43,13 +45,21 @@ class Limits:
     def __post_init__(self) -> None:
         if np.isnan(self.lower).any() or np.isnan(self.upper).any():
             raise InputError("a limit is not a number; leave out what is not limited.")
-        for k, i in np.argwhere(self.lower >= self.upper):
+        for k, i in np.argwhere(self._without_room):
             raise InputError(
                 f"the {NAMES[KINDS[k]]} limits of joint coordinate {i} leave no room: "
                 f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; widen them."
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
+
+    @property
+    def _without_room(self) -> npt.NDArray[np.bool_]:
+        """Where rounding leaves nothing between the bounds, or only numbers beyond all limits."""
+        size = np.maximum(1.0, np.minimum(np.abs(self.lower), np.abs(self.upper)))
+        size[np.isinf(size)] = 1.0
+        beyond = (self.lower > UNLIMITED) | (self.upper < -UNLIMITED)
+        return np.asarray((self.lower + LEAST_ROOM * size >= self.upper) | beyond)
 
     @property
     def bounded(self) -> npt.NDArray[np.bool_]:
@@ -138,6 +148,7 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
     for row, kind in enumerate(KINDS):
         for i, (low, high) in _entries(robot, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
+    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
     chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
     return chosen.with_margin(_number(limits, "margin", 0.0))
 

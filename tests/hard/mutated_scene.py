@@ -6,6 +6,7 @@ solution or in a sentence.
 
 from __future__ import annotations
 
+import dataclasses
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -19,8 +20,8 @@ from mutated_bytes import mutated_bytes
 from verdict import Mutant, Verdict, judge
 
 from hovi.model_files import example, example_scenes
-from hovi.planner import plan
 from hovi.task_file import Task, load_task
+from hovi.task_plan import plan_task
 
 MOST_INTERVALS = 64  # of a plan that is tried
 TOKENS = (
@@ -62,8 +63,7 @@ Change = Callable[[dict[str, Any], Random], None]
 
 @cache
 def _originals() -> tuple[str, ...]:
-    names = [name for name in example_scenes() if name.startswith("two_link")]
-    return tuple(example(f"{name}.toml").read_text() for name in names)
+    return tuple(example(f"{name}.toml").read_text() for name in example_scenes())
 
 
 def mutate(random: Random) -> Mutant:
@@ -84,9 +84,10 @@ def mutate(random: Random) -> Mutant:
 
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
     """Load it as a user does, from a file in `folder`, and plan a little."""
-    urdf = folder / "two_link.urdf"
-    if not urdf.exists():
-        urdf.write_text(example("two_link.urdf").read_text())
+    for urdf in example("two_link.urdf").parent.glob("*.urdf"):
+        copy = folder / urdf.name
+        if not copy.exists():
+            copy.write_text(urdf.read_text())
     path = folder / "scene.toml"
     path.write_bytes(mutant.content)
     return judge(lambda: load_task(path), objection, mutant.poison)
@@ -103,19 +104,8 @@ def objection(task: Task) -> str:
     task.scene.describe()
     if task.intervals > MOST_INTERVALS:
         return ""
-    solution = plan(
-        task.scene,
-        task.start,
-        task.goal,
-        task.duration,
-        scheme=task.scheme,
-        intervals=task.intervals,
-        limits=task.limits,
-        seed=task.seed,
-        max_iterations=2,
-        time_limit=2.0,
-        processes=1,
-    )
+    once = dataclasses.replace(task, starts=1, tolerance=None)
+    solution = plan_task(once, max_iterations=2, time_limit=2.0, processes=1)
     if solution.success and not np.isfinite(solution.cost):
         return f"a minimum of cost {solution.cost} was reported"
     return "" if solution.message else "its plan says nothing"
@@ -190,7 +180,8 @@ def _duration(scene: dict[str, Any], random: Random) -> None:
 
 def _intervals(scene: dict[str, Any], random: Random) -> None:
     """the number of intervals is impossible"""
-    scene["scheme"]["intervals"] = random.choice((0, -1, 10**9, 10**30, 1.5, "16", True))
+    impossible = (0, -1, 10**9, 10**30, 1.5, "16", True)
+    scene.setdefault("scheme", {})["intervals"] = random.choice(impossible)
 
 
 def _end(scene: dict[str, Any], random: Random) -> None:
@@ -206,7 +197,7 @@ def _unknown(scene: dict[str, Any], random: Random) -> None:
         (
             (scene, "durration", 1.0),
             (scene.setdefault("effects", {}), "gravitas", {}),
-            (scene["scheme"], "name", "galerkin"),
+            (scene.setdefault("scheme", {}), "name", "galerkin"),
             (scene, "robot", "no_such_robot"),
             (scene["start"], "w", [0.0, 0.0]),
         )
