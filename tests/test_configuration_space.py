@@ -57,6 +57,33 @@ def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
     np.testing.assert_allclose(space.difference_near(q0[:1], q0[:1], still), still, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("parts", "q", "dq"),
+    [
+        (("SO(3)", 1), 5, 2),
+        (("SO(3)", 1), 4, 4),
+        (("SE(3)",), 8, 6),
+        ((1, "SO(2)"), 3, 1),
+        ((1, "SE(2)"), 5, 5),
+        ((2, "SO(2)", 1), 4, 4),
+    ],
+)
+def test_numbers_that_are_not_the_space_s_are_refused(
+    parts: tuple[int | str, ...], q: int, dq: int
+) -> None:
+    space = ConfigurationSpace(parts)
+    right, by = np.ones((2, space.nq)), np.zeros((2, space.nv))
+    with pytest.raises(InputError, match=rf"numbers here, got {q if q != space.nq else dq} in"):
+        space.integrate(np.ones((2, q)), np.zeros((2, dq)))
+    with pytest.raises(InputError, match=f"a configuration has {space.nq} numbers here, got 0 "):
+        space.integrate(np.array(1.0), by)
+    for pair in ((right[:, 1:], right), (right, right[:, 1:])):
+        with pytest.raises(InputError, match=f"a configuration has {space.nq} numbers here"):
+            space.difference(*pair)
+    with pytest.raises(InputError, match=f"a tangent vector has {space.nv} numbers here"):
+        space.difference_near(right, right, by[:, 1:])
+
+
 def test_numbers_of_a_configuration_are_named_by_what_they_are() -> None:
     robot = load_robot(with_arm("free-flyer"))
     base, arm = ("x", "y", "z", "qx", "qy", "qz", "qw"), ("j1", "j2[cos]", "j2[sin]", "j3")

@@ -136,7 +136,7 @@ class ConfigurationSpace:
         q0, q1 = np.asarray(q0, dtype=np.float64), np.asarray(q1, dtype=np.float64)
         if self.vector:
             return q1 - q0
-        return differenced(self.layout, self.nv, q0, q1)
+        return differenced(self.layout, q0, q1)
 
     def difference_near(self, q0: Array, q1: Array, expected: Array) -> Array:
         """As `difference`, with the full turns that come nearest to an expected answer, (..., nv).
@@ -145,7 +145,7 @@ class ConfigurationSpace:
         """
         if self.vector:
             return q1 - q0
-        return differenced(self.layout, self.nv, q0, q1, expected)
+        return differenced(self.layout, q0, q1, expected)
 
     def normalized(self, q: Array) -> Array:
         """Configurations (..., nq) with quaternions and (cos, sin) of unit norm."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.errors import InputError
 from hovi.lie_groups import _charts
 
 Array = npt.NDArray[np.float64]
@@ -44,11 +45,11 @@ class Group:
 
     def difference(self, g0: Array, g1: Array) -> Array:
         """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
-        return differenced(self._layout, self.nv, g0, g1)
+        return differenced(self._layout, g0, g1)
 
     def difference_near(self, g0: Array, g1: Array, expected: Array) -> Array:
         """As `difference`, with the full turns that come nearest to an expected answer."""
-        return differenced(self._layout, self.nv, g0, g1, expected)
+        return differenced(self._layout, g0, g1, expected)
 
     @property
     def _layout(self) -> Layout:
@@ -64,22 +65,50 @@ class Group:
 
 
 def integrated(layout: Layout, q: Array, dq: Array) -> Array:
-    """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
+    """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq).
+
+    Raises InputError for a number of numbers that is not the layout's.
+    """
+    nq, nv = _totals(layout)
+    _check_numbers("configuration", nq, q)
+    _check_numbers("tangent vector", nv, dq)
     lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
-    result = np.empty((*lead, q.shape[-1]))
-    _charts.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, q.shape[-1]))
+    result = np.empty((*lead, nq))
+    _charts.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
     return result
 
 
-def differenced(
-    layout: Layout, nv: int, q0: Array, q1: Array, expected: Array | None = None
-) -> Array:
-    """q1 (-) q0 for configurations (..., nq) -> tangent vectors (..., nv): see Group."""
+def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = None) -> Array:
+    """q1 (-) q0 for configurations (..., nq) -> tangent vectors (..., nv): see Group.
+
+    Raises InputError for a number of numbers that is not the layout's.
+    """
+    nq, nv = _totals(layout)
+    _check_numbers("configuration", nq, q0, q1)
+    if expected is not None:
+        _check_numbers("tangent vector", nv, expected)
     lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
     result = np.empty((*lead, nv))
     near = None if expected is None else _rows(expected, lead)
     _charts.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
     return result
+
+
+def _totals(layout: Layout) -> tuple[int, int]:
+    """(nq, nv) of a layout, whose last part ends them."""
+    kind, q, v, size = layout[-1].tolist()
+    return q + next((g.nq for g in GROUPS.values() if g.kind == kind), size), v + size
+
+
+def _check_numbers(what: str, count: int, *arrays: Array) -> None:
+    """Compiled code reads and writes as many numbers as the layout says, whatever came."""
+    for array in arrays:
+        came = array.shape[-1] if array.ndim else 0
+        if came != count:
+            raise InputError(
+                f"a {what} has {count} numbers here, got {came} in an array of shape "
+                f"{array.shape}: give (..., {count})."
+            )
 
 
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:
