@@ -327,6 +327,45 @@ def test_a_chain_of_mimics_follows_its_first(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("locked", "held"),
+    [
+        ("a", {"a": 0.0, "c": 0.25, "d": -0.125}),
+        ("b", {"b": 0.0, "a": 0.5, "c": -1.25, "d": 2.125}),
+        ("c", {"c": 0.0, "d": 0.25}),
+    ],
+)
+def test_a_locked_joint_of_a_chain_holds_what_follows_it(
+    tmp_path: Path, locked: str, held: dict[str, float]
+) -> None:
+    """Of a = 2 b + 0.5, c = -3 a + 0.25, d = -1.5 c + 0.25."""
+    text = two_fingers(mimic("b", 2.0, 0.5)).replace("</robot>", "")
+    text += LINK.format("tip", 0.1, 1.0, 0.1) + LINK.format("top", 0.1, 1.0, 0.1)
+    text += joint("c", "right", "tip", 0.2, mimic("a", -3.0, 0.25))
+    text += joint("d", "tip", "top", 0.2, mimic("c", -1.5, 0.25)) + "</robot>"
+    robot, free = loaded(tmp_path, text, locked=[locked]), loaded(tmp_path, text, mimic=False)
+    assert robot.joint_names == (() if locked == "b" else ("b",))
+    stands = {"b": 0.7, "a": 1.9, **held}
+    np.testing.assert_allclose(top(robot, stands), top(free, stands), atol=1e-14)
+
+
+def top(robot: Robot, stands: dict[str, float]) -> Array:
+    """Where the frame "top" is when the joints that move on their own stand so."""
+    data, q = robot.model.createData(), np.array([stands[name] for name in robot.joint_names])
+    pin.framesForwardKinematics(robot.model, data, q)
+    return np.array(data.oMf[robot.model.getFrameId("top")].homogeneous)
+
+
+def test_a_range_that_a_continuous_leader_cannot_keep_is_told(tmp_path: Path) -> None:
+    text = two_fingers(mimic("b", -2.0, 0.3))
+    turning = text.replace('<joint name="b" type="revolute"', '<joint name="b" type="continuous"')
+    assert turning != text
+    told = "position range of a is not kept"
+    assert told in loaded(tmp_path, turning).describe()
+    assert told not in loaded(tmp_path, turning, mimic=False).describe()
+    assert told not in loaded(tmp_path, text).describe()
+
+
+@pytest.mark.parametrize(
     ("text", "sentence"),
     [
         (two_fingers(mimic("nobody")), "'a' mimics 'nobody', which is no joint"),

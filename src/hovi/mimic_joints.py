@@ -7,7 +7,7 @@ leaders come first, and then coupled.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -21,10 +21,13 @@ _LARGEST = float(np.finfo(float).max)
 """Pinocchio's limit where a URDF states none."""
 
 
-def read_couplings(text: str, name: str = "robot.urdf") -> tuple[Coupling, ...]:
+def read_couplings(
+    text: str, name: str = "robot.urdf", locked: Collection[str] = ()
+) -> tuple[Coupling, ...]:
     """The <mimic> tags of a URDF's movable joints, followed to joints that mimic no other.
 
-    name: what to call the URDF in a message. Raises ModelError for a leader that does not exist
+    name: what to call the URDF in a message. locked: joints that stand still although they mimic
+    others, where chains end too. Raises ModelError for a leader that does not exist
     and for joints that mimic each other in a ring.
     """
     joints = {joint.get("name", ""): joint for joint in checked_urdf(text, name).iterfind("joint")}
@@ -43,19 +46,20 @@ def read_couplings(text: str, name: str = "robot.urdf") -> tuple[Coupling, ...]:
         if joints[leader].get("type") == "fixed" or factor == 0.0:
             leader, factor = "", 0.0
         stated[follower] = Coupling(follower, leader, factor, offset)
-    return tuple(_to_the_end(coupling, stated) for coupling in stated.values())
+    following = {name: coupling for name, coupling in stated.items() if name not in locked}
+    return tuple(_to_the_end(coupling, following) for coupling in stated.values())
 
 
-def _to_the_end(coupling: Coupling, stated: Mapping[str, Coupling]) -> Coupling:
+def _to_the_end(coupling: Coupling, following: Mapping[str, Coupling]) -> Coupling:
     """The coupling with a leader that follows no other joint."""
-    for _ in stated:
-        if coupling.leader not in stated:
+    for _ in following:
+        if coupling.leader not in following:
             return coupling
-        before = stated[coupling.leader]
+        before = following[coupling.leader]
         factor = coupling.multiplier * before.multiplier
         offset = coupling.multiplier * before.offset + coupling.offset
         coupling = Coupling(coupling.follower, before.leader, factor, offset)
-    if coupling.leader not in stated:
+    if coupling.leader not in following:
         return coupling
     raise ModelError(f"joint {coupling.follower!r} mimics itself in the end: break that ring.")
 

@@ -48,7 +48,9 @@ def build_full_model(source: RobotSource) -> pin.Model:
 
 def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
     """The couplings that a source's URDF states, if the robot is to have them."""
-    return read_couplings(source.urdf or "", source.reference) if source.mimic else ()
+    if not source.mimic:
+        return ()
+    return read_couplings(source.urdf or "", source.reference, source.locked)
 
 
 def build_model(source: RobotSource) -> pin.Model:

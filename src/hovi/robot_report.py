@@ -137,9 +137,24 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     mimics = [name for name in mimics if name in movable]
     if mimics and not source.mimic:
         yield f"{_some(mimics)}: <mimic> counts with mimic=True only; the joint moves freely"
+    unbounded = [name for name in _ranges_not_kept(model, robot) if source.mimic]
+    if unbounded:
+        yield (
+            f"the position range of {_some(unbounded)} is not kept, as what leads there is a "
+            "continuous joint"
+        )
     odd = [link.get("name", "") for link in robot.iterfind("link") if _breaks_triangle(link)]
     if odd:
         yield f"no rigid body has the principal inertias that are written for {_some(odd)}"
+
+
+def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[str]:
+    """Followers with a range of their own whose leader has no plain position to bound."""
+    for coupling in couplings_of(model):
+        joint = robot.find(f"joint[@name='{coupling.follower}']")
+        continuous = model.joints[model.getJointId(coupling.leader)].nq == 2
+        if continuous and joint is not None and joint.get("type") == "revolute":
+            yield coupling.follower
 
 
 def _breaks_triangle(link: ElementTree.Element) -> bool:
