@@ -23,7 +23,9 @@ from hovi.coupled_model import Coupling, coupled
 from hovi.dynamics_replay import chart_rates
 from hovi.effects import Effect, Gravity, SceneSymbols, ViscousFriction
 from hovi.errors import InputError
-from hovi.lagrangians import mechanics
+from hovi.lagrangian import Lagrangian
+from hovi.lagrangians import bracket, mechanics
+from hovi.legendre_transforms import highest_derivative, legendre
 from hovi.planner import plan
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -272,6 +274,69 @@ def test_a_step_that_turns_too_far_is_named() -> None:
     start = State([0, 0, 0, 1], [0.0, 40.0, 0.0])
     with pytest.raises(InputError, match="shorter step"):
         simulate(Scene(rigid_body(MOMENTS)), start, 1.0, intervals=10)
+
+
+# Of optimal control, k = 2
+
+
+def pontryagin(
+    robot: Robot, L: Lagrangian, start: tuple[Array, Array], p: Array, T: float
+) -> tuple[Array, Array]:
+    """q and (v, p, p~) at T: DOP853 on q' = q v, L_a = p~, p~' = L_v - p, p' = ad*_v p + L_q."""
+    n, (q, v) = robot.nv, start
+    y = np.concatenate([v, *p])
+
+    def rhs(t: float, z: Array) -> Array:
+        x, v, p, pt = np.split(z, 4)
+        here = robot.integrate(q, x)[None], v[None]
+        a = highest_derivative(L, here, np.stack([p, pt])[None])
+        by_q, by_v, _ = L.gradient(*here, a)[0]
+        turned = bracket(robot.space, np.tile(v, (n, 1)), np.eye(n)) @ p
+        rate = chart_rates(robot, q[None], x[None], v[None])[0]
+        return np.concatenate([rate, a[0], turned + by_q, by_v - p])
+
+    for _ in range(10):
+        first = np.concatenate([np.zeros(n), y])
+        z = solve_ivp(rhs, (0, T / 10), first, "DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+        q, y = robot.integrate(q, z[:n]), z[n:]
+    return q, y
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_the_flow_of_optimal_control_has_the_order_of_the_nodes(base: str) -> None:
+    robot = load_robot(with_arm(base))
+    L = Scene(robot, [Gravity()]).effort_lagrangian()
+    q, (v, a, jerk) = start_of(robot).q, 0.5 * np.random.default_rng(1).normal(size=(3, robot.nv))
+    x, p = legendre(L, q, v, a, jerk)
+    expected, rest = pontryagin(robot, L, (np.asarray(q), v), p, 0.5)
+    errors = []
+    for N in (24, 48) if base == "free-flyer" else (12, 24):
+        motion = flow(ChartedLagrangian(L, robot.space, galerkin(1), 0.5 / N), x, p, N)
+        found = np.concatenate([motion.jets[1][-1], motion.p[-1].ravel()])
+        misses = robot.difference(expected, motion.q[-1]), found - rest
+        errors.append(np.abs(np.concatenate(misses)).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(6, abs=0.3)
+    np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=1e-6)
+
+
+def test_a_plan_is_the_flow_from_its_own_momenta() -> None:
+    """On a group, too: the optimiser and the flow solve the same discrete equations."""
+    robot = load_robot(with_arm("free-flyer"))
+    q = configurations(robot, 2, size=0.4)
+    scene = Scene(robot, [Gravity()])
+    planned = plan(scene, q[0], q[1], 1.0, limits="none", intervals=8)
+    assert planned.problem is not None
+    ld = planned.problem.ld
+    path = planned.trajectory.path
+    start = State(path.q[0], path.v[0])
+    motion = flow(ld, start, ld.momenta(path)[0], 4)
+    misses = robot.difference(path.q[:5], motion.q)
+    assert np.abs(misses).max() < 1e-6
+    np.testing.assert_allclose(motion.p, ld.momenta(path)[:5], rtol=1e-5, atol=1e-4)
+    again = motion.trajectory
+    np.testing.assert_allclose(again.path.z, path.z[:4], rtol=1e-4, atol=1e-5)
+    t = np.linspace(0.0, 0.49, 20)
+    np.testing.assert_allclose(again.sample(t).tau, planned.trajectory.sample(t).tau, atol=1e-3)
 
 
 # Playing plans

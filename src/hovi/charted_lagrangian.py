@@ -1,12 +1,14 @@
-"""The discrete Lagrangian of mechanics on groups: L_d on Q x Q, one interval at a time.
+"""The discrete Lagrangian on groups: L_d on T^(k-1)Q x T^(k-1)Q, one interval at a time, k = 1, 2.
 
 An interval's curve is q(s) = q0 (+) x(s) in the chart of its first node, which moves with that
-node: L_d = h sum_j w_j L(q0 (+) x_j, J(x_j) x_j') keeps the left symmetries of L. The step solves
+node: L_d = h sum_j w_j L(q0 (+) x_j, J(x_j) x_j', ..) keeps the left symmetries of L. A step solves
 
-    p0 = -D_1 L_d(q0, q1),   0 = D_c L_d,   p1 = D_2 L_d(q0, q1)
+    p0 = -D_1 .. -D_k L_d,   0 = D_c L_d,   p1 = D_{k+1} .. D_2k L_d
 
-for the mean w = x1 / h of x' and the inner modes c, which stay of order one as h tends to zero.
-What `SchemeLagrangian` is for k = 1 where configurations are vectors. [MarsdenPekarskyShkoller1999]
+for the moments w of x^(k) and the inner modes c, which stay of order one as h tends to zero. What
+`SchemeLagrangian` is where configurations are vectors. [MarsdenPekarskyShkoller1999]
+
+A point of T^(k-1)Q is a row (q, q', ..) of nq + (k - 1) nv numbers.
 """
 
 from __future__ import annotations
@@ -23,7 +25,9 @@ from hovi.chart_expansion import IntervalCharts
 from hovi.configuration_space import ConfigurationSpace
 from hovi.errors import InputError, SchemeError
 from hovi.lagrangian import Lagrangian
+from hovi.lagrangians import bracket
 from hovi.newton import newton
+from hovi.regularised import Regularised, regularised
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -36,27 +40,24 @@ WIDEST = 3.0
 class ChartedSegment:
     """An interval of a discrete motion on a group.
 
-    w: x1 / h, shape (1, 1, nv). inner: inner modes, shape (1, r, nv).
-    x1: q1, shape (1, 1, nq). p1: momenta there, shape (1, 1, nv).
+    w: regularised coordinates, shape (1, k, nv). z: gamma w. inner: inner modes, (1, r, nv); all
+        in the units of x^(k).
+    x1: the end, shape (1, 1, nq + (k - 1) nv). p1: momenta there, shape (1, k, nv).
     """
 
     w: Array
+    z: Array
     inner: Array
     x1: Array
     p1: Array
 
-    @property
-    def z(self) -> Array:
-        """The regularised coordinate w."""
-        return self.w
-
 
 @dataclass(frozen=True, eq=False)
 class ChartedLagrangian:
-    """L_d of one interval on a configuration space with groups, for L on TQ.
+    """L_d of one interval on a configuration space with groups, for L on TQ or T^(2)Q.
 
-    lagrangian: L, of order 1. space: Q. scheme: a table for order 1. h: the step, in [s].
-    Raises InputError for a step that is not positive, SchemeError for another order.
+    lagrangian: L, of order 1 or 2. space: Q. scheme: a table of that order. h: the step, in [s].
+    Raises InputError for a step that is not positive, SchemeError for other orders.
     """
 
     lagrangian: Lagrangian
@@ -67,122 +68,196 @@ class ChartedLagrangian:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.h) and self.h > 0):
             raise InputError(f"a step must be positive and finite, got {self.h} s.")
-        if (self.lagrangian.order, self.scheme.derivatives) != (1, 1):
+        if self.k not in (1, 2) or self.scheme.derivatives != self.k:
             raise SchemeError(
-                "flows on groups are those of Lagrangians of order 1, got order "
-                f"{self.lagrangian.order} and a scheme for {self.scheme.derivatives}."
+                "flows on groups are those of Lagrangians of order 1 or 2 with a scheme of the "
+                f"same order, got {self.k} and {self.scheme.derivatives}."
             )
 
     @property
     def k(self) -> int:
         """Order of the Lagrangian."""
-        return 1
+        return self.lagrangian.order
 
     @property
     def n(self) -> int:
         """Degrees of freedom."""
         return self.lagrangian.nv
 
+    @property
+    def regularised(self) -> Regularised:
+        """The change between the chart's end and w."""
+        return regularised(self.k, self.h)
+
+    def split(self, x: Array) -> list[Array]:
+        """(q, q', ..) of rows x (N, nq + (k - 1) nv)."""
+        return np.split(x, [self.space.nq], axis=1)[: self.k]
+
     def from_start(
         self, x0: Array, p0: Array, t0: float = 0.0, guess: ChartedSegment | None = None
     ) -> ChartedSegment:
-        """The segment that starts at q0 with momentum p0, (1, 1, nq) and (1, 1, nv).
+        """The segment that starts at a point (1, 1, nq + ..) with momenta (1, k, nv).
 
         By Newton's method. Raises InputError where there is none, or it turns too far.
         """
-        q0, n, h, r = x0[0], self.n, self.h, self.scheme.inner_modes
+        k, n, r, R = self.k, self.n, self.scheme.inner_modes, self.regularised
+        start = x0[0]
+        back = np.kron(R.back / self.h, np.eye(n))
 
         def system(u: Array) -> tuple[Array, Array]:
-            modes = u.reshape(1 + r, n)
-            g, H = self._expand(q0, modes, t0)
-            H = h * H[np.r_[:n, 2 * n : len(H)], n:]  # rows p0 and c by columns q1 and c
-            H[:, :n] = H[:, :n] @ self._jacobian(q0, h * modes[0])
-            F = np.concatenate([-g[0] - p0[0, 0], g[2:].ravel()])
-            H[:n] *= -1.0
+            interval = self._interval(start, u.reshape(1, k + r, n))
+            p, slack, H = self._expand(interval, start, t0)
+            F = np.concatenate([back @ (p[0] - p0[0]).ravel(), self.h * slack.ravel()])
+            H[: k * n] = back @ H[: k * n]
+            H[k * n :] *= self.h
             return F[None], H[None]
 
         first = (
-            np.zeros((1, 1 + r, n)) if guess is None else np.append(guess.w, guess.inner, axis=1)
+            np.zeros((1, k + r, n)) if guess is None else np.append(guess.w, guess.inner, axis=1)
         )
         u, found = newton(system, first.reshape(1, -1))
-        self._check(u[0, :n], bool(found.all()))
-        modes = u.reshape(1, 1 + r, n)
-        p1 = self._expand(q0, modes[0], t0)[0][1]
-        q1 = self.space.integrate(q0, h * modes[:, 0])
-        return ChartedSegment(modes[:, :1], modes[:, 1:], q1[None], p1[None, None])
+        modes = u.reshape(1, k + r, n)
+        interval = self._interval(start, modes)
+        self._check(interval.ends[0, 0], bool(found.all()))
+        p1 = self._momenta(interval, start, t0)[1]
+        return ChartedSegment(
+            modes[:, :k], R.z(modes[:, :k]), modes[:, k:], self._end(start, interval)[None], p1
+        )
 
     def jet(self, q0: Array, w: Array, inner: Array) -> tuple[Array, Array]:
-        """(q, v) at the quadrature points of N intervals, (N Q, nq) and (N Q, nv).
+        """(q, v) at the quadrature points of N intervals, for k = 1: (N Q, nq) and (N Q, nv).
 
         q0: (N, 1, nq). w, inner: (N, 1, nv) and (N, r, nv).
         """
-        q, v, _ = Chart(self.space).jets_from(q0[:, 0], self._curve(np.append(w, inner, axis=1)))
+        interval = self._interval(q0[:, 0], np.append(w, inner, axis=1))
+        q, v, _ = Chart(self.space).jets_from(q0[:, 0], interval.x)
         return q, v
 
     @cached_property
-    def _twofold(self) -> Scheme:
-        """The scheme as a table for k = 2 that ignores the velocities of the ends."""
+    def _scheme(self) -> Scheme:
+        """The scheme as a table for k = 2, which ignores the velocities of the ends for k = 1."""
+        if self.k == 2:
+            return self.scheme
         first = self.scheme.table  # (Q, 2, 1 + r) over (Z0, c)
         table = np.zeros((len(first), 3, first.shape[2] + 2))
         table[:, :2, 0] = table[:, :2, 1] = first[:, :, 0]  # q1 - q0 = h v0 + Z0
         table[:, :2, 3:] = first[:, :, 1:]
         return dataclasses.replace(self.scheme, table=table)
 
-    def _curve(self, modes: Array) -> Array:
-        """(x, x', 0) at the points, shape (3, N Q, n), of modes (w, c), shape (N, 1 + r, n)."""
-        table = np.delete(self._twofold.table, [0, 2], axis=2)  # over (Z0, c)
-        table = table * self.h ** (1.0 - np.arange(3.0))[:, None]
-        points: Array = np.einsum("qri,nia->rnqa", table, modes)
-        return points.reshape(3, -1, self.n)
+    @property
+    def _used(self) -> npt.NDArray[np.intp]:
+        """Which of (q0, h v0, q1, h v1, c) L_d depends on."""
+        every = np.arange(4 + self.scheme.inner_modes)
+        return every if self.k == 2 else np.delete(every, [1, 3])
 
-    def _expand(self, q0: Array, modes: Array, t0: float) -> tuple[Array, Array]:
-        """Derivatives of L_d by (q0, q1, h c): gradient (2 + r, n), Hessian, both indices flat."""
-        n, Q = self.n, len(self.scheme.weights)
-        charts = self._charts(modes[None])
-        q, v, _ = Chart(self.space).jets_from(q0, charts.x)
-        _, gradient, hessian = self.lagrangian.evaluate(q, v, t=t0 + self.h * self.scheme.points)
-        force = np.append(gradient, np.zeros((Q, 1, n)), axis=1)
+    def _interval(self, start: Array, modes: Array) -> IntervalCharts:
+        """The charts of N intervals from (w, c), shape (N, k + r, n)."""
+        h, k, N = self.h, self.k, len(start)
+        scaled = h**k * np.append(self.regularised.z(modes[:, :k]), modes[:, k:], axis=1)
+        still = np.zeros((N, 1, self.n))
+        hv = h * self.split(start)[1][:, None] if k == 2 else still
+        Z = scaled if k == 2 else np.concatenate([scaled[:, :1], still, scaled[:, 1:]], axis=1)
+        table = self._scheme.table / h ** np.arange(3.0)[:, None]
+        points: Array = np.einsum("qri,nia->rnqa", table, np.append(hv, Z, axis=1))
+        ends = hv + Z[:, :2]
+        return IntervalCharts(
+            Chart(self.space), self._scheme, np.full(N, h), points.reshape(3, -1, self.n), ends
+        )
+
+    def _end(self, start: Array, interval: IntervalCharts) -> Array:
+        """The end point, shape (1, nq + (k - 1) nv)."""
+        x1, hdx1 = np.moveaxis(interval.ends, 1, 0)
+        q0 = self.split(start)[0]
+        q1, v1, _ = Chart(self.space).jet(q0, x1, hdx1 / self.h, np.zeros_like(x1))
+        return np.append(q1, v1, axis=1) if self.k == 2 else q1
+
+    def _jets(self, interval: IntervalCharts, start: Array) -> list[Array]:
+        jets = Chart(self.space).jets_from(self.split(start)[0], interval.x)
+        return list(jets[: self.k + 1])
+
+    def _times(self, t0: float) -> Array:
+        return np.asarray(t0 + self.h * self.scheme.points)
+
+    def _force(self, gradient: Array) -> Array:
+        """A gradient at the points with zeros for what L does not depend on, (Q, 3, n)."""
+        return np.append(gradient, np.zeros((len(gradient), 2 - self.k, self.n)), axis=1)
+
+    def _momenta(self, interval: IntervalCharts, start: Array, t0: float) -> tuple[Array, Array]:
+        """p0 and p1, shape (1, k, n) each."""
+        gradient = self.lagrangian.gradient(*self._jets(interval, start), t=self._times(t0))
+        return self._ends(interval, self._force(gradient))
+
+    def _ends(self, interval: IntervalCharts, force: Array) -> tuple[Array, Array]:
+        ends = interval.end_gradient(force) * np.array([1.0, self.h, 1.0, self.h])[:, None]
+        return -ends[:, : self.k], ends[:, 2 : 2 + self.k]
+
+    def _expand(
+        self, interval: IntervalCharts, start: Array, t0: float
+    ) -> tuple[Array, Array, Array]:
+        """p0 (1, k, n), D_c L_d (r, n) and the derivatives of both by (w, c)."""
+        n, k, Q = self.n, self.k, len(self.scheme.weights)
+        jets = self._jets(interval, start)
+        _, gradient, hessian = self.lagrangian.evaluate(*jets, t=self._times(t0))
+        force = self._force(gradient)
         # the work of a force has no symmetric Hessian, so that the chart's part stands alone
-        g, bent = charts.expand(force, np.zeros((Q, 3 * n, 3 * n)))
-        used = np.delete(np.arange(g.shape[1]), [1, 3])
+        g, bent = interval.expand(force, np.zeros((Q, 3 * n, 3 * n)))
+        used = self._used
         bent = bent[0][np.ix_(used, used)].transpose(0, 2, 1, 3)
-        D = self._point_steps(charts, used)  # (C, Q, 2 n), C = (2 + r) n
+        D = self._point_steps(interval)  # (C, Q, (k + 1) n), C columns
         weighted = self.h * self.scheme.weights[:, None] * D
-        moved = np.matmul(D.transpose(1, 0, 2), hessian.reshape(Q, 2 * n, 2 * n).swapaxes(1, 2))
-        rows = weighted.reshape(len(D), -1)
-        H = rows @ moved.transpose(0, 2, 1).reshape(-1, len(D))
-        return g[0, used], H + bent.reshape(len(D), len(D))
+        size = (k + 1) * n
+        moved = np.matmul(D.transpose(1, 0, 2), hessian.reshape(Q, size, size).swapaxes(1, 2))
+        H = weighted.reshape(len(D), -1) @ moved.transpose(0, 2, 1).reshape(-1, len(D))
+        H += bent.reshape(len(D), len(D))
+        H[: k * n] *= -np.repeat([1.0, self.h], n)[: k * n, None]
+        H = np.delete(H, np.s_[k * n : 2 * k * n], axis=0)[:, k * n :]  # rows (p0, c)
+        H = H @ self._columns(interval)
+        return self._ends(interval, force)[0], g[0, 4:], H
 
-    def _point_steps(self, charts: IntervalCharts, used: npt.NDArray[np.intp]) -> Array:
-        """Change of (q, v) at the points in every column, shape (C, Q, 2 n)."""
-        n, m = self.n, 4 + self.scheme.inner_modes
+    def _columns(self, interval: IntervalCharts) -> Array:
+        """(q1, h v1, h^k c) by (w, c), in the tangent space, (C, (k + r) n)."""
+        n, k, r = self.n, self.k, self.scheme.inner_modes
+        columns = self.h**k * np.eye((k + r) * n)
+        ends = np.kron(self.regularised.gamma, np.eye(n))
+        columns[: k * n, : k * n] = self.h**k * self._end_slopes(interval) @ ends
+        return columns
+
+    def _end_slopes(self, interval: IntervalCharts) -> Array:
+        """(q1, h v1) by (x1, h x1'), for k = 1 without the velocities, (k n, k n).
+
+        h v1 = J(x1) y with y = h x1'. The rate of J(x1) y by x1 along e follows from those of J e
+        and J y along y and e, of which charts know the sum, and the bracket is the difference.
+        """
+        n, (x1, y) = self.n, interval.ends[0]
+        each, still = np.eye(n), np.zeros((n, n))
+        chart, origin = Chart(self.space), np.ones((n, self.space.nq))  # wherever it stands
+        _, J, own = chart.jet(origin, still + x1, each, still)
+        if self.k == 1:
+            return J.T
+        _, both, mixed = chart.jet(origin, still + x1, each + y, still)
+        v, alone = (both - J)[:1], chart.jet(origin[:1], x1[None], y[None], still[:1])[2]
+        slope = 0.5 * (mixed - own - alone + bracket(self.space, still + v, J))
+        return np.block([[J.T, still], [slope.T, J.T]])
+
+    def _point_steps(self, interval: IntervalCharts) -> Array:
+        """Change of (q, .., q^(k)) at the points in every used column, shape (C, Q, (k + 1) n)."""
+        n, m, used = self.n, 4 + self.scheme.inner_modes, self._used
         C = len(used) * n
         step = np.zeros((C, m, n))
         step.reshape(C, -1)[np.arange(C), (used[:, None] * n + np.arange(n)).ravel()] = 1.0
         many = IntervalCharts(
-            charts.chart,
-            charts.scheme,
+            interval.chart,
+            interval.scheme,
             np.full(C, self.h),
-            np.tile(charts.x, (1, C, 1)),
-            np.repeat(charts.ends, C, axis=0),
+            np.tile(interval.x, (1, C, 1)),
+            np.repeat(interval.ends, C, axis=0),
         )
-        return many.point_steps(step)[:, :, :2].reshape(C, -1, 2 * n)
+        steps = many.point_steps(step)[:, :, : self.k + 1]
+        return steps.reshape(C, -1, (self.k + 1) * n)
 
-    def _charts(self, modes: Array) -> IntervalCharts:
-        x1 = self.h * modes[:, 0]
-        ends = np.stack([x1, np.zeros_like(x1)], axis=1)
-        h = np.array([self.h])
-        return IntervalCharts(Chart(self.space), self._twofold, h, self._curve(modes), ends)
-
-    def _jacobian(self, q0: Array, x1: Array) -> Array:
-        """J of dq1 = J(x1) dx1, in the tangent space at q1, shape (n, n)."""
-        each, still = np.eye(self.n), np.zeros((self.n, self.n))
-        moved = Chart(self.space).jets_from(q0, np.stack([still + x1, each, still]))
-        return moved[1].T
-
-    def _check(self, w: Array, found: bool) -> None:
-        turns = [w[f.v][list(f.group.angular)] for f in self.space.curved]
-        widest = self.h * max((float(np.linalg.norm(turn)) for turn in turns), default=0.0)
+    def _check(self, x1: Array, found: bool) -> None:
+        turns = [x1[f.v][list(f.group.angular)] for f in self.space.curved]
+        widest = max((float(np.linalg.norm(turn)) for turn in turns), default=0.0)
         if not (found and widest < WIDEST):
             raise InputError(
                 f"the discrete equations of a step of h = {self.h:g} s have no solution near the "

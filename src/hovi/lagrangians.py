@@ -203,6 +203,19 @@ def _turned_back(scene: Scene, momentum: ca.SX) -> ca.SX:
     return turned
 
 
+def bracket(space: ConfigurationSpace, x: Array, y: Array) -> Array:
+    """[x, y] of tangent vectors in the bodies' axes, (M, nv) each: zero where they add."""
+    result = np.zeros_like(x)
+    for factor in space.curved:
+        i, places = factor.v, _PLACES[factor.group.name]
+        a, b, c = np.zeros((3, len(x), 6))
+        a[:, places], b[:, places] = x[:, i], y[:, i]
+        c[:, :3] = np.cross(a[:, 3:], b[:, :3]) + np.cross(a[:, :3], b[:, 3:])
+        c[:, 3:] = np.cross(a[:, 3:], b[:, 3:])
+        result[:, i] = c[:, places]
+    return result
+
+
 def _added_inertia(scene: Scene) -> ca.SX | None:
     """A(q) of effects whose torque is A(q) a + ..., shape (nv, nv); None without such effects."""
     q, v, a, t = scene.terms.symbols.columns()

@@ -8,6 +8,8 @@ Points of T^(k-1)Q and momenta have shape (B, k, n), B of them at a time; (k, n)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +51,7 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
     (q, v, dL/dv - d/dt dL/da, dL/da). [ColomboFerraroMartin2016, section 4; deLeonRodrigues1985]
 
     lagrangian: not dependent on time; of order 3 or more only as a CasadiLagrangian.
-    jet: 2 k arrays of shape (B, n) or (n,).
+    jet: 2 k arrays of shape (B, n) or (n,). On groups x is one row, (B, 1, nq + (k - 1) nv).
     """
     arrays = [np.asarray(x, dtype=np.float64) for x in jet]
     k = lagrangian.order
@@ -60,16 +62,19 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
     one = arrays[0].ndim == 1
     points = [np.atleast_2d(x) for x in arrays]
     p = _momenta(lagrangian, points) if k <= 2 else _symbolic_momenta(lagrangian, points)
-    x = np.stack(points[:k], axis=1)
+    if lagrangian.space is None:
+        x = np.stack(points[:k], axis=1)
+    else:
+        x = np.concatenate(points[:k], axis=1)[:, None]
     return (x[0], p[0]) if one else (x, p)
 
 
-def highest_derivative(lagrangian: Lagrangian, x: Array, p: Array) -> Array:
+def highest_derivative(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
     """q^(k) of p_{k-1} = dL/dq^(k)(x, q^(k)), shape (B, n) for x and p of shape (B, k, n).
 
-    For k = 1 x holds configurations alone, (B, 1, nq), on groups too; q' is a velocity then.
+    x: or (q, q', ..., q^(k-1)), k arrays of B rows, as on groups.
     """
-    jet = [x[:, j] for j in range(lagrangian.order)]
+    jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
 
     def system(u: Array) -> tuple[Array, Array]:
         _, gradient, hessian = lagrangian.evaluate(*jet, u)
@@ -81,14 +86,15 @@ def highest_derivative(lagrangian: Lagrangian, x: Array, p: Array) -> Array:
     return u
 
 
-def hamiltonian(lagrangian: Lagrangian, x: Array, p: Array) -> Array:
+def hamiltonian(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
     """H = sum_j p_j . q^(j+1) - L on T*T^(k-1)Q, shape (B,); x and p of shape (B, k, n).
 
     H = E_L o FL^-1: mechanical energy for k = 1, Pontryagin's p.v + p~.a - L for k = 2.
+    x: as for `highest_derivative`.
     """
-    top = highest_derivative(lagrangian, x, p)
-    rates = np.concatenate([x[:, 1:, : top.shape[1]], top[:, None]], axis=1)
-    jet = [*np.moveaxis(x, 1, 0), top]
+    jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
+    jet.append(highest_derivative(lagrangian, jet, p))
+    rates = np.stack(jet[1:], axis=1)
     return np.asarray(np.sum(p * rates, axis=(1, 2)) - lagrangian.value(*jet))
 
 

@@ -100,10 +100,7 @@ class SchemeLagrangian(SegmentLagrangian):
     @classmethod
     def of(cls, ld: DiscreteLagrangian) -> SchemeLagrangian:
         """The L_d of every interval of a grid whose intervals are all alike."""
-        steps, schemes = ld.grid.steps, ld.grid.groups
-        if len(schemes) > 1 or np.ptp(steps) > 1e-12 * steps[0]:
-            raise InputError("a discrete flow needs a grid of equal steps with one scheme.")
-        return cls(ld.lagrangian, schemes[0][0], float(steps[0]))
+        return cls(ld.lagrangian, *uniform_grid(ld))
 
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
         """Newton on the inner modes alone."""
@@ -240,12 +237,20 @@ class SchemeLagrangian(SegmentLagrangian):
         return root
 
 
+def uniform_grid(ld: DiscreteLagrangian) -> tuple[Scheme, float]:
+    """The scheme and the step of every interval. Raises InputError where they differ."""
+    steps, schemes = ld.grid.steps, ld.grid.groups
+    if len(schemes) > 1 or np.ptp(steps) > 1e-12 * steps[0]:
+        raise InputError("a discrete flow needs a grid of equal steps with one scheme.")
+    return schemes[0][0], float(steps[0])
+
+
 def check_segment(lagrangian: Lagrangian, h: float) -> None:
     """Raise InputError where no discrete Lagrangian can be built on one interval."""
     if not (np.isfinite(h) and h > 0):
         raise InputError(f"a step must be positive and finite, got {h} s.")
     if lagrangian.nq != lagrangian.nv:
         raise InputError(
-            "a discrete flow of this Lagrangian needs joints whose configurations are vectors "
-            "(nq = nv): lock the others with load_robot(..., locked=[...]), or take hovi.simulate."
+            "L_d between two points needs joints whose configurations are vectors (nq = nv): lock "
+            "the others with load_robot(..., locked=[...]), or step with hovi.flow."
         )

@@ -26,7 +26,7 @@ from hovi.scene import Scene
 from hovi.schemes import require_regular
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
 from hovi.segment import Segment
-from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian
+from hovi.segment_lagrangian import SchemeLagrangian, SegmentLagrangian, uniform_grid
 from hovi.state import State
 from hovi.symmetry import Symmetry
 from hovi.trajectory import Trajectory
@@ -40,7 +40,8 @@ class Flow:
     """A discrete motion from momenta.
 
     ld: the discrete Lagrangian. t: times of the nodes, shape (N + 1,), in [s].
-    x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n); on groups q, (N + 1, 1, nq).
+    x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n); on groups in one row,
+        (N + 1, 1, nq + (k - 1) nv).
     p: momenta, shape (N + 1, k, n).
     z: regularised coordinates of the intervals, shape (N, k, n).
     inner: inner modes, (N, r, n).
@@ -60,12 +61,19 @@ class Flow:
     @property
     def q(self) -> Array:
         """Configurations at the nodes, shape (N + 1, nq)."""
-        return self.x[:, 0]
+        return self.jets[0]
+
+    @property
+    def jets(self) -> list[Array]:
+        """q, q', ..., q^(k-1) at the nodes, k arrays (N + 1, nq) or (N + 1, n)."""
+        if isinstance(self.ld, ChartedLagrangian):
+            return self.ld.split(self.x[:, 0])
+        return list(np.moveaxis(self.x, 1, 0))
 
     @property
     def energy(self) -> Array:
         """H = sum_j p_j . q^(j+1) - L at the nodes, shape (N + 1,)."""
-        return hamiltonian(self.ld.lagrangian, self.x, self.p)
+        return hamiltonian(self.ld.lagrangian, self.jets, self.p)
 
     @property
     def momentum_maps(self) -> dict[str, Array]:
@@ -88,10 +96,13 @@ class Flow:
     def trajectory(self) -> Trajectory:
         """The motion of a scene's effort Lagrangian as a Trajectory, to be replayed and saved."""
         lagrangian, ld = self.ld.lagrangian, self.ld
-        if not (isinstance(ld, SchemeLagrangian) and isinstance(lagrangian, EffortLagrangian)):
+        if not isinstance(lagrangian, EffortLagrangian) or not isinstance(
+            ld, SchemeLagrangian | ChartedLagrangian
+        ):
             raise InputError("only the flow of a scene's effort Lagrangian is a Trajectory.")
         assert isinstance(lagrangian.scene, Scene)
-        path = DiscretePath(self.x[:, 0].copy(), self.x[:, 1].copy(), self.z, self.inner)
+        q, v = self.jets
+        path = DiscretePath(q.copy(), v.copy(), self.z, self.inner)
         N = len(self.z)
         grid = Grid(np.full(N, ld.h), (ld.scheme,) * N)
         return Trajectory(grid, path, self.p, lagrangian.scene, {"status": "flow"})
@@ -112,7 +123,7 @@ def flow(
 
     ld: a discrete Lagrangian on a uniform grid, or that of one interval.
     z0: start in T^(k-1)Q: a State for k = 2, or (q, q', ..., q^(k-1)) of shape (k, n); on groups
-        (q,) of shape (1, nq).
+        one row of nq + (k - 1) nv numbers.
     p0: momenta, shape (k, n): (p, p~) for k = 2. `legendre` gives both from (q, v, a, jerk).
     steps: how many. t0: time of the start, in [s].
     force: go on where the flow's own instability has made of the rounding of the start an error in
@@ -122,9 +133,11 @@ def flow(
     Raises InputError also for shapes that do not fit and steps that have no solution, SchemeError
     for a scheme that is not regular.
     """
-    segment = SchemeLagrangian.of(ld) if isinstance(ld, DiscreteLagrangian) else ld
-    if isinstance(segment, SchemeLagrangian) and segment.k == 2:
+    segment = _segment(ld) if isinstance(ld, DiscreteLagrangian) else ld
+    if isinstance(segment, SchemeLagrangian | ChartedLagrangian) and segment.k == 2:
         require_regular(segment.scheme)
+    if symmetries and isinstance(segment, ChartedLagrangian):
+        raise InputError("momentum maps are of joints whose configurations are vectors (nq = nv).")
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
@@ -142,6 +155,13 @@ def flow(
     t = np.asarray(t0 + np.arange(steps + 1) * segment.h)
     rounding = None if watch is None else np.array(watch.errors)
     return Flow(segment, t, *records, rounding, symmetries or {})
+
+
+def _segment(ld: DiscreteLagrangian) -> SchemeLagrangian | ChartedLagrangian:
+    space, (scheme, h) = ld.lagrangian.space, uniform_grid(ld)
+    if space is None:
+        return SchemeLagrangian(ld.lagrangian, scheme, h)
+    return ChartedLagrangian(ld.lagrangian, space, scheme, h)
 
 
 def _stepper(
@@ -238,13 +258,17 @@ def _start(
     """x and p as arrays (k, n). Raises InputError where they do not fit."""
     if isinstance(z0, State):
         v = np.zeros(ld.n) if z0.v is None else z0.v
-        z0 = np.stack([np.asarray(z0.q, float), np.asarray(v, float)][: ld.k])
+        rows = [np.asarray(z0.q, float), np.asarray(v, float)][: ld.k]
+        z0 = np.concatenate(rows)[None] if isinstance(ld, ChartedLagrangian) else np.stack(rows)
     x, p = np.array(z0, dtype=np.float64), np.array(p0, dtype=np.float64)
-    size = ld.lagrangian.nq if isinstance(ld, ChartedLagrangian) else ld.n
-    for name, array, n in (("z0", x, size), ("p0", p, ld.n)):
-        if array.shape != (ld.k, n) or not np.isfinite(array).all():
+    shape = (ld.k, ld.n)
+    if isinstance(ld, ChartedLagrangian):
+        shape = (1, ld.space.nq + (ld.k - 1) * ld.n)
+    for name, array, expected in (("z0", x, shape), ("p0", p, (ld.k, ld.n))):
+        if array.shape != expected or not np.isfinite(array).all():
             raise InputError(
-                f"{name} needs {ld.k} rows of {n} finite numbers, got shape {array.shape}."
+                f"{name} needs {expected[0]} rows of {expected[1]} finite numbers, got shape "
+                f"{array.shape}."
             )
     return x, p
 
