@@ -90,3 +90,34 @@ def test_what_nothing_cures_is_cut_into_four() -> None:
 
 def pairs(one: Grid, other: Grid):  # type: ignore[no-untyped-def]
     return zip(one.schemes, other.schemes, strict=True)
+
+
+def test_a_grid_has_one_scheme_or_two() -> None:
+    rng = np.random.default_rng(0)
+    grid = Grid.uniform(1.0, 24, galerkin(2))
+    for joints in (2, 6, 30):
+        demands = [Demand(10 ** rng.uniform(-9, 0, 24), 2)]
+        finer = refined(grid, rng.uniform(0.05, 0.8, 24), demands, joints)
+        assert len(finer.groups) <= 2
+
+
+def test_many_joints_are_worth_a_second_scheme_and_few_are_not() -> None:
+    grid = Grid.uniform(1.0, 64, galerkin(2))
+    factor = np.where(np.arange(64) < 60, 1.0, 1e-7)
+    rho = np.where(np.arange(64) < 60, 0.1, 0.3)
+    groups = [len(refined(grid, rho, [Demand(factor, 2)], n).groups) for n in (1, 20)]
+    assert groups == [1, 2]
+
+
+def test_what_is_left_sums_up_in_the_cost_and_is_the_largest_along_the_curve() -> None:
+    factor = np.array([1e-2, 1e-4])
+    change = np.array([0.1, 0.1])
+    assert Demand(factor, 2).left(change) == pytest.approx((1e-2 / 1e-2 + 1e-2 / 1e-4) / 2)
+    assert Demand(factor, 1).left(change) == pytest.approx(0.1 / 1e-4)
+
+
+def test_an_interval_that_nothing_helps_is_cut_into_four() -> None:
+    grid = Grid.uniform(1.0, 3, galerkin(2))
+    demand = Demand(np.array([1.0, 1e-12, 1.0]), 2)
+    finer = refined(grid, np.array([0.1, 0.97, 0.1]), [demand])
+    np.testing.assert_allclose(finer.steps, [1 / 3, *[1 / 12] * 4, 1 / 3])

@@ -56,7 +56,7 @@ def draw(column: np.ndarray, solution: Solution, values: str, title: str) -> Non
     right = below.twinx()
     right.plot(grid.t[:-1] + grid.steps / 2, modes, ".", markersize=4, color=ORANGE)
     right.set_ylabel("inner modes", color=ORANGE)
-    right.set_ylim(0, 13)
+    right.set_ylim(0, modes.max() + 1)
 
 
 def main() -> None:
