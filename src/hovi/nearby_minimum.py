@@ -33,8 +33,7 @@ SETTLED = 1e-9
 LONG = 3e-3
 """Length of a step after which the Hessian is renewed in any case."""
 FAR = 1e-2
-"""Length of a way beyond which the Hessian at its end is factored again: it is that which tells a
-minimum."""
+"""Length of a way beyond which the Hessian at its end serves better than the one before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +81,8 @@ class NearbyMinimum:
             if length <= ROUNDING or (length * length <= ROUNDING * last and last < np.inf):
                 break
             last = length
-        if not length <= SETTLED:
-            return None
+        if not length <= SETTLED or objective.model(x, None, None).factor(0.0) is None:
+            return None  # the exact Hessian tells a minimum, and all that served were near it
         seconds = time.perf_counter() - self.began
         return minimum_at(objective.problem, x, steps, seconds)
 
