@@ -4,6 +4,8 @@ Twenty pairs are drawn evenly within the position limits of each robot, a turn a
 that the motors can hold with some torque to spare. The time is three times what the slowest joint
 needs at its velocity limit, one second at least. What does not end in a minimum directly goes on
 by continuation, and what does not end in one then is tried again from four guesses.
+
+    python random_reaches.py [ROBOT ...]
 """
 
 from __future__ import annotations
@@ -81,7 +83,7 @@ def main() -> None:
         "Medians and largest of those that end in a minimum.\n"
     )
     table, failures = [], []
-    for name in ROBOTS:
+    for name in sys.argv[1:] or ROBOTS:
         rows = alone(measure, name)
         good = [row["solution"] for row in rows if row["solution"]["success"]]
         bad = [row for row in rows if not row["solution"]["success"]]
