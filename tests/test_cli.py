@@ -247,6 +247,43 @@ def test_an_interrupt_prints_the_best_so_far(tmp_path: Path) -> None:
     assert math.isfinite(fields["cost"])
 
 
+INTERRUPTED_IMPORT = """
+import os, signal, sys
+from hovi.__main__ import run
+
+module = sys.argv.pop(1)
+
+class Interrupt:
+    def find_spec(self, name, *rest):
+        if name == module:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt())
+run()
+"""
+
+
+def interrupted_import(module: str, *arguments: str | Path) -> Outcome:
+    """A command that gets Ctrl-C when it begins to import a module."""
+    command = [sys.executable, "-c", INTERRUPTED_IMPORT, module, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_an_interrupt_while_a_run_imports_keeps_the_best_so_far(tmp_path: Path) -> None:
+    free = REACH.replace("duration = 1.0", "time_weight = 3.0\nduration = [0.5, 40.0]")
+    options = scene(tmp_path, free), "--intervals", "4000", "--json"
+    code, out, err = interrupted_import("scipy.optimize", "plan", *options)
+    fields = only_object(out)
+    assert (code, err, fields["status"]) == (1, "", "interrupted")
+    assert math.isfinite(fields["cost"])
+
+
+@pytest.mark.parametrize("module", ["typer", "numpy", "pinocchio"])
+def test_an_interrupt_while_a_command_imports_what_it_begins_with_ends_it(module: str) -> None:
+    assert interrupted_import(module, "plan", "two_link_reach") == (130, "", "")
+
+
 # Looking at robots, scenes and motions
 
 

@@ -5,11 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
+from _thread import interrupt_main, start_new_thread
+from collections.abc import Iterator
 from types import FrameType
 
 INTERRUPTED = 130
 IMPORTING = "<frozen importlib"
 """What the file names of Python's own frames begin with while a module is imported."""
+PATIENCE = 0.05
+"""Seconds after which Ctrl-C is heard again that came while a run imported what it needs."""
 
 
 def run() -> None:
@@ -35,15 +40,43 @@ def run() -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C. While modules are imported the program ends at once: nothing is there to finish.
+    """Ctrl-C. While a command imports what it begins with, the program ends at once.
 
-    Raises KeyboardInterrupt at any other time; modules that are imported may swallow that.
+    Raises KeyboardInterrupt at any other time. A module that is imported in the middle of a run may
+    swallow that, so that the run hears of it when the module is there.
     """
+    asking = _asks_for_imports(frame)
+    if asking is None:
+        raise KeyboardInterrupt
+    if not any(map(_of_a_run, _outward(asking))):
+        os._exit(_flushed(INTERRUPTED))  # nothing is there to finish
+    start_new_thread(_again, ())  # a Timer takes locks that what was interrupted may hold
+
+
+def _again() -> None:
+    time.sleep(PATIENCE)
+    interrupt_main()
+
+
+def _asks_for_imports(frame: FrameType | None) -> FrameType | None:
+    """What imports, and is not imported itself; None where nothing is imported."""
+    asking = None
+    for each in _outward(frame):
+        if each.f_code.co_filename.startswith(IMPORTING):
+            asking = each.f_back
+    return asking
+
+
+def _outward(frame: FrameType | None) -> Iterator[FrameType]:
     while frame is not None:
-        if frame.f_code.co_filename.startswith(IMPORTING):
-            os._exit(_flushed(INTERRUPTED))
+        yield frame
         frame = frame.f_back
-    raise KeyboardInterrupt
+
+
+def _of_a_run(frame: FrameType) -> bool:
+    """Whether it is one of the library's own, neither of the commands nor of this module."""
+    package, *module = frame.f_globals.get("__name__", "").split(".")[:2]
+    return package == "hovi" and module not in ([], ["cli"], ["__main__"])
 
 
 def _flushed(code: int) -> int:

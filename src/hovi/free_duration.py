@@ -17,6 +17,7 @@ import numpy as np
 from hovi.errors import InputError
 from hovi.solver import Solution
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 SolveFor = Callable[[float, Trajectory], Solution]
 """The solution for a duration in [s], from a guess."""
@@ -132,6 +133,9 @@ class _Search:
                     break
             except _FailedError as failed:
                 return self.unfinished(failed.solution)
+            except KeyboardInterrupt:  # between two solves, each of which hears its own
+                self.ending = "The search for a better one was interrupted; the last duration is"
+                return dataclasses.replace(self.best, success=False, status=Status.INTERRUPTED)
             T, slope = further, next_slope
         return self.best
 
