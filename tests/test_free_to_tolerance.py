@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 import pytest
 
+from hovi.adaptive import refine_to_tolerance
+from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.free_duration import FreeDuration, SolveFor
+from hovi.free_to_tolerance import free_to_tolerance
+from hovi.grid import Grid
 from hovi.model_files import example
 from hovi.motion_error import deviation
 from hovi.planner import plan
+from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
-from hovi.solver import Solution, Status
+from hovi.schemes import galerkin
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.task_file import Task, load_task
-from hovi.tolerance import Accuracy
+from hovi.tolerance import Accuracy, Tolerance
+from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 from paper_arm import HANG, REACH_Q, REACH_V
 
 BOUNDS = 0.5, 6.0
@@ -98,6 +110,51 @@ def test_nothing_is_claimed_where_no_minimum_was_found(arm_scene: Scene) -> None
     assert found.status is Status.ITERATION_LIMIT
     assert found.accuracy is None
     assert found.error_estimate is None
+
+
+def in_vain(solution: Solution) -> Solution:
+    """Refining that is out of time when it begins."""
+    return refine_to_tolerance(solution, Tolerance(1e-14), time_limit=0.0)
+
+
+@pytest.mark.parametrize(
+    ("later_steps", "later_refine", "reason"),
+    [
+        (0, None, "as the finer one gave none (iteration_limit): "),
+        (500, in_vain, "as the finer one gave none (the tolerance was not reached again): "),
+    ],
+)
+def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
+    task: Task,
+    later_steps: int,
+    later_refine: Callable[[Solution], Solution] | None,
+    reason: str,
+) -> None:
+    coarse = Grid.uniform(task.duration, 12, galerkin(2))
+    refine = partial(refine_to_tolerance, tolerance=Tolerance(1e-7))
+    refined: list[Solution] = []
+
+    def on_grid(grid: Grid) -> SolveFor:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
+            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), stretched)
+            problem = TrajectoryProblem(ld, task.start, task.goal)
+            return solve(problem, guess, max_iterations=later_steps if refined else 500)
+
+        return solve_for
+
+    def each_refine(solution: Solution) -> Solution:
+        refined.append((refine if not refined or later_refine is None else later_refine)(solution))
+        return refined[-1]
+
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), coarse)
+    first = solve(TrajectoryProblem(ld, task.start, task.goal))
+    found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
+    assert accuracy_of(refined[0]).reached
+    assert found.success
+    assert found.trajectory is refined[0].trajectory
+    assert accuracy_of(found).reached
+    assert reason in found.message
 
 
 def test_limits_hold_in_the_best_duration(arm_scene: Scene) -> None:

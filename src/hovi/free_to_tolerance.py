@@ -33,29 +33,43 @@ def free_to_tolerance(
     first: a solution for some duration between the bounds, on a coarse grid.
     The accuracy is that of the motion among those of its duration, relative in the cost without
     w T. That J' + w vanishes on the grid and not in the limit costs the square of a small error.
+    Where a later turn fails, the motion within the tolerance of the one before is returned.
     """
     found = best_duration(free, on_grid(first.trajectory.grid), first)
     steps, rounds = found.steps, tuple[Round, ...]()
+    kept: BestDuration | None = None
     for turn in range(TURNS):
         if not found.solution.success:
-            return dataclasses.replace(found, steps=steps).with_time()
+            break
         refined = refine(found.solution)
         assert refined.accuracy is not None
         rounds += refined.accuracy.rounds
         steps += sum(done.nit for done in refined.accuracy.rounds[1:])
         settled = refined.trajectory.grid is found.solution.trajectory.grid
-        if settled or not refined.accuracy.reached or turn == TURNS - 1:
+        found = dataclasses.replace(found, solution=refined)
+        if not refined.accuracy.reached:
             break
-        grid = refined.trajectory.grid
-        found = best_duration(free, on_grid(grid), refined, STRIDE)
+        kept = found
+        if settled or turn == TURNS - 1:
+            break
+        found = best_duration(free, on_grid(refined.trajectory.grid), refined, STRIDE)
         steps += found.steps - refined.nit
-    return _told(BestDuration(free, refined, steps, found.ending), rounds)
+    best = found if kept is None or kept is found else _held(kept, found.solution)
+    return _told(dataclasses.replace(best, steps=steps), rounds)
+
+
+def _held(kept: BestDuration, failed: Solution) -> BestDuration:
+    """The last motion within the tolerance, with what became of the search for a better one."""
+    reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
+    ending = f"Its duration is the best on a coarser grid, as the finer one gave none ({reason}):"
+    return dataclasses.replace(kept, ending=ending)
 
 
 def _told(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
-    """The motion with all rounds, and with its accuracy in the message."""
+    """The motion with all rounds, and with its accuracy in the message if it was estimated."""
     solution = found.with_time()
-    assert solution.accuracy is not None
+    if solution.accuracy is None:
+        return solution
     accuracy = dataclasses.replace(solution.accuracy, rounds=rounds)
     message = f"{solution.message.removesuffix('.')}; {accuracy}"
     return dataclasses.replace(solution, message=message, accuracy=accuracy)
