@@ -295,6 +295,17 @@ def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
     assert "joint_limit_potential" in run("info", "two_link_elbow")[1]
 
 
+@pytest.mark.parametrize("name", ["ARM.URDF", "arm.xml", "arm.xacro", "folder/arm"])
+def test_info_takes_the_paths_that_load_robot_takes(run: Run, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(URDF)
+    code, out, err = run("info", path)
+    assert (code, err) == (0, "")
+    assert "elbow" in out
+    assert "no-such.xml" in run("info", "no-such.xml")[2]
+
+
 def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> None:
     target = tmp_path / "reach.csv"
     code, out, _ = run("export", motion, "--csv", target, "--rate", "100")

@@ -23,11 +23,12 @@ def info(
     from hovi.errors import InputError, nearest
     from hovi.example_robots import example_names
     from hovi.model_files import example_scenes
+    from hovi.robot_reading import is_path
 
     robots, scenes = example_names(), example_scenes()
-    if what.endswith(".toml") or what in scenes:
+    if what.lower().endswith(".toml") or what in scenes:
         print(_scene(what))
-    elif what.endswith(".urdf") or what in robots:
+    elif is_path(what) or what in robots:
         print(_robot(what, mimic))
     else:
         raise InputError(
