@@ -108,6 +108,7 @@ FLOORS = [
     },
     {"trajectory_objective"},
     {"limited_action", "equality_rounds", "predictor"},
+    {"penalized_action"},
     {"limited_solver"},
     {"verdict"},
     {"solver", "task_file", "simulator", "controllers"},

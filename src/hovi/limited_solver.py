@@ -25,8 +25,8 @@ from hovi.optimize.band import BandModel
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
-from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import Iteration, Objective, Options, Stop, minimize
+from hovi.optimize.trust_region import Iteration, Options, Stop, minimize
+from hovi.penalized_action import PenalizedAction
 from hovi.problem import TrajectoryProblem
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
@@ -231,7 +231,7 @@ class _Search:
         density = _density(outcome, objective)
         least = np.inf
         for guess in self._guesses():
-            path, violation, stop = self._penalised(objective, guess, density)
+            path, violation, stop = self._penalized(objective, guess, density)
             if stop in ENDED:
                 outcome.stop = stop
                 return outcome, ""
@@ -255,19 +255,19 @@ class _Search:
             curve = with_bump(base, problem.robot, T, seed)
             yield problem.path(curve)
 
-    def _penalised(
+    def _penalized(
         self, objective: LimitedAction, path: DiscretePath, density: float
     ) -> tuple[DiscretePath, float, Stop]:
         """A motion of little violation, by penalties that grow, its violation, and why it ended."""
         for penalty in PENALTIES:
-            penalised = PenalisedAction(objective, penalty * density)
+            penalized = PenalizedAction(objective, penalty * density)
             options = dataclasses.replace(self._options(), max_iterations=PENALTY_STEPS)
-            result = minimize(penalised, path, options, None)
+            result = minimize(penalized, path, options, None)
             path = result.x
             self.iterations += result.iterations
             if result.stop in ENDED:
                 break
-        return path, penalised.violation(path), result.stop
+        return path, penalized.violation(path), result.stop
 
     def tightened(self, outcome: BoundedOutcome[DiscretePath]) -> LimitedOutcome:
         """Draw bounds in where the interpolant exceeds them, and solve again, until they hold."""
@@ -404,43 +404,6 @@ class _Search:
                 return approach_sentence(trajectory, distances, approach, margin)
         sentence = worst_sentence(trajectory, self.limits, self.problem.robot)
         return sentence + static_sentence(self.problem, self.limits)
-
-
-class PenalisedAction(Objective[DiscretePath]):
-    """The action plus penalty/2 sum weights (distance outside the bounds)^2."""
-
-    def __init__(self, limited: LimitedAction, penalty: float) -> None:
-        self.limited = limited
-        self.penalty = penalty
-
-    def violation(self, x: DiscretePath) -> float:
-        """Largest distance outside the bounds, as a share of the range."""
-        return float(np.max(np.abs(self._outside(x)), initial=0.0))
-
-    def value(self, x: DiscretePath) -> float:
-        """The penalised action."""
-        squares = float(np.sum(self.limited.bounds.weights * self._outside(x) ** 2))
-        return self.limited.outputs(x).value + 0.5 * self.penalty * squares
-
-    def model(
-        self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
-    ) -> QuadraticModel:
-        """The quadratic model, the penalty's kinks taken as they are at x."""
-        outside = self._outside(x)
-        force = self.penalty * outside
-        return self.limited.model(x, self.penalty * (outside != 0), force, force)
-
-    def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
-        """The path moved by a step."""
-        return self.limited.retract(x, step, model)
-
-    def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
-        """As for the action."""
-        return self.limited.action.relative_size(x, step, model)
-
-    def _outside(self, x: DiscretePath) -> Array:
-        y, bounds = self.limited.outputs(x).y, self.limited.bounds
-        return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
 
 
 def _usable(outcome: BoundedOutcome[DiscretePath]) -> bool:

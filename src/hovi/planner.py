@@ -98,7 +98,8 @@ def plan(
     guess: "cubic", "minimum-jerk" or a Trajectory.
     turns: full turns that the guess makes on top of the shortest way, by joint: see State.
     weight: weight of each joint's torque in the cost, shape (nv,).
-    max_iterations: of one solve. time_limit: of everything, in [s]; returns the best so far.
+    max_iterations: of one solve; with limits of every round of it, of which a small number only
+        makes more. time_limit: of everything, in [s]; returns the best so far.
     processes: for the starts; all processors by default.
     progress: called with a line of text and the fraction done.
     continuation: where no start ends in a minimum, solve easier problems that lead to this one,
