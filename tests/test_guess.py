@@ -21,7 +21,7 @@ from hovi.guess import (
     moved,
     named_curve,
     path_on_grid,
-    regularised,
+    regularized,
     stretched,
     with_bump,
 )
@@ -146,7 +146,7 @@ def test_a_path_has_the_curves_nodes_and_the_boundary_to_the_last_bit(
     np.testing.assert_array_equal(path.v[1:-1], v[1:-1])
     for found, end in ((path.q[0], 0), (path.v[0], 1), (path.q[-1], 2), (path.v[-1], 3)):
         np.testing.assert_array_equal(found, ENDS[end])
-    np.testing.assert_array_equal(path.z, regularised(two_link, grid, path.q, path.v))
+    np.testing.assert_array_equal(path.z, regularized(two_link, grid, path.q, path.v))
     for k, scheme in enumerate(grid.schemes):
         assert not path.inner[k, scheme.inner_modes :].any()
 
@@ -154,7 +154,7 @@ def test_a_path_has_the_curves_nodes_and_the_boundary_to_the_last_bit(
 def test_z_is_what_the_paper_calls_it(two_link: Robot) -> None:
     grid = Grid(np.array([0.5, 0.1]), (by_name("galerkin-0"),) * 2)
     q, v = np.random.default_rng(0).normal(size=(2, 3, 2))
-    z = regularised(two_link, grid, q, v)
+    z = regularized(two_link, grid, q, v)
     for k, h in enumerate(grid.steps):
         np.testing.assert_allclose(z[k, 0], (q[k + 1] - q[k] - h * v[k]) / h**2, rtol=1e-14)
         np.testing.assert_allclose(z[k, 1], (v[k + 1] - v[k]) / h, rtol=1e-14)
@@ -236,7 +236,7 @@ def test_a_moved_path_is_the_path_plus_a_cubic(arm_scene: Scene, curve: Curve) -
     np.testing.assert_allclose(found.q, path.q + dq, rtol=0, atol=1e-13)
     np.testing.assert_allclose(found.v, path.v + dv, rtol=0, atol=1e-13)
     np.testing.assert_array_equal(found.inner, path.inner)
-    z = regularised(robot, UNEQUAL, found.q, found.v)
+    z = regularized(robot, UNEQUAL, found.q, found.v)
     np.testing.assert_allclose(found.z, z, rtol=0, atol=1e-11)
     for end, x in zip(OTHER_ENDS, (found.q[0], found.v[0], found.q[-1], found.v[-1]), strict=True):
         np.testing.assert_array_equal(x, end)

@@ -48,7 +48,7 @@ FLOORS = [
         "rigid_body",
         "urdf_check",
         "grid",
-        "regularised",
+        "regularized",
         "model_files",
         "meshcat_server",
         "figure_file",

@@ -19,7 +19,7 @@ from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
 from hovi.export import write_csv
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import regularised, with_ends_of_nodes
+from hovi.guess import regularized, with_ends_of_nodes
 from hovi.joint_condition import JointCondition
 from hovi.limit_check import excess_along
 from hovi.limits import as_limits
@@ -160,7 +160,7 @@ def test_an_orientation_is_followed_past_half_a_turn() -> None:
     q0, v = robot.neutral(), np.zeros((2, robot.nv))
     turn = 3.0
     q = np.stack([q0, robot.integrate(q0, turn * axis)])
-    path = DiscretePath(q, v, regularised(robot, grid, q, v), np.zeros((1, 0, robot.nv)))
+    path = DiscretePath(q, v, regularized(robot, grid, q, v), np.zeros((1, 0, robot.nv)))
     while turn < 4.0:
         turn += 0.25
         q = np.stack([q0, robot.integrate(q0, turn * axis)])

@@ -11,7 +11,7 @@ from finite_differences import derivative
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import regularised
+from hovi.guess import regularized
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name
@@ -35,7 +35,7 @@ def random_path(robot: Robot, grid: Grid, turn: float = 1.0, seed: int = 0) -> D
         q.append(robot.integrate(q[-1], d))
     v = random.normal(size=(N + 1, n))
     inner = random.normal(size=(N, grid.inner_modes, n))
-    return DiscretePath(np.array(q), v, regularised(robot, grid, np.array(q), v), inner)
+    return DiscretePath(np.array(q), v, regularized(robot, grid, np.array(q), v), inner)
 
 
 def moved(robot: Robot, grid: Grid, path: DiscretePath, columns: Array) -> DiscretePath:
@@ -45,7 +45,7 @@ def moved(robot: Robot, grid: Grid, path: DiscretePath, columns: Array) -> Discr
     dq[:2], dv[:2] = columns[[0, 2]], columns[[1, 3]] / h
     q, v, inner = robot.integrate(path.q, dq), path.v + dv, path.inner.copy()
     inner[0] += columns[4:] / h**2
-    return DiscretePath(q, v, regularised(robot, grid, q, v), inner)
+    return DiscretePath(q, v, regularized(robot, grid, q, v), inner)
 
 
 @pytest.mark.parametrize("turn", [1e-9, 1.0, 3.0])

@@ -13,7 +13,7 @@ from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import check_path, regularised
+from hovi.guess import check_path, regularized
 from hovi.model_files import example
 from hovi.non_finite import non_finite_sentence
 from hovi.predictor import follow
@@ -79,7 +79,7 @@ def assert_fits(problem: TrajectoryProblem, solution: Solution) -> None:
     q0, v0, q1, v1 = problem.boundary
     for found, end in zip((path.q[0], path.v[0], path.q[-1], path.v[-1]), (q0, v0, q1, v1)):  # noqa: B905
         np.testing.assert_array_equal(found, end)
-    z = regularised(problem.robot, problem.grid, path.q, path.v)
+    z = regularized(problem.robot, problem.grid, path.q, path.v)
     slack = 1e-13 * np.abs(path.q).max() / problem.grid.steps.min() ** 2 + 1e-9 * np.abs(z).max()
     np.testing.assert_allclose(path.z, z, rtol=0, atol=slack)
     assert solution.cost == pytest.approx(problem.ld.action(path), rel=1e-13, abs=1e-25)

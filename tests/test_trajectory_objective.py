@@ -9,7 +9,7 @@ import pytest
 from hovi.action_structure import ActionStructure
 from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import regularised
+from hovi.guess import regularized
 from hovi.problem import TrajectoryProblem
 from hovi.scene import Scene
 from hovi.schemes import by_name
@@ -62,11 +62,11 @@ def path_at(grid: Grid, scene: Scene, origin: DiscretePath, x: Array) -> Discret
     nodes = q[1:-1].size
     q[1:-1], v[1:-1] = (x[i * nodes : (i + 1) * nodes].reshape(-1, 2) for i in (0, 1))
     inner = x[2 * nodes :].reshape(origin.inner.shape)
-    return DiscretePath(q, v, regularised(scene.robot, grid, q, v), inner)
+    return DiscretePath(q, v, regularized(scene.robot, grid, q, v), inner)
 
 
 def assert_consistent(scene: Scene, grid: Grid, path: DiscretePath) -> None:
-    z = regularised(scene.robot, grid, path.q, path.v)
+    z = regularized(scene.robot, grid, path.q, path.v)
     np.testing.assert_allclose(path.z, z, rtol=0, atol=1e-9 * np.abs(z).max())
     for k, scheme in enumerate(grid.schemes):
         assert not path.inner[k, scheme.inner_modes :].any()

@@ -27,7 +27,7 @@ from hovi.errors import InputError, SchemeError
 from hovi.lagrangian import Lagrangian
 from hovi.lagrangians import bracket
 from hovi.newton import newton
-from hovi.regularised import Regularised, regularised
+from hovi.regularized import Regularized, regularized
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -40,7 +40,7 @@ WIDEST = 3.0
 class ChartedSegment:
     """An interval of a discrete motion on a group.
 
-    w: regularised coordinates, shape (1, k, nv). z: gamma w. inner: inner modes, (1, r, nv); all
+    w: regularized coordinates, shape (1, k, nv). z: gamma w. inner: inner modes, (1, r, nv); all
         in the units of x^(k).
     x1: the end, shape (1, 1, nq + (k - 1) nv). p1: momenta there, shape (1, k, nv).
     """
@@ -85,9 +85,9 @@ class ChartedLagrangian:
         return self.lagrangian.nv
 
     @property
-    def regularised(self) -> Regularised:
+    def regularized(self) -> Regularized:
         """The change between the chart's end and w."""
-        return regularised(self.k, self.h)
+        return regularized(self.k, self.h)
 
     def split(self, x: Array) -> list[Array]:
         """(q, q', ..) of rows x (N, nq + (k - 1) nv)."""
@@ -100,7 +100,7 @@ class ChartedLagrangian:
 
         By Newton's method. Raises InputError where there is none, or it turns too far.
         """
-        k, n, r, R = self.k, self.n, self.scheme.inner_modes, self.regularised
+        k, n, r, R = self.k, self.n, self.scheme.inner_modes, self.regularized
         start = x0[0]
         back = np.kron(R.back / self.h, np.eye(n))
 
@@ -153,7 +153,7 @@ class ChartedLagrangian:
     def _interval(self, start: Array, modes: Array) -> IntervalCharts:
         """The charts of N intervals from (w, c), shape (N, k + r, n)."""
         h, k, N = self.h, self.k, len(start)
-        scaled = h**k * np.append(self.regularised.z(modes[:, :k]), modes[:, k:], axis=1)
+        scaled = h**k * np.append(self.regularized.z(modes[:, :k]), modes[:, k:], axis=1)
         still = np.zeros((N, 1, self.n))
         hv = h * self.split(start)[1][:, None] if k == 2 else still
         Z = scaled if k == 2 else np.concatenate([scaled[:, :1], still, scaled[:, 1:]], axis=1)
@@ -218,7 +218,7 @@ class ChartedLagrangian:
         """(q1, h v1, h^k c) by (w, c), in the tangent space, (C, (k + r) n)."""
         n, k, r = self.n, self.k, self.scheme.inner_modes
         columns = self.h**k * np.eye((k + r) * n)
-        ends = np.kron(self.regularised.gamma, np.eye(n))
+        ends = np.kron(self.regularized.gamma, np.eye(n))
         columns[: k * n, : k * n] = self.h**k * self._end_slopes(interval) @ ends
         return columns
 

@@ -30,7 +30,7 @@ LADDER = (4, 7, 10, 14, 19, 25, 32, 40)
 class ExactDiscreteLagrangian(SegmentLagrangian):
     """L_d^e to a tolerance, with all its derivatives.
 
-    lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularised momenta (for
+    lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularized momenta (for
         k = 2 h p and p~ - h p), relative to the largest.
     The solution that is followed is the one that exists for small h; where h has passed a
     conjugate point of it, InputError says so, as it does where the tolerance is not met.

@@ -147,13 +147,13 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
 class DiscretePath:
     """The numbers of a discrete motion on a grid.
 
-    The regularised coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are carried, not
+    The regularized coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are carried, not
     recomputed: from q and v alone they would lose 12 eps q/h^2 and more.
     [ColomboFerraroMartin2016, section 2]
 
     q: nodes, shape (N + 1, nq), in [rad] or [m].
     v: velocities at the nodes, shape (N + 1, nv), per [s].
-    z: regularised coordinates of the intervals, shape (N, 2, nv), per [s^2].
+    z: regularized coordinates of the intervals, shape (N, 2, nv), per [s^2].
     inner: inner modes c/h^2, shape (N, r, nv), per [s^2]; 0 where an interval has fewer.
     """
 

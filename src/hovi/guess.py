@@ -163,7 +163,7 @@ def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> 
     q[0], v[0], q[-1], v[-1] = boundary
     turned = None if robot.vector_joints else _turned(curve, grid, robot)
     inner = _inner_modes(curve, grid, robot, q)
-    return DiscretePath(q, v, regularised(robot, grid, q, v, turned), inner)
+    return DiscretePath(q, v, regularized(robot, grid, q, v, turned), inner)
 
 
 def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
@@ -179,7 +179,7 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
             )
     h = grid.steps[:, None]
     turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
-    gap = (regularised(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
+    gap = (regularized(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
     if np.abs(gap).max() > 1e-6 * max(1.0, np.abs(path.q).max()):
         raise InputError(
             "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
@@ -209,7 +209,7 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, robot)
 
 
-def regularised(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | None = None) -> Array:
+def regularized(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | None = None) -> Array:
     """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
 
     x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 where tangent vectors add.
@@ -233,7 +233,7 @@ def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> Discrete
         return path
     h = grid.steps[:, None]
     turned = h * path.v[:-1] + h**2 * path.z[:, 0]
-    z, known = path.z.copy(), regularised(robot, grid, path.q, path.v, turned)
+    z, known = path.z.copy(), regularized(robot, grid, path.q, path.v, turned)
     for factor in robot.space.curved:
         z[:, :, factor.v] = known[:, :, factor.v]
     return DiscretePath(path.q, path.v, z, path.inner)

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi.regularised import Regularised, regularised
+from hovi.regularized import Regularized, regularized
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +24,7 @@ class Segment:
 
     scheme: what the action was discretised with. h: in [s].
     x0: jets (q, q', ..., q^(k-1)) at the start, shape (B, k, n).
-    w: regularised coordinates, shape (B, k, n). inner: inner modes, shape (B, r, n); both in the
+    w: regularized coordinates, shape (B, k, n). inner: inner modes, shape (B, r, n); both in the
         units of q^(k).
     values: L_d, shape (B,).
     gradient: of phi = L_d / h in (x0, w, c), shape (B, 2 k + r, n).
@@ -48,30 +48,30 @@ class Segment:
         return int(self.x0.shape[1])
 
     @property
-    def regularised(self) -> Regularised:
+    def regularized(self) -> Regularized:
         """The change between (x0, w) and (x0, x1)."""
-        return regularised(self.k, self.h)
+        return regularized(self.k, self.h)
 
     @cached_property
     def x1(self) -> Array:
         """Jets at the end, shape (B, k, n)."""
-        return self.regularised.end(self.x0, self.w)
+        return self.regularized.end(self.x0, self.w)
 
     @cached_property
     def z(self) -> Array:
         """z_j = (q1^(j) - sum_i h^i / i! q0^(j+i)) / h^(k-j), shape (B, k, n)."""
-        return self.regularised.z(self.w)
+        return self.regularized.z(self.w)
 
     @cached_property
     def p1(self) -> Array:
         """Momenta at the end, D_{k+1} .. D_2k of L_d, shape (B, k, n)."""
-        dz = self.regularised.inverse_gamma.T @ self.gradient[:, self.k : 2 * self.k]
-        return np.asarray(self.h * dz / self.regularised.scale[:, None])
+        dz = self.regularized.inverse_gamma.T @ self.gradient[:, self.k : 2 * self.k]
+        return np.asarray(self.h * dz / self.regularized.scale[:, None])
 
     @cached_property
     def p0(self) -> Array:
         """Momenta at the start, -D_1 .. -D_k of L_d, shape (B, k, n)."""
-        return np.asarray(self.regularised.taylor.T @ self.p1 - self.h * self.gradient[:, : self.k])
+        return np.asarray(self.regularized.taylor.T @ self.p1 - self.h * self.gradient[:, : self.k])
 
     @property
     def derivatives(self) -> Array:
@@ -98,7 +98,7 @@ class Segment:
     def second_derivatives(self) -> Array:
         """D_ij of L_d with respect to (x0, x1), shape (B, 2 k, 2 k, n, n)."""
         k, n = self.k, self.x0.shape[2]
-        A = np.concatenate([np.eye(k, 2 * k), self.regularised.from_ends])
+        A = np.concatenate([np.eye(k, 2 * k), self.regularized.from_ends])
         A = np.kron(A, np.eye(n))
         H = self.h * (A.T @ self.condensed @ A)
         return np.asarray(H.reshape(-1, 2 * k, n, 2 * k, n).transpose(0, 1, 3, 2, 4))
@@ -125,7 +125,7 @@ class Segment:
     @property
     def tangent(self) -> Array:
         """The tangent map d(x1, p1) / d(x0, p0) of the discrete Hamiltonian flow, (B, 2kn, 2kn)."""
-        k, n, R = self.k, self.x0.shape[2], self.regularised
+        k, n, R = self.k, self.x0.shape[2], self.regularized
         K, m = self.condensed, k * n
         back = self._back / self.h  # gamma^T (S/h) T^-T
         rhs = np.concatenate([self._back @ K[:, :m, :m] - K[:, m:, :m], 0 * K[:, :m, :m]], axis=2)
@@ -141,8 +141,8 @@ class Segment:
 
     @property
     def _back(self) -> Array:
-        """`Regularised.back` (x) I, shape (k n, k n)."""
-        return np.asarray(np.kron(self.regularised.back, np.eye(self.x0.shape[2])))
+        """`Regularized.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularized.back, np.eye(self.x0.shape[2])))
 
 
 def flat(blocks: Array) -> Array:

@@ -18,7 +18,7 @@ from hovi.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
 from hovi.lagrangian import Lagrangian
 from hovi.newton import newton
-from hovi.regularised import Regularised, regularised
+from hovi.regularized import Regularized, regularized
 from hovi.schemes import Scheme
 from hovi.segment import Segment, flat
 
@@ -45,13 +45,13 @@ class SegmentLagrangian(ABC):
         return self.lagrangian.nv
 
     @property
-    def regularised(self) -> Regularised:
+    def regularized(self) -> Regularized:
         """The change between (x0, w) and (x0, x1)."""
-        return regularised(self.k, self.h)
+        return regularized(self.k, self.h)
 
     @abstractmethod
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
-        """The segment with given ends, in regularised coordinates: x0, w of shape (B, k, n).
+        """The segment with given ends, in regularized coordinates: x0, w of shape (B, k, n).
 
         t0: time at its start, in [s]. Raises InputError when the inner modes are not found.
         """
@@ -68,7 +68,7 @@ class SegmentLagrangian(ABC):
 
     def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> Segment:
         """The segment between two points of T^(k-1)Q, both (B, k, n)."""
-        return self.between(x0, self.regularised.w(x0, x1), t0)
+        return self.between(x0, self.regularized.w(x0, x1), t0)
 
     def value(self, x0: Array, x1: Array) -> Array:
         """L_d(x0, x1), shape (B,)."""
@@ -121,7 +121,7 @@ class SchemeLagrangian(SegmentLagrangian):
     ) -> Segment:
         """Newton on (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
         B, m = len(x0), self.k * self.n
-        back, given = self._back, (self.regularised.back / self.h @ p0).reshape(B, m)
+        back, given = self._back, (self.regularized.back / self.h @ p0).reshape(B, m)
 
         def system(u: Array) -> tuple[Array, Array]:
             gradient, H = self._system(x0, *self._split(u, B), t0)
@@ -136,7 +136,7 @@ class SchemeLagrangian(SegmentLagrangian):
 
     def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
         """Newton on (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, where x0 follows from w."""
-        B, m, R = len(x1), self.k * self.n, self.regularised
+        B, m, R = len(x1), self.k * self.n, self.regularized
         given = (R.gamma.T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
         moved = np.kron(R.inverse_taylor @ R.moments, np.eye(self.n))
 
@@ -165,7 +165,7 @@ class SchemeLagrangian(SegmentLagrangian):
     def table(self) -> Array:
         """(q, q', ..., q^(k)) at the points over (x0, w, c), shape (Q, k + 1, 2 k + r)."""
         k, table = self.k, np.array(self.scheme.regular_table)
-        table[:, :, k : 2 * k] = table[:, :, k : 2 * k] @ self.regularised.gamma
+        table[:, :, k : 2 * k] = table[:, :, k : 2 * k] @ self.regularized.gamma
         columns = np.concatenate([np.arange(k), np.full(k + self.scheme.inner_modes, k)])
         powers = columns - np.arange(k + 1)[:, None]
         return np.where(table == 0, 0.0, table * self.h ** np.where(table == 0, 0, powers))
@@ -215,8 +215,8 @@ class SchemeLagrangian(SegmentLagrangian):
 
     @cached_property
     def _back(self) -> Array:
-        """`Regularised.back` (x) I, shape (k n, k n)."""
-        return np.asarray(np.kron(self.regularised.back, np.eye(self.n)))
+        """`Regularized.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularized.back, np.eye(self.n)))
 
     def _split(self, u: Array, B: int) -> tuple[Array, Array]:
         modes = u.reshape(B, -1, self.n)

@@ -15,7 +15,7 @@ from hovi.blas_threads import one_blas_thread
 from hovi.charted_lagrangian import ChartedLagrangian
 from hovi.errors import InputError
 from hovi.grid import DiscretePath, Grid
-from hovi.guess import regularised
+from hovi.guess import regularized
 from hovi.lagrangian import CasadiLagrangian
 from hovi.lagrangians import (
     Drive,
@@ -88,7 +88,7 @@ class Simulation:
         ld = self.flow.ld
         assert isinstance(ld, SchemeLagrangian | ChartedLagrangian)
         assert isinstance(ld.lagrangian, ForcedLagrangian)
-        w = self.flow.z  # for k = 1 both regularised coordinates are the same
+        w = self.flow.z  # for k = 1 both regularized coordinates are the same
         q, v = ld.jet(self.flow.x[:-1], w, self.flow.inner[:, : ld.scheme.inner_modes])
         t = (self.t[:-1, None] + ld.h * ld.scheme.points).ravel()
         done = []
@@ -105,7 +105,7 @@ class Simulation:
         N, n = len(q) - 1, v.shape[1]
         grid = Grid(np.full(N, h), (galerkin(0),) * N)
         turned = None if self.scene.robot.vector_joints else h * self.flow.z[:, 0]
-        z = regularised(self.scene.robot, grid, q, v, turned)
+        z = regularized(self.scene.robot, grid, q, v, turned)
         path = DiscretePath(q.copy(), v, z, np.zeros((N, 0, n)))
         momenta = np.stack([self.momenta, np.zeros_like(v)], axis=1)
         return Trajectory(grid, path, momenta, self.scene, {"status": "simulated"})

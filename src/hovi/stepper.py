@@ -1,6 +1,6 @@
 """The discrete flow: initial value problems, stepped in momentum form.
 
-One step solves p0 = -D_1 L_d(x0, x1), ... for the regularised coordinates w of the interval, whose
+One step solves p0 = -D_1 L_d(x0, x1), ... for the regularized coordinates w of the interval, whose
 equations stay well conditioned as h tends to zero, and moves on by increments,
 
     x1 = x0 + (T - 1) x0 + S gamma w,      p1 = p0 + (T^-T - 1) p0 + h T^-T dphi/dx0,
@@ -43,7 +43,7 @@ class Flow:
     x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n); on groups in one row,
         (N + 1, 1, nq + (k - 1) nv).
     p: momenta, shape (N + 1, k, n).
-    z: regularised coordinates of the intervals, shape (N, k, n).
+    z: regularized coordinates of the intervals, shape (N, k, n).
     inner: inner modes, (N, r, n).
     rounding: what rounding of the start has grown to in q, shape (N + 1,); None when `force`d.
     symmetries: of which the momentum maps are wanted, by name.
@@ -88,7 +88,7 @@ class Flow:
         """
         if not isinstance(self.ld, SchemeLagrangian):
             raise InputError("only the L_d of a scheme is evaluated again from its inner modes.")
-        w = self.ld.regularised.w_of_z(self.z)
+        w = self.ld.regularized.w_of_z(self.z)
         segment = self.ld.at(self.x[:-1], w, self.inner)
         return segment.p0, segment.p1
 
@@ -196,7 +196,7 @@ class _Stepper:
     """The state of a flow, with what its sums have lost."""
 
     def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, t0: float) -> None:
-        R = ld.regularised
+        R = ld.regularized
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
         self._lost = np.zeros((2, *x.shape))
         self._taylor = R.taylor - np.eye(ld.k)

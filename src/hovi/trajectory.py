@@ -55,7 +55,7 @@ class Trajectory:
     """A motion of a scene's robot on a grid, with the costates that came with it.
 
     grid: the intervals, each with its step and scheme.
-    path: nodes, regularised coordinates and inner modes.
+    path: nodes, regularized coordinates and inner modes.
     momenta: p and p~ at the nodes, shape (N + 1, 2, nv).
     scene: what moves; None for a robot that was a bare Pinocchio model, after loading.
     metadata: what JSON can hold about the origin (cost, status, versions), without wall times.

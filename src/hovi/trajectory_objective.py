@@ -38,12 +38,12 @@ BAND_INTERVALS = 1000
 
 
 class ActionObjective(Objective[DiscretePath]):
-    """The discrete action between fixed ends, in nodal or in regularised coordinates.
+    """The discrete action between fixed ends, in nodal or in regularized coordinates.
 
     problem: what to minimise.
     structure: what depends on the grid alone, from an earlier objective on the same grid.
     algebra: "band" (a banded Cholesky in nodal coordinates, the faster one) or "tree"
-        (merging intervals in regularised coordinates, right at every step length; for fixed ends
+        (merging intervals in regularized coordinates, right at every step length; for fixed ends
         without conditions).
     multipliers: of the equations, where there are some.
     """
@@ -187,7 +187,7 @@ class ActionObjective(Objective[DiscretePath]):
         return self.merge_model(x).negative_eigenvalues()
 
     def merge_model(self, x: DiscretePath) -> MergeTreeModel:
-        """The exact model at x in regularised coordinates, between fixed ends."""
+        """The exact model at x in regularized coordinates, between fixed ends."""
         expansion = self.ld.expand(x, "regular")
         metric = self.structure.metric["regular"]
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)

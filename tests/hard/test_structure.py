@@ -71,7 +71,7 @@ def digits_of_a_chain(count: int) -> Callable[[], Outcome]:
 
 
 def again(problem: TrajectoryProblem, path: object) -> tuple[float, int]:
-    """How far regularised coordinates move a minimum that nodal ones found, and its inertia."""
+    """How far regularized coordinates move a minimum that nodal ones found, and its inertia."""
     tree = ActionObjective(problem, "tree")
     outcome = minimize(tree, path, Options(decrease=1e-9, max_iterations=20))  # type: ignore[arg-type]
     return float(np.abs(outcome.x.q - path.q).max()), tree.negative_eigenvalues(outcome.x)  # type: ignore[attr-defined]

@@ -2,7 +2,7 @@
 
 Two neighbouring intervals become one of their joint length by eliminating the node between
 them, as its deviation Y from the cubic through the outer ends. Everything is written in the
-regularised coordinates (q0, H v0, Z0, Z1) of the interval at hand, so no entry is a difference of
+regularized coordinates (q0, H v0, Z0, Z1) of the interval at hand, so no entry is a difference of
 numbers that grow like h^-3, and log2(N) rounds of small batched operations do the work. The
 eliminated blocks give the inertia. [ColomboFerraroMartin2016, section 2]
 """

@@ -77,7 +77,7 @@ def repeated_integral(coefficients: Array, times: int) -> Array:
 def jet_rows(s: Array, k: int, inner_modes: int) -> Array:
     """(q - q0, h q', ..., h^k q^(k)) at s over (h q0', ..., h^(k-1) q0^(k-1), Z, c).
 
-    Z_j = h^k z_j, j < k, are the regularised end data and c the inner modes.
+    Z_j = h^k z_j, j < k, are the regularized end data and c the inner modes.
     s: shape (M,). Returns shape (M, k + 1, 2 k - 1 + r).
     """
     s = np.asarray(s, dtype=np.float64)

@@ -28,7 +28,7 @@ class Scheme:
     """The discrete Lagrangian L_d = h sum_j w_j L(q_j, v_j, a_j) as numbers.
 
     In scaled variables the j-th point is (q_j - q0, h v_j, h^2 a_j) = table[j] @ (h v0, Z0, Z1, c),
-    with Z0 = q1 - q0 - h v0 and Z1 = h v1 - h v0 (h^2 and h^2 times the regularised coordinates
+    with Z0 = q1 - q0 - h v0 and Z1 = h v1 - h v0 (h^2 and h^2 times the regularized coordinates
     z0, z1) and c the interval's inner modes. [ColomboFerraroMartin2016, sections 2 and 5]
 
     name: how the scheme is called in files and on the command line.

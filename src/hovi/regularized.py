@@ -1,4 +1,4 @@
-"""Regularised coordinates of an interval: end data that stay apart as h tends to zero.
+"""Regularized coordinates of an interval: end data that stay apart as h tends to zero.
 
 [ColomboFerraroMartin2016, section 2]. A point of T^(k-1)Q is x = (q, q', ..., q^(k-1)). The end of
 an interval is x1 = T x0 + S z, with T[j, j+i] = h^i / i! (Taylor) and S = diag(h^(k-j)), and
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Regularised:
+class Regularized:
     """The change of coordinates (x0, w) <-> (x0, z) <-> (x0, x1) of an interval of length h.
 
     k: order of the Lagrangian. h: length of the interval, in [s].
@@ -102,6 +102,6 @@ class Regularised:
 
 
 @lru_cache(maxsize=256)
-def regularised(k: int, h: float) -> Regularised:
+def regularized(k: int, h: float) -> Regularized:
     """The change of coordinates of intervals of length h, made once."""
-    return Regularised(k, h)
+    return Regularized(k, h)
