@@ -47,6 +47,28 @@ def test_jacobians_are_those_of_pinocchio(name: str, size: float) -> None:
         np.testing.assert_array_equal(v, 0 * dx)
 
 
+@pytest.mark.parametrize("size", [1.0, 5.0, 6.2])
+@pytest.mark.parametrize("name", CURVED)
+def test_jacobians_are_those_of_their_series_up_to_a_full_turn(name: str, size: float) -> None:
+    """J = sum_k (-ad)^k / (k + 1)! in extended precision: Pinocchio loses digits towards 2 pi."""
+    space = ConfigurationSpace((name,))
+    places, x = list(GROUPS[name].places), vectors(space, size)
+    twists = np.zeros((POINTS, 6), dtype=np.longdouble)
+    twists[:, places] = x
+    for e in np.eye(space.nv):
+        dx = np.tile(e, (POINTS, 1))
+        _, _, a = Chart(space).jet(bases(space), x, 0 * dx, dx)
+        for twist, found in zip(twists, a, strict=True):
+            term = np.zeros(6, dtype=np.longdouble)
+            term[places] = e
+            total = term.copy()
+            for k in range(60):
+                linear = np.cross(twist[3:], term[:3]) + np.cross(twist[:3], term[3:])
+                term = -np.append(linear, np.cross(twist[3:], term[3:])) / (k + 2)
+                total += term
+            np.testing.assert_allclose(found, total[places].astype(float), rtol=0, atol=2e-14)
+
+
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", CURVED)
 def test_velocity_and_acceleration_are_rates_of_the_curve(name: str, size: float) -> None:

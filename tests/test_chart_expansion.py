@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from finite_differences import derivative
 from hovi.chart import Chart
 from hovi.chart_expansion import IntervalCharts
 from hovi.configuration_space import ConfigurationSpace
-from hovi.lie_groups import _charts
+from hovi.lie_groups import CompiledCharts, local_rates, rates
 from hovi.schemes import Scheme, by_name
 
 Array = npt.NDArray[np.float64]
@@ -179,13 +180,44 @@ def test_an_interval_has_the_same_bytes_in_every_batch(space: ConfigurationSpace
             np.testing.assert_array_equal(one[k], other[0])
 
 
+def expanded(charts: CompiledCharts, g: Array, H: Array) -> tuple[Array, ...]:
+    return charts.expand(g, H)
+
+
+def pulled(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    return (charts.pull_gradient(g, False),)
+
+
+def pulled_regularly(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    return (charts.pull_gradient(g, True),)
+
+
+def pushed(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    B, m, n = len(charts.h), charts.table.shape[2], charts.x.shape[2]
+    return (charts.push_steps(np.random.default_rng(3).normal(size=(B, m, n))),)
+
+
+def rated(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    carried = np.random.default_rng(4).normal(size=charts.x[:2].shape)
+    layout, portable = charts.layout, charts.portable
+    alone = rates(layout, charts.x, portable=portable)
+    return *alone, *rates(layout, charts.x, carried, portable=portable)
+
+
+def rated_locally(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    return local_rates(charts.layout, *charts.x, portable=charts.portable)
+
+
+DOORS = [expanded, pulled, pulled_regularly, pushed, rated, rated_locally]
+
+
+@pytest.mark.parametrize("door", DOORS)
 @each_space
-def test_any_processor_expands_alike(space: ConfigurationSpace) -> None:
-    charts = random_intervals(space, 1.0, GALERKIN).charts
-    g, H = random_terms(space, GALERKIN)
-    fast = charts.expand(g, H)
-    slow = tuple(np.empty_like(array) for array in fast)
-    numbers = GALERKIN.nodal_table, GALERKIN.weights, STEPS, charts.x, charts.ends
-    _charts.expand(space.layout, *numbers, g, H, *slow, portable=True)
+def test_any_processor_gives_the_same(
+    space: ConfigurationSpace, door: Callable[..., tuple[Array, ...]]
+) -> None:
+    charts, terms = random_intervals(space, 1.0, GALERKIN).charts, random_terms(space, GALERKIN)
+    table = GALERKIN.regular_table if door is pulled_regularly else GALERKIN.nodal_table
+    fast, slow = (door(charts.compiled(table, portable), *terms) for portable in (False, True))
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-13 * np.abs(other).max())

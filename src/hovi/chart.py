@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.configuration_space import ConfigurationSpace
-from hovi.lie_groups import _charts
+from hovi.lie_groups import local_rates, rates
 
 Array = npt.NDArray[np.float64]
 Jet = tuple[Array, Array, Array]
@@ -35,17 +35,13 @@ class Chart:
 
     def jets_from(self, q0: Array, x: Array) -> Jet:
         """As `jet` for (x, x', x''), (3, P, nv); each of q0 (B, nq) is that of P / B points."""
-        v, a = self._rates(x, None)
+        v, a = rates(self.space.layout, x)
         of_each = x[0].reshape(len(q0), -1, self.space.nv)
         return self.space.integrate(q0[:, None], of_each).reshape(len(v), -1), v, a
 
     def rates(self, x: Array, v: Array, a: Array | None = None) -> tuple[Array, Array]:
         """(x', x'') of a curve that is at x with velocity v and acceleration a (zero if None)."""
-        out = np.empty((2, *x.shape))
-        still = np.zeros_like(x) if a is None else np.ascontiguousarray(a)
-        rows = np.ascontiguousarray(x), np.ascontiguousarray(v)
-        _charts.local_rates(self.space.layout, *rows, still, out)
-        return out[0], out[1]
+        return local_rates(self.space.layout, x, v, np.zeros_like(x) if a is None else a)
 
     def difference_slopes(self, x: Array) -> Array:
         """d(q1 (-) q0) / dq0 in the tangent space at q0, where x = q1 (-) q0, (P, nv, nv)."""
@@ -57,10 +53,5 @@ class Chart:
     def carried(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q(t) (+) x(t) for a curve q(t) with the jet (q, v, a)."""
         q, v, a = jet
-        seen, turned = self._rates(np.stack([x, dx, ddx]), np.stack([v, a]))
+        seen, turned = rates(self.space.layout, np.stack([x, dx, ddx]), np.stack([v, a]))
         return self.space.integrate(q, x), seen, turned
-
-    def _rates(self, x: Array, carried: Array | None) -> tuple[Array, Array]:
-        out = np.empty((2, *x.shape[1:]))
-        _charts.rates(self.space.layout, np.ascontiguousarray(x), carried, out)
-        return out[0], out[1]

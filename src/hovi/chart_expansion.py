@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.chart import Chart
-from hovi.lie_groups import Layout, _charts
+from hovi.lie_groups import CompiledCharts
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -50,39 +50,21 @@ class IntervalCharts:
 
         gradient (P, 3 n), hessian (P, 3 n, 3 n), symmetric: of the Lagrangian at the points.
         """
-        B, n, m = len(self.h), self.x.shape[2], 4 + self.scheme.inner_modes
-        H = np.ascontiguousarray(hessian.reshape(-1, 3 * n, 3 * n))
-        gradients, hessians = np.empty((B, m, n)), np.empty((B, m, m, n, n))
-        charts = self._charts(self.scheme.nodal_table)
-        _charts.expand(*charts, self._at_points(gradient), H, gradients, hessians)
-        return gradients, hessians
+        return self.compiled(self.scheme.nodal_table).expand(gradient, hessian)
 
     def nodal_gradient(self, gradient: Array) -> Array:
         """The gradient (B, m, n) of L_d in nodal columns from that at the points, (P, 3, n)."""
-        return self._pulled(gradient, self.scheme.nodal_table, False)
+        return self.compiled(self.scheme.nodal_table).pull_gradient(gradient, False)
 
     def end_gradient(self, gradient: Array) -> Array:
         """As `nodal_gradient`, by (q0, h v0, q1, h v1) alone and without differences of ends."""
-        return self._pulled(gradient, self.scheme.regular_table, True)[:, :4]
+        return self.compiled(self.scheme.regular_table).pull_gradient(gradient, True)[:, :4]
 
     def point_steps(self, step: Array) -> Array:
         """Change of (q, v, a) at the points in a nodal step (B, m, n), (B, Q, 3, n)."""
-        change = np.empty((len(self.h), len(self.scheme.weights), 3, self.x.shape[2]))
-        charts = self._charts(self.scheme.nodal_table)
-        _charts.push_steps(*charts, np.ascontiguousarray(step), change)
-        return change
+        return self.compiled(self.scheme.nodal_table).push_steps(step)
 
-    def _pulled(self, gradient: Array, table: Array, regular: bool) -> Array:
-        pulled = np.empty((len(self.h), 4 + self.scheme.inner_modes, self.x.shape[2]))
-        at_points = self._at_points(gradient)
-        _charts.pull_gradient(*self._charts(table), at_points, regular, pulled)
-        return pulled
-
-    def _at_points(self, gradient: Array) -> Array:
-        return np.ascontiguousarray(gradient.reshape(self.x.shape[1], -1))
-
-    def _charts(self, table: Array) -> tuple[Layout, Array, Array, Array, Array, Array]:
-        """What the compiled chain rule has to know of the charts."""
-        scheme = np.ascontiguousarray(table), self.scheme.weights
-        intervals = np.ascontiguousarray(self.h), self.x, self.ends
-        return self.chart.space.layout, *scheme, *intervals
+    def compiled(self, table: Array, portable: bool = False) -> CompiledCharts:
+        """The same charts over the columns of a table, (Q, 3, m)."""
+        layout, weights = self.chart.space.layout, self.scheme.weights
+        return CompiledCharts(layout, table, weights, self.h, self.x, self.ends, portable)

@@ -22,8 +22,6 @@ from hovi.scene import Scene, require_known_joints
 from hovi.torque_model import times
 
 Array = npt.NDArray[np.float64]
-_PLACES = {"SE(2)": [0, 1, 5], "SO(3)": [3, 4, 5], "SE(3)": [0, 1, 2, 3, 4, 5]}
-"""Where the tangent vectors of a group stand in those of SE(3), (linear, angular)."""
 Torque = Callable[[Array], Array]
 """u(t): times (P,) in [s] -> joint efforts (P, nv) in [N m] or [N]."""
 
@@ -195,7 +193,7 @@ def _turned_back(scene: Scene, momentum: ca.SX) -> ca.SX:
     """
     v, turned = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
     for factor in scene.robot.space.curved:
-        i, places = factor.v, _PLACES[factor.group.name]
+        i, places = factor.v, list(factor.group.places)
         p, twist = ca.SX.zeros(6), ca.SX.zeros(6)
         p[places], twist[places] = momentum[i], v[i]
         moment = ca.cross(p[:3], twist[:3]) + ca.cross(p[3:], twist[3:])
@@ -207,7 +205,7 @@ def bracket(space: ConfigurationSpace, x: Array, y: Array) -> Array:
     """[x, y] of tangent vectors in the bodies' axes, (M, nv) each: zero where they add."""
     result = np.zeros_like(x)
     for factor in space.curved:
-        i, places = factor.v, _PLACES[factor.group.name]
+        i, places = factor.v, list(factor.group.places)
         a, b, c = np.zeros((3, len(x), 6))
         a[:, places], b[:, places] = x[:, i], y[:, i]
         c[:, :3] = np.cross(a[:, 3:], b[:, :3]) + np.cross(a[:, :3], b[:, 3:])

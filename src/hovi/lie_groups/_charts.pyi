@@ -8,8 +8,12 @@ def integrate(layout: Layout, q: Array, x: Array, result: Array) -> None: ...
 def difference(
     layout: Layout, q0: Array, q1: Array, expected: Array | None, result: Array
 ) -> None: ...
-def rates(layout: Layout, x: Array, carried: Array | None, out: Array) -> None: ...
-def local_rates(layout: Layout, x: Array, v: Array, a: Array, out: Array) -> None: ...
+def rates(
+    layout: Layout, x: Array, carried: Array | None, out: Array, portable: bool = False
+) -> None: ...
+def local_rates(
+    layout: Layout, x: Array, v: Array, a: Array, out: Array, portable: bool = False
+) -> None: ...
 def expand(
     layout: Layout,
     table: Array,
@@ -33,6 +37,7 @@ def pull_gradient(
     gradient: Array,
     regular: bool,
     columns_gradient: Array,
+    portable: bool = False,
 ) -> None: ...
 def push_steps(
     layout: Layout,
@@ -43,4 +48,5 @@ def push_steps(
     ends: Array,
     step: Array,
     change: Array,
+    portable: bool = False,
 ) -> None: ...

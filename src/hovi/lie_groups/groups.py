@@ -27,6 +27,7 @@ class Group:
     name: as files name it. kind: as layouts name it. nq: numbers of an element. nv: of a tangent
         vector.
     angular: places of the rotation in a tangent vector.
+    places: of a tangent vector in those of SE(3), (linear, angular), a plane at right angles to z.
     unit: places in an element of what has unit norm.
     parts: names of an element's numbers.
     """
@@ -36,6 +37,7 @@ class Group:
     nq: int
     nv: int
     angular: tuple[int, ...]
+    places: tuple[int, ...]
     unit: tuple[int, ...]
     parts: tuple[str, ...]
 
@@ -118,8 +120,8 @@ def _rows(x: Array, lead: tuple[int, ...]) -> Array:
 
 
 _TURN = ("qx", "qy", "qz", "qw")
-SO2 = Group("SO(2)", 1, 2, 1, (0,), (0, 1), ("cos", "sin"))
-SE2 = Group("SE(2)", 2, 4, 3, (2,), (2, 3), ("x", "y", "cos", "sin"))
-SO3 = Group("SO(3)", 3, 4, 3, (0, 1, 2), (0, 1, 2, 3), _TURN)
-SE3 = Group("SE(3)", 4, 7, 6, (3, 4, 5), (3, 4, 5, 6), ("x", "y", "z", *_TURN))
+SO2 = Group("SO(2)", 1, 2, 1, (0,), (5,), (0, 1), ("cos", "sin"))
+SE2 = Group("SE(2)", 2, 4, 3, (2,), (0, 1, 5), (2, 3), ("x", "y", "cos", "sin"))
+SO3 = Group("SO(3)", 3, 4, 3, (0, 1, 2), (3, 4, 5), (0, 1, 2, 3), _TURN)
+SE3 = Group("SE(3)", 4, 7, 6, (3, 4, 5), (0, 1, 2, 3, 4, 5), (3, 4, 5, 6), ("x", "y", "z", *_TURN))
 GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}

@@ -4,7 +4,6 @@
 namespace hovi {
 namespace {
 
-constexpr double series_below = 1.0;  // angles squared for which closed forms lose digits
 constexpr double no_turn = 1e-9;      // turn, in [rad], below which its axis says nothing
 constexpr double full_turn = 6.283185307179586;
 
@@ -24,7 +23,7 @@ constexpr double cotangent_series[series_terms] = {
     77683.0 / 14101100039391805440000.0,
 };
 
-// (1 - (t / 2) cot(t / 2)) / t^2 of t^2.
+// (1 - (t / 2) cot(t / 2)) / t^2 of t^2, for |t| < 2 pi.
 double half_cotangent(double square) {
   if (square >= series_below) {
     const double half = 0.5 * std::sqrt(square);

@@ -54,8 +54,8 @@ struct ChartDoors {
                  double* workspace, double* columns_gradient, double* columns_hessian);
 
   // The gradient alone. regular: the table is over (q0, h v0, Z0, Z1, c).
-  void (*pull_gradient)(const Charts& charts, const double* gradient, bool regular, double* workspace,
-               double* columns_gradient);
+  void (*pull_gradient)(const Charts& charts, const double* gradient, bool regular,
+                        double* workspace, double* columns_gradient);
 
   // Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n).
   void (*push_steps)(const Charts& charts, const double* step, double* workspace, double* change);

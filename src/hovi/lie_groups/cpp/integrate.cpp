@@ -4,8 +4,6 @@
 namespace hovi {
 namespace {
 
-constexpr double series_below = 1.0;  // angles squared for which closed forms lose digits
-
 double sinc(double x) { return x == 0.0 ? 1.0 : std::sin(x) / x; }
 
 // (t - sin t) / t^3 of t^2.

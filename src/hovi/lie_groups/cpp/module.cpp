@@ -32,21 +32,29 @@ const ChartDoors& doors(bool portable = false) {
   return portable ? hovi::charts_baseline : best;
 }
 
-// The layout's numbers are those of hovi::Part.
-hovi::Space space_of(const Layout& layout, std::size_t nq, std::size_t nv) {
-  static_assert(sizeof(hovi::Part) == 4 * sizeof(std::int64_t));
-  return {nq, nv, layout.shape(0), reinterpret_cast<const hovi::Part*>(layout.data())};
+std::vector<hovi::Part> parts_of(const Layout& layout) {
+  std::vector<hovi::Part> parts;
+  for (const std::int64_t* row = layout.data(); parts.size() < layout.shape(0); row += 4)
+    parts.push_back({static_cast<hovi::Kind>(row[0]), row[1], row[2], row[3]});
+  return parts;
 }
 
-Charts charts_of(const Layout& layout, const Input<3>& table, const Input<1>& weights,
-                 const Input<1>& steps, const Input<3>& x, const Input<3>& ends) {
-  return {space_of(layout, 0, x.shape(2)), steps.shape(0),  table.shape(0), table.shape(2),
-          table.data(),                    weights.data(), steps.data(),   x.data(), ends.data()};
+hovi::Space space_of(const std::vector<hovi::Part>& parts, std::size_t nq, std::size_t nv) {
+  return {nq, nv, parts.size(), parts.data()};
+}
+
+Charts charts_of(const std::vector<hovi::Part>& parts, const Input<3>& table,
+                 const Input<1>& weights, const Input<1>& steps, const Input<3>& x,
+                 const Input<3>& ends) {
+  return {space_of(parts, 0, x.shape(2)), steps.shape(0),  table.shape(0), table.shape(2),
+          table.data(),                   weights.data(),  steps.data(),   x.data(),
+          ends.data()};
 }
 
 void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
                const Output<2>& result) {
-  const hovi::Space space = space_of(layout, q.shape(1), x.shape(1));
+  const auto parts = parts_of(layout);
+  const hovi::Space space = space_of(parts, q.shape(1), x.shape(1));
   const std::size_t points = x.shape(0);
   const nb::gil_scoped_release released;
   for (std::size_t p = 0; p < points; ++p)
@@ -56,7 +64,8 @@ void integrate(const Layout& layout, const Input<2>& q, const Input<2>& x,
 
 void difference(const Layout& layout, const Input<2>& q0, const Input<2>& q1,
                 const std::optional<Input<2>>& expected, const Output<2>& result) {
-  const hovi::Space space = space_of(layout, q0.shape(1), result.shape(1));
+  const auto parts = parts_of(layout);
+  const hovi::Space space = space_of(parts, q0.shape(1), result.shape(1));
   const double* const turned = expected ? expected->data() : nullptr;
   const nb::gil_scoped_release released;
   for (std::size_t p = 0; p < result.shape(0); ++p)
@@ -65,28 +74,31 @@ void difference(const Layout& layout, const Input<2>& q0, const Input<2>& q1,
 }
 
 void rates(const Layout& layout, const Input<3>& x, const std::optional<Input<3>>& carried,
-           const Output<3>& out) {
+           const Output<3>& out, bool portable) {
   const std::size_t points = x.shape(1), n = x.shape(2);
-  const hovi::Space space = space_of(layout, 0, n);
+  const auto parts = parts_of(layout);
+  const hovi::Space space = space_of(parts, 0, n);
   const nb::gil_scoped_release released;
-  doors().rates(space, points, x.data(), carried ? carried->data() : nullptr, out.data(),
-                out.data() + points * n);
+  doors(portable).rates(space, points, x.data(), carried ? carried->data() : nullptr, out.data(),
+                        out.data() + points * n);
 }
 
 void local_rates(const Layout& layout, const Input<2>& x, const Input<2>& v, const Input<2>& a,
-                 const Output<3>& out) {
+                 const Output<3>& out, bool portable) {
   const std::size_t points = x.shape(0), n = x.shape(1);
-  const hovi::Space space = space_of(layout, 0, n);
+  const auto parts = parts_of(layout);
+  const hovi::Space space = space_of(parts, 0, n);
   const nb::gil_scoped_release released;
-  doors().local_rates(space, points, x.data(), v.data(), a.data(), out.data(),
-                      out.data() + points * n);
+  doors(portable).local_rates(space, points, x.data(), v.data(), a.data(), out.data(),
+                              out.data() + points * n);
 }
 
 void expand(const Layout& layout, const Input<3>& table, const Input<1>& weights,
             const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
             const Input<2>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
             const Output<5>& columns_hessian, bool portable) {
-  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+  const auto parts = parts_of(layout);
+  const Charts charts = charts_of(parts, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;
   const auto work = room(doors(portable).workspace(charts));
   doors(portable).expand(charts, gradient.data(), hessian.data(), work.get(),
@@ -95,20 +107,24 @@ void expand(const Layout& layout, const Input<3>& table, const Input<1>& weights
 
 void pull_gradient(const Layout& layout, const Input<3>& table, const Input<1>& weights,
                    const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
-                   const Input<2>& gradient, bool regular, const Output<3>& columns_gradient) {
-  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+                   const Input<2>& gradient, bool regular, const Output<3>& columns_gradient,
+                   bool portable) {
+  const auto parts = parts_of(layout);
+  const Charts charts = charts_of(parts, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;
-  const auto work = room(doors().workspace(charts));
-  doors().pull_gradient(charts, gradient.data(), regular, work.get(), columns_gradient.data());
+  const auto work = room(doors(portable).workspace(charts));
+  doors(portable).pull_gradient(charts, gradient.data(), regular, work.get(),
+                                columns_gradient.data());
 }
 
 void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& weights,
                 const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
-                const Input<3>& step, const Output<4>& change) {
-  const Charts charts = charts_of(layout, table, weights, steps, x, ends);
+                const Input<3>& step, const Output<4>& change, bool portable) {
+  const auto parts = parts_of(layout);
+  const Charts charts = charts_of(parts, table, weights, steps, x, ends);
   const nb::gil_scoped_release released;
-  const auto work = room(doors().workspace(charts));
-  doors().push_steps(charts, step.data(), work.get(), change.data());
+  const auto work = room(doors(portable).workspace(charts));
+  doors(portable).push_steps(charts, step.data(), work.get(), change.data());
 }
 
 }  // namespace
@@ -116,13 +132,14 @@ void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& wei
 NB_MODULE(_charts, m) {
   m.def("integrate", &integrate, "layout"_a, "q"_a, "x"_a, "result"_a);
   m.def("difference", &difference, "layout"_a, "q0"_a, "q1"_a, "expected"_a.none(), "result"_a);
-  m.def("rates", &rates, "layout"_a, "x"_a, "carried"_a.none(), "out"_a);
-  m.def("local_rates", &local_rates, "layout"_a, "x"_a, "v"_a, "a"_a, "out"_a);
+  m.def("rates", &rates, "layout"_a, "x"_a, "carried"_a.none(), "out"_a, "portable"_a = false);
+  m.def("local_rates", &local_rates, "layout"_a, "x"_a, "v"_a, "a"_a, "out"_a,
+        "portable"_a = false);
   m.def("expand", &expand, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
         "gradient"_a, "hessian"_a, "columns_gradient"_a, "columns_hessian"_a,
         "portable"_a = false);
   m.def("pull_gradient", &pull_gradient, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a,
-        "ends"_a, "gradient"_a, "regular"_a, "columns_gradient"_a);
+        "ends"_a, "gradient"_a, "regular"_a, "columns_gradient"_a, "portable"_a = false);
   m.def("push_steps", &push_steps, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
-        "step"_a, "change"_a);
+        "step"_a, "change"_a, "portable"_a = false);
 }

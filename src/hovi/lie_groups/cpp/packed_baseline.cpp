@@ -3,6 +3,7 @@
 
 namespace hovi {
 
-extern const ChartDoors charts_baseline{rates, local_rates, workspace, expand, pull_gradient, push_steps};
+extern const ChartDoors charts_baseline{rates,  local_rates,   workspace,
+                                        expand, pull_gradient, push_steps};
 
 }  // namespace hovi

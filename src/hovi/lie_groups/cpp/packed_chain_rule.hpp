@@ -13,8 +13,8 @@ namespace {
 
 // sum += n L. L is a linear map of the group.
 template <typename Group>
-[[gnu::always_inline]] inline void add_pulled(const Pack* n, std::size_t place, const Square<Group>& L,
-                       Pack (&sum)[Group::k]) {
+[[gnu::always_inline]] inline void add_pulled(const Pack* n, std::size_t place,
+                                              const Square<Group>& L, Pack (&sum)[Group::k]) {
   for (std::size_t i = 0; i < Group::k; ++i)
     for (std::size_t j = i < Group::slides ? 0 : Group::slides; j < Group::k; ++j)
       sum[j] += n[i * place] * L.at[i][j];
@@ -22,7 +22,8 @@ template <typename Group>
 
 // sum += L x.
 template <typename Group>
-[[gnu::always_inline]] inline void add_pushed(const Square<Group>& L, const Pack* x, Pack (&sum)[Group::k]) {
+[[gnu::always_inline]] inline void add_pushed(const Square<Group>& L, const Pack* x,
+                                              Pack (&sum)[Group::k]) {
   for (std::size_t i = 0; i < Group::k; ++i)
     for (std::size_t j = i < Group::slides ? 0 : Group::slides; j < Group::k; ++j)
       sum[i] += L.at[i][j] * x[j];

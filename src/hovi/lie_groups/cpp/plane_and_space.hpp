@@ -5,6 +5,8 @@
 
 namespace hovi {
 
+constexpr double series_below = 1.0;  // angles squared for which closed forms lose digits
+
 // Results may be arguments.
 inline void cross(const double* x, const double* y, double* result) {
   const double z[] = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],

@@ -1,7 +1,8 @@
 // A point of a curve q0 exp(x(t)): how (q, v, a) depends on (q0, x, x', x''), to second order.
 //
 // With z = log(exp(-x) exp(x + dx)) a varied curve is q exp(z) and its velocity
-// v - [z, v] + [z, [z, v]] / 2 + z' - [z, z'] / 2 to second order, where z = J dx + (dJ . dx) dx / 2.
+// v - [z, v] + [z, [z, v]] / 2 + z' - [z, z'] / 2 to second order, where
+// z = J dx + (dJ . dx) dx / 2.
 #pragma once
 
 #include "group_places.hpp"
