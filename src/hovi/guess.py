@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hovi.errors import ChartError, InputError, nearest
 from hovi.grid import DiscretePath, Grid
+from hovi.optimize.interval_paths import misfit
 from hovi.robot import Robot
 from hovi.schemes.polynomials import interval_rows
 from hovi.trajectory import Trajectory
@@ -19,6 +20,8 @@ Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
 """(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
 
+MISFIT = 1e-6
+"""Largest gap, relative to q, between the z of a path that is handed in and that of its q and v."""
 QUADRATURE = 8
 """Points by which the turns of continuous joints within an interval are told."""
 WIDEST = 0.9 * np.pi
@@ -170,6 +173,9 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
     """Raise InputError for a path that does not fit a grid and a robot, or not itself."""
     N, r, n = grid.intervals, grid.inner_modes, robot.nv
     shapes = {"q": (N + 1, robot.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
+    fits = [array.shape for array in path.arrays] == list(shapes.values())
+    if fits and robot.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT:
+        return
     for name, shape in shapes.items():
         array = getattr(path, name)
         if array.shape != shape or not np.isfinite(array).all():
@@ -180,7 +186,7 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
     h = grid.steps[:, None]
     turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
     gap = (regularized(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
-    if np.abs(gap).max() > 1e-6 * max(1.0, np.abs(path.q).max()):
+    if np.abs(gap).max() > MISFIT * max(1.0, np.abs(path.q).max()):
         raise InputError(
             "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
             "where configurations are vectors."
@@ -191,7 +197,7 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     """A path plus the cubic that carries its ends to other boundary data."""
     q0, v0, q1, v1 = boundary
     old = path.q[0], path.v[0], path.q[-1], path.v[-1]
-    if all((a == b).all() for a, b in zip(old, boundary, strict=True)):
+    if [x.tolist() for x in old] == [x.tolist() for x in boundary]:
         return path
     dq0, dq1 = robot.difference(old[0], q0), robot.difference(old[2], q1)
     ends = np.stack([dq0, v0 - old[1], dq1, v1 - old[3]])  # (4, n)

@@ -80,6 +80,20 @@ def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float, e
     np.testing.assert_array_equal(again.solve(-model.gradient), step)
 
 
+@pytest.mark.parametrize("shift", [0.0, 30.0])
+@pytest.mark.parametrize(("n", "modes"), SIZES)
+def test_steps_come_with_their_slope_and_length(
+    n: int, modes: tuple[int, ...], shift: float
+) -> None:
+    problem, model = build(n, modes, DEFINITE)
+    factor = model.factor(shift)
+    assert factor is not None
+    step, slope, length = model.descend(factor)
+    np.testing.assert_array_equal(step, factor.solve(-model.gradient))
+    assert slope == pytest.approx(problem.gradient @ step, rel=1e-12)
+    assert length == pytest.approx(step @ problem.metric @ step, rel=1e-12)
+
+
 @pytest.mark.parametrize("n", [5, 6, 7, 16, 30])
 def test_any_processor_solves_arms_of_any_size(n: int) -> None:
     problem, model = build(n, (2, 0, 1, 2, 2), DEFINITE + 10.0 * n)

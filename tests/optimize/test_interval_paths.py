@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.optimize.interval_paths import Path, interpolate, move
+from hovi.optimize.interval_paths import Path, interpolate, misfit, move
 
 Array = npt.NDArray[np.float64]
 
@@ -60,3 +60,23 @@ def test_steps_lead_where_their_columns_say(shape: tuple[int, int, int]) -> None
     after = dq, v + dv, *after[2:]
     for x, y in zip(found, after, strict=True):
         np.testing.assert_allclose(x, y, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_a_misfit_is_the_largest_gap_of_z(shape: tuple[int, int, int]) -> None:
+    (q, v, z, inner), h, _ = random_path(*shape)
+    hh = h[:, None]
+    gaps = (
+        np.diff(q, axis=0) - hh * v[:-1] - hh**2 * z[:, 0],
+        hh * (np.diff(v, axis=0) - hh * z[:, 1]),
+    )
+    expected = np.abs(gaps).max() / max(1.0, np.abs(q).max())
+    assert misfit((q, v, z, inner), h) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize("what", [np.nan, np.inf, -np.inf])
+def test_a_path_that_is_not_finite_has_no_misfit(part: int, what: float) -> None:
+    path, h, _ = random_path(*SHAPES[1])
+    path[part].flat[-1] = what
+    assert np.isnan(misfit(path, h))

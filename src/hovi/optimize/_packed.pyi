@@ -34,6 +34,15 @@ def factor(
     portable: bool = False,
 ) -> bool: ...
 def product(band: Array, rows: Index, x: Array, out: Array) -> None: ...
+def descend(
+    factor: Array,
+    rows: Index,
+    gradient: Array,
+    metric: Array,
+    out: Array,
+    portable: bool = False,
+) -> tuple[float, float]: ...
+def misfit(steps: Array, q: Array, v: Array, z: Array, inner: Array) -> float: ...
 def interpolate(
     table: Array,
     steps: Array,

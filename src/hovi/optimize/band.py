@@ -165,6 +165,16 @@ class BandModel(QuadraticModel):
         _packed.product(self._metric_band, self.layout.rows, s, product)
         return product
 
+    def descend(self, factor: Factor) -> tuple[Array, float, float]:
+        """The step of a factor of this model: see QuadraticModel.descend."""
+        if not isinstance(factor, BandFactor):
+            return super().descend(factor)
+        s = np.empty_like(self.gradient)
+        slope, length = _packed.descend(
+            factor.factor, factor.rows, self.gradient, self._metric_band, s
+        )
+        return s, slope, length
+
     def factor(self, shift: float) -> Factor | None:
         """Banded Cholesky of H + shift D; None where it fails."""
         if self._band is None:

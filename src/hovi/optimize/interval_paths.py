@@ -38,3 +38,12 @@ def move(path: Path, step: Array, steps: Array, nodal: bool) -> Path:
     after = np.empty_like(v), np.empty_like(v), np.empty_like(z), np.empty_like(inner)
     _packed.move(step, steps, nodal, v, z, inner, *after)
     return after
+
+
+def misfit(path: Path, steps: Array) -> float:
+    """By how much z fails to be that of q and v, where tangent vectors add.
+
+    The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q|
+    or to one; not a number where the path has one that is not finite. steps: h, shape (N,).
+    """
+    return _packed.misfit(steps, *path)

@@ -59,6 +59,12 @@ class QuadraticModel(ABC):
         """D s."""
         return self.scatter(np.matmul(self.intervals.metric, self.gather(s)))
 
+    def descend(self, factor: Factor) -> tuple[Array, float, float]:
+        """s = -(H + shift D)^-1 g, its slope g.s and its length squared s.D s."""
+        s = factor.solve(-self.gradient)
+        slope = float(np.vdot(self.gradient, s))
+        return s, slope, float(np.vdot(s, self.metric_product(s)))
+
     def curvature_scale(self) -> float:
         """A size of H relative to D, for a first shift."""
         largest = float(np.max(np.abs(self.intervals.hessian)))

@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -120,8 +120,7 @@ class Outcome(Generic[X]):
     convex: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Trial:
+class Trial(NamedTuple):
     """A solution of the subproblem min g.s + 1/2 s.H s, |s| <= radius.
 
     decrease: what the model foresees. shift: multiplier of the radius; 0 for a Newton step.
@@ -288,13 +287,13 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
                 return search.complete(*last)
             shift = search.after_failure(shift)
             continue
-        trial, slope = search.step_at(factor, shift)
+        trial = search.step_at(factor, shift)
         if search.fits(trial):
             return trial
         if trial.norm < radius and search.is_hard_case(shift):
             return search.complete(factor, trial)
         last = factor, trial
-        shift = search.after_step(shift, trial, slope)
+        shift = search.after_step(factor, trial)
     if last is not None:
         factor, trial = last
         return search.complete(factor, trial) if search.is_short(trial) else trial
@@ -320,22 +319,19 @@ class _ShiftSearch:
             return max(math.sqrt(self.low * self.high), 0.1 * self.high)
         return max(4.0 * shift, (1e-5 if self.reached else 0.03) * self._scale())
 
-    def step_at(self, factor: Factor, shift: float) -> tuple[Trial, float]:
-        """The step of a shift, and the slope s.D (H + shift D)^-1 D s."""
-        g = self.model.gradient
-        s = factor.solve(-g)
-        Ds = self.model.metric_product(s)
-        norm2 = max(float(np.vdot(s, Ds)), 0.0)
-        decrease = -0.5 * float(np.vdot(g, s)) + 0.5 * shift * norm2
-        if not math.isfinite(decrease) or (decrease == 0.0 and g.any()):
+    def step_at(self, factor: Factor, shift: float) -> Trial:
+        """The step of a shift."""
+        s, slope, norm2 = self.model.descend(factor)
+        norm2 = max(norm2, 0.0)
+        decrease = -0.5 * slope + 0.5 * shift * norm2
+        if not math.isfinite(decrease) or (decrease == 0.0 and self.model.gradient.any()):
             raise ArithmeticError("the model has numbers that are not finite")
-        trial = Trial(s, decrease, shift, math.sqrt(norm2))
-        if self.fits(trial):
-            return trial, 0.0
-        return trial, float(np.vdot(Ds, factor.solve(Ds)))
+        return Trial(s, decrease, shift, math.sqrt(norm2))
 
-    def after_step(self, shift: float, trial: Trial, slope: float) -> float:
+    def after_step(self, factor: Factor, trial: Trial) -> float:
         """The next shift after a step that is too long or too short."""
+        shift, Ds = trial.shift, self.model.metric_product(trial.step)
+        slope = float(np.vdot(Ds, factor.solve(Ds)))  # s.D (H + shift D)^-1 D s
         if trial.norm > self.radius:
             self.low = max(self.low, shift)
         else:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -42,6 +43,26 @@ inline void interpolate(const IntervalPath& path, const double* q, const double*
           add_scaled(row[i] * scales[d], inner + (i - 3) * n, n, to);
       }
   }
+}
+
+// The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q| or
+// to one; not a number where the path has one that is not finite.
+inline double misfit(const IntervalPath& path, const double* q, const double* steps) {
+  const std::size_t N = path.intervals, n = path.dof;
+  double largest = 0.0, size = 1.0, poison = 0.0;
+  for (std::size_t i = 0; i < (N + 1) * n; ++i) {
+    size = std::max(size, std::abs(q[i]));
+    poison += 0.0 * q[i] + 0.0 * path.v[i];
+  }
+  for (std::size_t i = 0; i < N * path.modes * n; ++i) poison += 0.0 * path.inner[i];
+  for (std::size_t k = 0; k < N; ++k)
+    for (std::size_t i = k * n; i < (k + 1) * n; ++i) {
+      const double h = steps[k], z0 = path.z[k * n + i], z1 = path.z[(k + 1) * n + i];
+      poison += 0.0 * z0 + 0.0 * z1;
+      largest = std::max(largest, std::abs(q[i + n] - q[i] - h * path.v[i] - h * h * z0));
+      largest = std::max(largest, std::abs(h * (path.v[i + n] - path.v[i] - h * z1)));
+    }
+  return largest / size + poison;
 }
 
 // Where a step leads, (N, columns, n) in the columns (q0, h v0, q1, h v1, c), or

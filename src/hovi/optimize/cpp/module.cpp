@@ -1,13 +1,16 @@
 // The Python binding. Shapes and types are checked by the Python side that calls it.
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 
 #include "arrays.hpp"
 #include "band_product.hpp"
 #include "doors.hpp"
+#include "dot.hpp"
 #include "interval_paths.hpp"
 #include "least_squares.hpp"
 
@@ -87,6 +90,22 @@ void product(const Input<2>& band, const Index& rows, const Input<1>& x, const O
   hovi::product(shape, band.data(), x.data(), out.data());
 }
 
+// s = -A^-1 g with its slope g.s and its length squared s.D s.
+std::pair<double, double> descend(const Input<2>& factor, const Index& rows,
+                                  const Input<1>& gradient, const Input<2>& metric,
+                                  const Output<1>& out, bool portable) {
+  const std::size_t size = gradient.shape(0), columns = factor.shape(0);
+  const hovi::Band shape{size, rows.shape(0), factor.shape(1), rows.data()};
+  const nb::gil_scoped_release released;
+  const auto x = room(columns), product = room(columns);
+  for (std::size_t i = 0; i < size; ++i) x.get()[i] = -gradient.data()[i];
+  std::fill_n(x.get() + size, columns - size, 0.0);
+  doors(portable).solve(shape, factor.data(), x.get());
+  std::copy_n(x.get(), size, out.data());
+  hovi::product(shape, metric.data(), x.get(), product.get());
+  return {hovi::dot(gradient.data(), x.get(), size), hovi::dot(x.get(), product.get(), size)};
+}
+
 void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,
                  const Input<2>& q, const Input<2>& v, const Input<3>& z, const Input<3>& inner,
                  const Output<3>& out) {
@@ -95,6 +114,14 @@ void interpolate(const Input<3>& table, const Input<1>& steps, const Index& inte
   const nb::gil_scoped_release released;
   hovi::interpolate(path, q.data(), table.data(), table.shape(0), table.shape(2), steps.data(),
                     intervals.data(), steps.shape(0), out.data());
+}
+
+double misfit(const Input<1>& steps, const Input<2>& q, const Input<2>& v, const Input<3>& z,
+              const Input<3>& inner) {
+  const hovi::IntervalPath path{z.shape(0), inner.shape(1), v.shape(1), v.data(), z.data(),
+                                inner.data()};
+  const nb::gil_scoped_release released;
+  return hovi::misfit(path, q.data(), steps.data());
 }
 
 void move(const Input<3>& step, const Input<1>& steps, bool nodal, const Input<2>& v,
@@ -141,6 +168,9 @@ NB_MODULE(_packed, m) {
   m.def("factor", &factor, "band"_a, "metric"_a, "shift"_a, "rows"_a, "size"_a, "out"_a,
         "portable"_a = false);
   m.def("product", &product, "band"_a, "rows"_a, "x"_a, "out"_a);
+  m.def("descend", &descend, "factor"_a, "rows"_a, "gradient"_a, "metric"_a, "out"_a,
+        "portable"_a = false);
+  m.def("misfit", &misfit, "steps"_a, "q"_a, "v"_a, "z"_a, "inner"_a);
   m.def("interpolate", &interpolate, "table"_a, "steps"_a, "intervals"_a, "q"_a, "v"_a, "z"_a,
         "inner"_a, "out"_a);
   m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
