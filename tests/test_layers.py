@@ -20,7 +20,6 @@ FLOORS = [
         "newton",
         "conditions",
         "budget",
-        "carried_momenta",
         "whole_file",
         "skeleton",
         "meshcat_page",
@@ -41,6 +40,7 @@ FLOORS = [
         "example_robots",
     },
     {
+        "carried_momenta",
         "clearance",
         "mass_matrix",
         "configuration_space",

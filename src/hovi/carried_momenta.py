@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.optimize import _packed
+
 Array = npt.NDArray[np.float64]
 
 ROUNDING = 1e-13
@@ -24,11 +26,6 @@ def carried_momenta(derivatives: Array) -> Array:
         not stationary to rounding, the evaluated p is returned.
     """
     N = len(derivatives)
-    evaluated = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
-    p = evaluated[:, 0]
-    sums = np.zeros_like(p)
-    np.add.accumulate(derivatives[:, 0] + derivatives[:, 2], axis=0, out=sums[1:])
-    carried = sums + (p - sums).sum(axis=0) / (N + 1)
-    if np.abs(carried - p).max() <= ROUNDING * N * np.abs(p).max():
-        evaluated[:, 0] = carried
-    return evaluated
+    momenta = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
+    _packed.carry(derivatives[:, 0] + derivatives[:, 2], ROUNDING * N, momenta)
+    return momenta

@@ -9,6 +9,7 @@
 
 #include "arrays.hpp"
 #include "band_product.hpp"
+#include "carried_sums.hpp"
 #include "doors.hpp"
 #include "dot.hpp"
 #include "interval_paths.hpp"
@@ -134,6 +135,12 @@ void move(const Input<3>& step, const Input<1>& steps, bool nodal, const Input<2
              new_z.data(), new_inner.data());
 }
 
+void carry(const Input<2>& increments, double share, const Output<3>& values) {
+  const nb::gil_scoped_release released;
+  hovi::carry(increments.shape(0), increments.shape(1), increments.data(), share,
+              values.shape(1) * values.shape(2), values.data());
+}
+
 double weighted_square(const Input<2>& residuals, const Input<1>& metric,
                        const Input<1>& weights) {
   const nb::gil_scoped_release released;
@@ -175,6 +182,7 @@ NB_MODULE(_packed, m) {
         "inner"_a, "out"_a);
   m.def("move", &move, "step"_a, "steps"_a, "nodal"_a, "v"_a, "z"_a, "inner"_a, "dq"_a, "new_v"_a,
         "new_z"_a, "new_inner"_a);
+  m.def("carry", &carry, "increments"_a, "share"_a, "values"_a);
   m.def("weighted_square", &weighted_square, "residuals"_a, "metric"_a, "weights"_a);
   m.def("expand_squares", &expand_squares, "residuals"_a, "metric"_a, "jacobian"_a,
         "force"_a.none(), "values"_a, "gradient"_a);
