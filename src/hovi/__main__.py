@@ -13,6 +13,8 @@ from types import FrameType
 INTERRUPTED = 130
 IMPORTING = "<frozen importlib"
 """What the file names of Python's own frames begin with while a module is imported."""
+EXTENSION = "hovi.rigid_body._core"
+"""What counts its objects at the end; those of a program that was interrupted are no leaks."""
 PATIENCE = 0.05
 """Seconds after which Ctrl-C is heard again that came while a run imported what it needs."""
 
@@ -45,6 +47,9 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     Raises KeyboardInterrupt at any other time. A module that is imported in the middle of a run may
     swallow that, so that the run hears of it when the module is there.
     """
+    extension = sys.modules.get(EXTENSION)
+    if hasattr(extension, "ignore_leaks"):
+        extension.ignore_leaks()
     asking = _asks_for_imports(frame)
     if asking is None:
         raise KeyboardInterrupt

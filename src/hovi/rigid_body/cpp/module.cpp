@@ -65,7 +65,7 @@ double time_pinocchio_calls(const std::string& archive, const Input& q, const In
 
 NB_MODULE(_core, m) {
   // What is alive as an interrupted program ends is no leak.
-  nb::set_leak_warnings(false);
+  m.def("ignore_leaks", [] { nb::set_leak_warnings(false); });
 
   m.attr("pinocchio_version") = PINOCCHIO_VERSION;
   m.attr("casadi_version") = CASADI_VERSION_STRING;

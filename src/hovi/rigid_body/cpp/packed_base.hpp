@@ -6,7 +6,8 @@
 // changes in packed_recursions.hpp, for all that the base carries and the base itself,
 //   dV = 0,    dA = fall x S_j,     dw = 0   per dq_j: so dS = L = 0, ddS = fall x S,
 //   dV = S_j,  dA = S_j x V + T_j,  dw = 0   per dv_j with T = V x S, V of the base,
-// and nothing turns S_i of another of its joints: c_q lacks S x* f, e = h = 0, k = S x* z - 2 B_w S.
+// and nothing turns S_i of another of its joints: c_q lacks S x* f, e = h = 0,
+// k = S x* z - 2 B_w S.
 // fall(d) = fall - d x fall + d x (d x fall) / 2 adds its bend to d2 phi / dq_i dq_j.
 #pragma once
 
