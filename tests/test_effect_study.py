@@ -21,6 +21,7 @@ from hovi.scene import Scene
 from hovi.state import State
 from hovi.task_file import Task
 from hovi.tracking import play
+from manifold_robots import with_arm
 
 CANDIDATES = (ViscousFriction(0.3), Armature(0.0), VelocityCost(2.0), Gravity())
 
@@ -137,12 +138,16 @@ def test_a_robot_that_floats_is_not_put_on_a_moving_base() -> None:
     assert "moving_base" not in keys
 
 
-def test_nothing_rubs_where_a_base_floats() -> None:
-    by_key = {e.key: e for e in effect_candidates(load_robot("solo8", free_flyer=True))}
+@pytest.mark.parametrize(
+    ("base", "floating"), [("free-flyer", 6), ("spherical", 3), ("planar", 3), ("continuous", 0)]
+)
+def test_nothing_rubs_where_a_base_floats(base: str, floating: int) -> None:
+    by_key = {e.key: e for e in effect_candidates(load_robot(with_arm(base)))}
+    assert ("moving_base" in by_key) == (floating == 0)
     for effect in (by_key["viscous_friction"], by_key["dry_friction"], by_key["armature"]):
         (numbers,) = [x for x in vars(effect).values() if isinstance(x, tuple)]
-        assert numbers[:6] == (0.0,) * 6
-        assert min(numbers[6:]) > 0.0
+        assert numbers[:floating] == (0.0,) * floating
+        assert min(numbers[floating:]) > 0.0
 
 
 def test_a_study_of_continuous_joints_is_that_of_their_revolute_twins(

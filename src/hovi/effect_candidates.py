@@ -64,11 +64,14 @@ def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
 
 
 def _borne(robot: Robot) -> Array:
-    """1 for coordinates with a bearing and perhaps a motor, 0 for those of a base that floats."""
+    """1 for coordinates with a bearing and perhaps a motor, 0 for those of a base that floats.
+
+    A base is a first joint on SE(2), SO(3) or SE(3).
+    """
     borne = np.ones(robot.nv)
-    for joint in robot.model.joints:
-        if joint.shortname() == "JointModelFreeFlyer":
-            borne[joint.idx_v : joint.idx_v + joint.nv] = 0.0
+    for factor in robot.space.curved[:1]:
+        if factor.v.start == 0:
+            borne[factor.v] = 0.0
     return borne
 
 
