@@ -19,11 +19,12 @@ from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
 from hovi.scene import Scene
 from hovi.schemes import galerkin
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.task_file import Task, load_task
 from hovi.tolerance import Accuracy, Round, Tolerance
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 from paper_arm import HANG, REACH_Q, REACH_V
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach")

@@ -18,8 +18,9 @@ from hovi.limits import as_limits
 from hovi.obstacles import Box, Obstacle, Sphere
 from hovi.problem import TrajectoryProblem
 from hovi.schemes import galerkin
-from hovi.solver import Status, guess_path, solve
+from hovi.solver import guess_path, solve
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 
 Array = npt.NDArray[np.float64]
 HANG, REACH = [-np.pi / 2, 0.0], [0.3, 0.7]

@@ -16,9 +16,10 @@ from hovi.multistart import Job
 from hovi.planner import plan
 from hovi.scene import Scene
 from hovi.schemes import galerkin
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 from paper_arm import HANG, REACH_Q
 from uneven_chain import uneven_chain
 

@@ -17,9 +17,10 @@ from hovi.optimize.trust_region import Options, Stop
 from hovi.planner import plan
 from hovi.problem import TrajectoryProblem
 from hovi.schemes import galerkin
-from hovi.solver import Status, guess_path, solve
+from hovi.solver import guess_path, solve
 from hovi.state import State
 from hovi.trajectory import Trajectory
+from hovi.verdict import Status
 from ipopt_oracle import least_action
 
 UR5 = {"v": 3.14, "tau": [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]}

@@ -14,9 +14,10 @@ from hovi.limits import no_limits
 from hovi.multistart import SAME_COST, Job, Pool, default_processes, distinct, explore
 from hovi.scene import Scene
 from hovi.schemes import by_name
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 from paper_arm import HANG
 
 

@@ -18,10 +18,11 @@ from hovi.problem import TrajectoryProblem
 from hovi.robot import load_robot
 from hovi.scene import Scene
 from hovi.schemes import galerkin
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.task_file import load_task
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 from paper_arm import HANG, REACH_Q, REACH_V
 
 UR5_START = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]

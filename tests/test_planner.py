@@ -18,11 +18,12 @@ from hovi.planner import COARSE_INTERVALS, REFINED, plan
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name, galerkin
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.task_file import load_task
 from hovi.task_plan import plan_task
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 from manifold_robots import half_turning
 from paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
 

@@ -22,10 +22,11 @@ from hovi.rigid_body import casadi_functions
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.schemes import by_name
-from hovi.solver import Solution, Status, guess_path, solve
+from hovi.solver import Solution, guess_path, solve
 from hovi.state import State
 from hovi.task_file import load_task
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 from ipopt_oracle import least_action
 from paper_arm import HANG, REACH_COST, REACH_Q, REACH_V, REST, extremal
 

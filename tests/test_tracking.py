@@ -17,7 +17,7 @@ from hovi.controllers import FEEDBACKS, Controller, OpenLoop, controller
 from hovi.effects import Gravity, Payload, ViscousFriction
 from hovi.errors import InputError
 from hovi.planner import plan
-from hovi.robot import Robot
+from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
 from hovi.simulator import simulate
 from hovi.state import State
@@ -250,6 +250,9 @@ def test_joints_without_a_motor_get_no_torque(models: Path) -> None:
     assert np.abs(u[:, slide] - plan.sample(plan.t).tau[:, slide]).min() > 0.1
     with pytest.raises(InputError, match="a motor at every joint, and hinge has none"):
         play(task.scene, plan, "computed-torque")
+    names = ["elbow_joint", "wrist_1_joint"]
+    with pytest.raises(InputError, match=f"and {', '.join(names)} have none"):
+        controller(plan, "computed-torque", Scene(load_robot("ur5"), passive=names), 10.0)
 
 
 def test_a_solution_is_no_trajectory(simple: Scene) -> None:

@@ -36,9 +36,10 @@ from hovi.optimize.quadratic_model import IntervalSum
 from hovi.planner import plan
 from hovi.scene import Scene
 from hovi.schemes import galerkin
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.state import State
 from hovi.task_file import load_task
+from hovi.verdict import Status
 from paper_arm import HANG, REACH_COST
 
 SCHEMES = "taylor-midpoint", "hermite-simpson", "galerkin-0", "galerkin-2"

@@ -13,8 +13,9 @@ from scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, 
 from hovi.lagrangians import spline
 from hovi.schemes import galerkin
 from hovi.segment_lagrangian import SchemeLagrangian
-from hovi.solver import Solution, Status, solve
+from hovi.solver import Solution, solve
 from hovi.stepper import flow
+from hovi.verdict import Status
 from long_flows import noether_errors, spline_error
 from paper_arm import HANG, REACH_COST
 from test_splines import exact_recursion

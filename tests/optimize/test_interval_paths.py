@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.optimize.interval_paths import Path, interpolate, misfit, move
+from hovi.optimize.interval_paths import PathArrays, interpolate, misfit, move
 
 Array = npt.NDArray[np.float64]
 
@@ -14,7 +14,7 @@ SHAPES = [(1, 0, 1), (3, 2, 2), (5, 4, 7)]
 """Intervals N, inner modes r, components n."""
 
 
-def random_path(N: int, r: int, n: int) -> tuple[Path, Array, np.random.Generator]:
+def random_path(N: int, r: int, n: int) -> tuple[PathArrays, Array, np.random.Generator]:
     """A path and unequal steps."""
     random = np.random.default_rng(N)
     shapes = (N + 1, n), (N + 1, n), (N, 2, n), (N, r, n)
