@@ -37,7 +37,11 @@ def _revolute(model: pin.Model) -> pin.Model:
     twin = pin.Model()
     twin.name = "revolute"
     for i in range(1, model.njoints):
-        joint = pin.JointModelRZ() if model.joints[i].nq == 2 else model.joints[i]  # RUBZ in Kinova
+        joint = model.joints[i]
+        if joint.nq == 2:
+            if joint.shortname() != "JointModelRUBZ":
+                raise ValueError(f"{model.names[i]} is {joint.shortname()}, no turn about z.")
+            joint = pin.JointModelRZ()
         twin.addJoint(model.parents[i], joint, model.jointPlacements[i], str(model.names[i]))
         twin.appendBodyToJoint(i, model.inertias[i], pin.SE3.Identity())
     return twin

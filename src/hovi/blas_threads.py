@@ -18,7 +18,10 @@ Result = TypeVar("Result")
 
 
 def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """The function, which runs with one thread in every BLAS of the process."""
+    """The function, which runs with one thread in every BLAS that the process has as it begins.
+
+    SciPy has one of its own: what imports it on the way imports it before.
+    """
 
     @functools.wraps(function)
     def limited(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:

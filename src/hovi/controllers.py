@@ -153,8 +153,9 @@ def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> 
     if feedback == "pd":
         return ProportionalDerivative.of_bandwidth(plan, scene.robot, bandwidth)
     if scene.passive:
+        have = "has" if len(scene.passive) == 1 else "have"
         raise InputError(
-            f"computed torques need a motor at every joint, and {', '.join(scene.passive)} has "
+            f"computed torques need a motor at every joint, and {', '.join(scene.passive)} {have} "
             "none; choose the feedback 'pd'."
         )
     if plan.scene is None:

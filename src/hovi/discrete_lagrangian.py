@@ -321,7 +321,7 @@ class DiscreteLagrangian:
 
 
 def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
-    """As `_jet`, in the charts q = q0 (+) x."""
+    """As `IntervalBatch.jet`, in the charts q = q0 (+) x."""
     return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
 
 

@@ -1,6 +1,8 @@
 """Do the planned torques move the robot as planned? Asked of SciPy and of Pinocchio's ABA.
 
-(Of its mass matrix where joints mimic others, which ABA does not know.)
+Where joints mimic others, which ABA does not know, it is asked of the mass matrix instead: that of
+Pinocchio for the robot with every joint on its own, pulled back by the same G as the planner's
+torques. An error in G would then be in both.
 
 The forward dynamics are integrated under the planned torques by an independent method, from every
 node to the next. That certifies dynamics and torques. It says nothing of optimality: the inverse

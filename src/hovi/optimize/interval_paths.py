@@ -1,4 +1,7 @@
-"""Paths of intervals: what their quadrature points see, and where steps in their columns lead."""
+"""Paths of intervals: what their quadrature points see, and where steps in their columns lead.
+
+Arrays alone, of any origin; compiled beside what contracts derivatives over the same columns.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,11 @@ from hovi.optimize import _packed
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-Path = tuple[Array, Array, Array, Array]
+PathArrays = tuple[Array, Array, Array, Array]
 """q (N + 1, n), v (N + 1, n), z (N, 2, n) and inner modes (N, r, n): see DiscretePath."""
 
 
-def interpolate(table: Array, steps: Array, intervals: Index, path: Path) -> Array:
+def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) -> Array:
     """(q, v, a) at the points of some intervals, where tangent vectors add, shape (3, B Q, n).
 
     (q - q0, h v, h^2 a) = table (h v0, h^2 z0, h^2 z1, h^2 inner) at every point.
@@ -27,7 +30,7 @@ def interpolate(table: Array, steps: Array, intervals: Index, path: Path) -> Arr
     return out
 
 
-def move(path: Path, step: Array, steps: Array, nodal: bool) -> Path:
+def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays:
     """Change of q in a step, and where it leads v, z and the inner modes.
 
     step: in the intervals' columns (q0, h v0, q1, h v1, c) when nodal, else (q0, h v0, Z0, Z1, c),
