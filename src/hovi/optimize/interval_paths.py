@@ -43,7 +43,7 @@ def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays
     return after
 
 
-def misfit(path: Path, steps: Array) -> float:
+def misfit(path: PathArrays, steps: Array) -> float:
     """By how much z fails to be that of q and v, where tangent vectors add.
 
     The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q|
