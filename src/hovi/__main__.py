@@ -48,7 +48,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     swallow that, so that the run hears of it when the module is there.
     """
     extension = sys.modules.get(EXTENSION)
-    if hasattr(extension, "ignore_leaks"):
+    if extension is not None and hasattr(extension, "ignore_leaks"):  # imported to its end
         extension.ignore_leaks()
     asking = _asks_for_imports(frame)
     if asking is None:
