@@ -108,7 +108,7 @@ FLOORS = [
     },
     {"trajectory_objective"},
     {"limited_action", "equality_rounds", "predictor"},
-    {"penalized_action"},
+    {"penalized_action", "limited_outcome"},
     {"limited_solver"},
     {"verdict"},
     {"solver", "task_file", "simulator", "controllers"},

@@ -20,7 +20,8 @@ Result = TypeVar("Result")
 def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """The function, which runs with one thread in every BLAS that the process has as it begins.
 
-    SciPy has one of its own: what imports it on the way imports it before.
+    That of SciPy, where the function itself imports it, is left as it is: what hovi takes from
+    there multiplies by NumPy's.
     """
 
     @functools.wraps(function)

@@ -16,9 +16,9 @@ from hovi.contradictions import contradiction, static_sentence
 from hovi.equality_rounds import first_multipliers, satisfy
 from hovi.grid import DiscretePath
 from hovi.guess import stretched, with_bump
-from hovi.lagrangian import PointTerms
 from hovi.limit_check import excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
+from hovi.limited_outcome import LimitedOutcome
 from hovi.limits import Limits
 from hovi.multipliers import Multipliers
 from hovi.optimize.band import BandModel
@@ -68,28 +68,6 @@ STAGE_STEPS = 80
 """Steps of each, whose result is only a guess."""
 HELD = 1e-3
 """Violation, as a share of the range, below which the larger penalty counts as having found one."""
-
-
-@dataclass(frozen=True, eq=False)
-class LimitedOutcome:
-    """What became of a problem with limits.
-
-    problem: the problem as solved, with the intervals that had to be split.
-    forces: of the limits and equations on the motion, at the quadrature points.
-    reason: why there is no motion, in a sentence without its end; "" where there is one.
-    excess: largest share of a range by which a limit is exceeded anywhere.
-    """
-
-    problem: TrajectoryProblem
-    x: DiscretePath
-    value: float
-    stop: Stop
-    iterations: int
-    history: list[Iteration]
-    n_neg: int
-    forces: list[PointTerms] | None = None
-    reason: str = ""
-    excess: float = 0.0
 
 
 def solve_limited(

@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 
 from hovi.grid import DiscretePath
-from hovi.limited_solver import LimitedOutcome
+from hovi.limited_outcome import LimitedOutcome
 from hovi.non_finite import non_finite_sentence
 from hovi.optimize.trust_region import Outcome, Stop
 from hovi.problem import TrajectoryProblem
