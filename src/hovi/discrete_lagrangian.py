@@ -138,7 +138,7 @@ class DiscreteLagrangian:
             if self.chart is None:
                 part = batch.contracted(point_gradient, coordinates)
             else:
-                part = _charts(self.chart, batch, path).nodal_gradient(point_gradient)
+                part = _charts_on(self.chart, batch, path).nodal_gradient(point_gradient)
             gradient[batch.index, : part.shape[1]] = part
         return gradient
 
@@ -246,7 +246,7 @@ class DiscreteLagrangian:
         gradients = self.point_gradients(path, forces, jets)
         for batch, gradient in zip(self._batches, gradients, strict=True):
             if self.chart is not None:
-                g[batch.index] = _charts(self.chart, batch, path).end_gradient(gradient)
+                g[batch.index] = _charts_on(self.chart, batch, path).end_gradient(gradient)
                 continue
             regular = batch.contracted(gradient, "regular")
             g[batch.index] = regular[:, :4]
@@ -299,7 +299,7 @@ class DiscreteLagrangian:
     def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
         if self.chart is None:
             return None
-        return [_charts(self.chart, batch, path) for batch in self._batches]
+        return [_charts_on(self.chart, batch, path) for batch in self._batches]
 
     @cached_property
     def _batches(self) -> list[IntervalBatch]:
@@ -325,7 +325,7 @@ def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath)
     return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
 
 
-def _charts(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
+def _charts_on(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
     """The charts of a batch's intervals."""
     h = batch.h[:, None, None]
     v0, z = path.v[:-1][batch.index], path.z[batch.index]
