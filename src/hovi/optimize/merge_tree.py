@@ -271,14 +271,32 @@ def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimina
     negative = 0
     if definite:
         np.linalg.cholesky(block)
+        inverse = np.asarray(np.linalg.inv(block), dtype=np.float64)
+        solved = np.matmul(inverse, coupling)
+        taken = np.matmul(coupling.transpose(0, 2, 1), solved)
     else:
-        negative = int(np.sum(np.linalg.eigvalsh(block) < 0))
-    inverse = np.asarray(np.linalg.inv(block), dtype=np.float64)
-    solved = np.matmul(inverse, coupling)
-    S = flat[:, : 4 * n, : 4 * n] - np.matmul(coupling.transpose(0, 2, 1), solved)
+        inverse, solved, taken, negative = _spectral(block, coupling)
+    S = flat[:, : 4 * n, : 4 * n] - taken
     S = (S + S.transpose(0, 2, 1)) / 2
     schur = S.reshape(B, 4, n, 4, n).transpose(0, 1, 3, 2, 4)
     return schur, _Elimination(inverse, solved), negative
+
+
+def _spectral(block: Array, coupling: Array) -> tuple[Array, Array, Array, int]:
+    """B^-1, B^-1 C, C^T B^-1 C and the number of negative eigenvalues of symmetric blocks B.
+
+    By the eigenvectors of B with its diagonal scaled to one: on long chains, products with B^-1
+    itself lose the signs that are to be counted.
+    """
+    size = np.sqrt(np.abs(np.einsum("bii->bi", block)))
+    size[size == 0] = 1.0
+    value, vector = np.linalg.eigh(block / (size[:, :, None] * size[:, None, :]))
+    vector = vector / size[:, :, None]
+    rotated = np.matmul(vector.transpose(0, 2, 1), coupling)
+    divided = rotated / value[:, :, None]
+    inverse = np.matmul(vector / value[:, None, :], vector.transpose(0, 2, 1))
+    taken = np.matmul(rotated.transpose(0, 2, 1), divided)
+    return inverse, np.matmul(vector, divided), taken, int(np.sum(value < 0))
 
 
 def _forward(step: _Elimination, rhs: Array, carried: Array | None) -> tuple[Array, Array]:
