@@ -40,7 +40,9 @@ FEW = ("galerkin-0", "galerkin-1", "hermite-simpson")
 
 @pytest.fixture(scope="module")
 def reach() -> Diagram:
-    return work_precision(load_task(example("two_link_reach")), schemes=FEW, repeats=1)
+    return work_precision(
+        load_task(example("two_link_reach")), schemes=FEW, repeats=1, clock="processor"
+    )
 
 
 def run(method: str, intervals: int, cost: float, seconds: float, joints: float = 1e-3) -> Run:
