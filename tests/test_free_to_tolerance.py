@@ -121,12 +121,13 @@ def in_vain(solution: Solution) -> Solution:
     ("later_steps", "later_refine", "reason"),
     [
         (0, None, "as the finer one gave none (iteration_limit): "),
+        (None, None, "as the finer one gave none (interrupted): "),
         (500, in_vain, "as the finer one gave none (the tolerance was not reached again): "),
     ],
 )
 def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
     task: Task,
-    later_steps: int,
+    later_steps: int | None,
     later_refine: Callable[[Solution], Solution] | None,
     reason: str,
 ) -> None:
@@ -139,7 +140,10 @@ def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
             stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
             ld = DiscreteLagrangian(task.scene.effort_lagrangian(), stretched)
             problem = TrajectoryProblem(ld, task.start, task.goal)
-            return solve(problem, guess, max_iterations=later_steps if refined else 500)
+            if refined and later_steps is None:
+                raise KeyboardInterrupt
+            most = later_steps if refined and later_steps is not None else 500
+            return solve(problem, guess, max_iterations=most)
 
         return solve_for
 
@@ -151,7 +155,8 @@ def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
     first = solve(TrajectoryProblem(ld, task.start, task.goal))
     found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
     assert accuracy_of(refined[0]).reached
-    assert found.success
+    assert found.success == (later_steps is not None)
+    assert found.status is (Status.MINIMUM if found.success else Status.INTERRUPTED)
     assert found.trajectory is refined[0].trajectory
     assert accuracy_of(found).reached
     assert reason in found.message

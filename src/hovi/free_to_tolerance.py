@@ -13,6 +13,7 @@ from hovi.free_duration import BestDuration, FreeDuration, SolveFor, best_durati
 from hovi.grid import Grid
 from hovi.solver import Solution
 from hovi.tolerance import Round
+from hovi.verdict import Status
 
 OnGrid = Callable[[Grid], SolveFor]
 """What solves on a grid that is stretched to a duration."""
@@ -33,7 +34,8 @@ def free_to_tolerance(
     first: a solution for some duration between the bounds, on a coarse grid.
     The accuracy is that of the motion among those of its duration, relative in the cost without
     w T. That J' + w vanishes on the grid and not in the limit costs the square of a small error.
-    Where a later turn fails, the motion within the tolerance of the one before is returned.
+    Where a later turn fails, the motion within the tolerance of the one before is returned; after
+    an interrupt it is no success, as elsewhere.
     """
     found = best_duration(free, on_grid(first.trajectory.grid), first)
     steps, rounds = found.steps, tuple[Round, ...]()
@@ -62,7 +64,10 @@ def _held(kept: BestDuration, failed: Solution) -> BestDuration:
     """The last motion within the tolerance, with what became of the search for a better one."""
     reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
     ending = f"Its duration is the best on a coarser grid, as the finer one gave none ({reason}):"
-    return dataclasses.replace(kept, ending=ending)
+    solution = kept.solution
+    if failed.status is Status.INTERRUPTED:  # so that no other motion is tried either
+        solution = dataclasses.replace(solution, success=False, status=failed.status)
+    return dataclasses.replace(kept, solution=solution, ending=ending)
 
 
 def _told(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
