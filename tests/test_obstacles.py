@@ -48,6 +48,7 @@ def test_a_box_is_turned_as_in_a_urdf() -> None:
         (lambda: Box([1, 0, 1], [0, 0, 0]), "`size` of a box must be positive"),
         (lambda: Capsule([[0, 0, 0], [0, 0, 0]], 0.1), "ends of a capsule coincide"),
         (lambda: obstacle_from_dict({"kind": "spere"}), "did you mean 'sphere'"),
+        (lambda: obstacle_from_dict({"kind": {"elbow": 1.0}}), "no obstacle of kind {"),
         (lambda: obstacle_from_dict({"kind": "box", "sise": 1}), "did you mean 'size'"),
         (lambda: obstacle_from_dict({"kind": "box", "size": [1, 1, 1]}), "needs `position`"),
         (lambda: Clearance([ALL[0], ALL[0]]), "two obstacles are called 'ball'"),

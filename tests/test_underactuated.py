@@ -10,7 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hovi
+from hovi.equality_rounds import unmet_sentence
 from hovi.errors import SceneError
+from hovi.multipliers import Residuals
 from hovi.trajectory_objective import ActionObjective
 
 ACROBOT, CART_POLE, PENDUBOT = "acrobot_swing_up", "cart_pole_swing_up", "pendubot_swing_up"
@@ -144,3 +146,11 @@ def test_passive_joints_are_checked_at_the_door(models) -> None:
     scene = hovi.Scene(robot, passive=["hinge"])
     assert "no torque at hinge" in scene.describe()
     assert hovi.Scene.from_dict(scene.to_dict()).passive == ("hinge",)
+
+
+def test_a_torque_that_is_nearly_none_is_told_where_nothing_else_is_asked() -> None:
+    solution = swing_up("acrobot_swing_up", 12, 0)
+    assert solution.problem is not None
+    left = Residuals([np.full((3, 1), 1e-5)], [], 1.0)
+    sentence = unmet_sentence(solution.problem, solution.trajectory.path, left)
+    assert "takes 1e-05 of the largest torque" in sentence

@@ -191,7 +191,7 @@ def _elsewhere(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
     """Which equation fails most."""
-    if residuals.torque_share > CLOSE:
+    if residuals.torque_share > CLOSE or not problem.conditions:
         joints = ", ".join(repr(joint) for joint in problem.scene.passive)
         return (
             f"no motion was found on which joint {joints} carries no torque: it still takes "

@@ -157,7 +157,7 @@ KINDS: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "box":
 def obstacle_from_dict(data: Mapping[str, Any]) -> Obstacle:
     """The obstacle that `to_dict` wrote, or that a file describes. Raises InputError."""
     kind = data.get("kind")
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(f"there is no obstacle of kind {kind!r}: {nearest(str(kind), KINDS)}")
     known = {each.name: each.default is MISSING for each in fields(KINDS[kind])}
     given = {key: value for key, value in data.items() if key != "kind"}

@@ -134,7 +134,7 @@ def _number(robot: Element, random: Random) -> None:
 
 
 def _component(robot: Element, random: Random) -> None:
-    vectors = [(e, k) for e in robot.iter() for k in ("xyz", "rpy", "size") if e.get(k)]
+    vectors = [(e, k) for e in robot.iter() for k in ("xyz", "rpy", "size") if e.get(k, "").split()]
     element, key = random.choice(vectors)
     words = element.get(key, "").split()
     words[random.randrange(len(words))] = random.choice(STRANGE_NUMBERS)
