@@ -16,6 +16,7 @@ from hovi.effects import Armature, Effect, Gravity
 from hovi.errors import InputError
 from hovi.grid import Grid
 from hovi.guess import cubic, path_on_grid, with_turns
+from hovi.planner import plan
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot, load_robot
 from hovi.scene import Scene
@@ -87,6 +88,39 @@ def test_a_guess_keeps_several_turns_within_one_interval() -> None:
     grid, ends = Grid.uniform(1.0, 1, galerkin(2)), (q, np.zeros(6), q, np.zeros(6))
     path = path_on_grid(curve, grid, ends, robot)
     np.testing.assert_allclose(path.z[0, 0], 8 * np.pi * (turns > 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("turns", [1, 5, 20, 60])
+def test_a_body_spins_as_often_as_it_is_asked_to(turns: int) -> None:
+    """About a principal axis, in the least effort: theta is a cubic, the cost 6 (I theta)^2/T^3."""
+    robot, T = rigid_body((0.7, 1.1, 1.6)), 2.0
+    q = robot.neutral()
+    goal = State(q, turns={"turn": [0, -turns, 0]})
+    solution = plan(Scene(robot), q, goal, T, intervals=6, limits="none")
+    assert solution.success
+    angle = 2 * np.pi * turns
+    assert solution.cost == pytest.approx(6 * (1.1 * angle) ** 2 / T**3, rel=1e-9)
+    assert solution.problem is not None
+    assert solution.problem.ld.turns(solution.trajectory.path).max() < np.pi
+    half = solution.trajectory.sample(np.array([T / 2])).v[0]
+    np.testing.assert_allclose(half, [0.0, -1.5 * angle / T, 0.0], atol=1e-9 * angle)
+
+
+@pytest.mark.parametrize("base", ["free-flyer", "spherical", "planar"])
+def test_v_and_a_of_a_guess_of_many_turns_are_those_of_its_q(base: str) -> None:
+    robot = load_robot(with_arm(base))
+    q0, q1 = configurations(robot, 2, 3)
+    random = np.random.default_rng(8)
+    v0, v1 = random.normal(size=(2, robot.nv))
+    axis = {"free-flyer": slice(3, 6), "spherical": slice(0, 3), "planar": slice(2, 3)}[base]
+    turns = np.zeros(robot.nv)
+    turns[axis] = [20.0] if base == "planar" else [4.0, -8.0, 19.0]  # of length 21
+    curve = with_turns(cubic(robot, (q0, v0, q1, v1), 1.0), robot, 1.0, turns)
+    h, t = 1e-5, np.linspace(0.05, 0.95, 40)
+    (qm, vm, _), (_, v, a), (qp, vp, _) = curve(t - h), curve(t), curve(t + h)
+    # the error of central differences: h^2 |w|^3 / 6 and less, with |w| up to 200 rad/s
+    np.testing.assert_allclose(robot.difference(qm, qp) / (2 * h), v, atol=1e-3)
+    np.testing.assert_allclose((vp - vm) / (2 * h), a, rtol=1e-6, atol=1e-1)
 
 
 def test_turns_that_are_none_are_refused() -> None:

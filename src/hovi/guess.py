@@ -127,9 +127,24 @@ def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curv
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        return robot.chart.carried(base(t), x * angle, dx * angle, ddx * angle)
+        return robot.chart.carried(base(t), _wound(robot, x * angle), dx * angle, ddx * angle)
 
     return curve
+
+
+def _wound(robot: Robot, x: Array) -> Array:
+    """Rotation vectors (M, nv) less those full turns, two at a time, after which exp repeats.
+
+    A chart's rates are exact up to 2 pi, and a quaternion returns to itself after 4 pi only. About
+    an axis that stays J(x) x' = x', so that the rates of x are those of what is left of it.
+    """
+    left = x.copy()
+    for factor in robot.space.curved:
+        axes = [factor.v.start + i for i in factor.group.angular]
+        size = np.linalg.norm(x[:, axes], axis=1, keepdims=True)
+        full = 4 * np.pi * np.round(size / (4 * np.pi))
+        left[:, axes] *= 1 - full / np.where(size > 0, size, 1.0)
+    return left
 
 
 NAMED: dict[str, Callable[[Robot, Boundary, float], Curve]] = {

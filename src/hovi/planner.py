@@ -193,7 +193,7 @@ class _Search:
         self, guess: str | Trajectory, starts: int, seed: int
     ) -> tuple[Solution, tuple[float, ...]]:
         """The best solution, and the costs of all minima on the grid that was asked for."""
-        job = self._coarse()
+        job = self._coarse(guess)
         pool = Pool(job, self.processes, self._explore_until(job))
         first = guess_path(job.problem(), guess)
         search = explore(pool, first, starts, seed, self.progress)
@@ -250,7 +250,7 @@ class _Search:
         now = time.monotonic()
         return now + EXPLORING * (self.deadline - now)
 
-    def _coarse(self) -> Job:
+    def _coarse(self, guess: str | Trajectory) -> Job:
         grid = self.fine.grid
         if grid.intervals <= 2 * COARSE_INTERVALS:
             return self.fine
@@ -260,7 +260,8 @@ class _Search:
                 coarse = coarse.with_nodes([each.time for each in self.fine.via])
             except InputError:  # too few nodes for the via points
                 return self.fine
-        return dataclasses.replace(self.fine, grid=coarse)
+        job = _with_room(dataclasses.replace(self.fine, grid=coarse), guess)
+        return job if job.grid.intervals < grid.intervals else self.fine
 
     def _refine(self, found: list[Solution]) -> list[Solution]:
         problem = self.fine.problem()
