@@ -52,6 +52,7 @@ FLOORS = [
         "model_files",
         "meshcat_server",
         "figure_file",
+        "aligned_axes",
     },
     {
         "interval_batch",

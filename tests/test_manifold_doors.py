@@ -100,8 +100,21 @@ def test_angles_are_shown_without_jumps(kinova: Robot, free_motion: Solution) ->
     turn[:, 3:6] = angle[:, None] * np.array([0.6, 0.0, 0.8])
     shown = unwrapped(robot.space, robot.integrate(robot.neutral(), turn))
     np.testing.assert_allclose(shown[:, 3:6], turn[:, 3:6], atol=1e-9)
-    figure = motion_figure(free_motion.trajectory)
-    assert len(figure.axes[0].lines) > 0
+
+
+def test_pictures_of_a_base_name_what_they_draw(free_motion: Solution) -> None:
+    trajectory = free_motion.trajectory
+    figure = motion_figure(trajectory)
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    base = [f"j0[{part}] (right)" for part in "xyz"] + [f"j0[r{part}]" for part in "xyz"]
+    arm = zip(trajectory.coordinate_names[6:], texts[6:], strict=True)
+    assert texts[:6] == base
+    assert all(text in (name, f"{name} (right)") for name, text in arm)
+    for ax in figure.axes[:3]:
+        (twin,) = (a for a in figure.axes if a is not ax and a.bbox.bounds == ax.bbox.bounds)
+        (low, high), (least, most) = ax.get_ylim(), twin.get_ylim()
+        assert low / (high - low) == pytest.approx(least / (most - least), abs=1e-12)
+    assert peaks(trajectory).shown[:4] == ("j0[x]", "j0[y]", "j0[z]", "j0[rx]")
 
 
 def test_a_certificate_stands_on_every_leg(free_motion: Solution) -> None:

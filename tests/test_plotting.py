@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
 from cubic_motion import cubic_motion
 from hovi import plotting
+from hovi.aligned_axes import align_zeros
 from hovi.effects import Gravity
 from hovi.errors import DisplayError
 from hovi.grid import DiscretePath
@@ -153,7 +155,38 @@ def test_sliding_joints_get_an_axis_in_meters() -> None:
     figure = plotting.motion_figure(cubic_motion(Scene(robot))[0])
     labels = {ax.get_ylabel() for ax in figure.axes}
     assert labels >= {"angle [deg]", "position [m]", "force [N]", "torque [N m]"}
-    assert len(figure.legends[0].get_texts()) == 9
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    fingers = [f"{name} (right)" for name in robot.joint_names[7:]]
+    assert texts == [*robot.joint_names[:7], *fingers]
+
+
+def zero_height(ax: Axes) -> float:
+    low, high = ax.get_ylim()
+    return -low / (high - low)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [((0, 3), (-1, 1)), ((-4, 1), (-1, 4)), ((1, 3), (-2, -1)), ((-1, 2), (0, 9))]
+)
+def test_zeros_of_two_axes_are_aligned(one: tuple[int, int], other: tuple[int, int]) -> None:
+    left = Figure().subplots()
+    right = left.twinx()
+    for ax, limits in ((left, one), (right, other)):
+        ax.set_ylim(*limits)
+    align_zeros(left, right)
+    assert zero_height(left) == pytest.approx(zero_height(right), abs=1e-12)
+    for ax, (low, high) in ((left, one), (right, other)):
+        assert ax.get_ylim()[0] <= low
+        assert ax.get_ylim()[1] >= high
+
+
+def test_a_range_far_from_zero_is_not_squashed() -> None:
+    left = Figure().subplots()
+    right = left.twinx()
+    left.set_ylim(-1, 2)
+    right.set_ylim(100, 101)
+    align_zeros(left, right)
+    assert (left.get_ylim(), right.get_ylim()) == ((-1, 2), (100, 101))
 
 
 def test_sections_of_the_surface_are_the_links(motion: Trajectory, two_link: Robot) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from hovi.aligned_axes import align_zeros
 from hovi.distance_panel import draw_distances, kept_distances
 from hovi.errors import DisplayError, expect
 from hovi.figure_file import write_figure
@@ -33,7 +34,7 @@ from hovi.robot import Robot
 from hovi.robot_model import frame_id
 from hovi.saturation import at_limit, imposed_limits
 from hovi.trajectory import Sample, Trajectory
-from hovi.unwrapped import unwrapped
+from hovi.unwrapped import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -46,6 +47,7 @@ _MOST_MARKS = 150
 _SURFACE_TIMES = 180
 _SECTIONS = 25
 _STRIPS = 20
+_RIGHT = " (right)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     if kept is not None:
         draw_distances(axes[3], trajectory, *kept)
     axes[-1].set_xlabel("time [s]")
-    _legend(figure, axes[0])
+    _legend(figure, axes[0], _names(trajectory))
     return figure
 
 
@@ -124,7 +126,7 @@ def angles_figure(trajectory: Trajectory) -> Figure:
     ax = figure.subplots()
     _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory, curve.motion.q))
     ax.set_xlabel("time [s]")
-    _legend(figure, ax)
+    _legend(figure, ax, _names(trajectory))
     return figure
 
 
@@ -205,6 +207,12 @@ def _coordinates(trajectory: Trajectory, q: Array) -> Array:
     return unwrapped(trajectory.space, q.reshape(-1, q.shape[-1])).reshape(*q.shape[:2], -1)
 
 
+def _names(trajectory: Trajectory) -> tuple[str, ...]:
+    """What the numbers of `_coordinates` are called."""
+    names = trajectory.coordinate_names
+    return names if trajectory.space is None else shown_names(trajectory.space, names)
+
+
 def _chain(robot: Robot, q: Array) -> Array:
     """Origins of the joints that carry the tip, and the tip, shape (links + 1, M, 3), in [m]."""
     model = robot.model
@@ -246,8 +254,10 @@ def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion
             _dress(side, label)
             if side is not ax:
                 side.grid(False)
-    if panel is _EFFORT and side is not ax:
-        _share_scale(trajectory, (ax, angular), (side, ~angular))
+    if side is not ax:
+        if panel is _EFFORT:
+            _share_scale(trajectory, (ax, angular), (side, ~angular))
+        align_zeros(ax, side)
 
 
 def _share_scale(trajectory: Trajectory, one: tuple[Axes, Mask], other: tuple[Axes, Mask]) -> None:
@@ -274,18 +284,20 @@ def _lines(
     gap = np.full((len(t), 1), np.nan)
     broken = np.hstack([t, gap]).ravel()
     limited: list[Curve] = []
+    names, side = _names(trajectory), _RIGHT if ax.yaxis.get_ticks_position() == "right" else ""
     for i in members:
         color, style = looks[i % len(looks)]
-        name = trajectory.coordinate_names[i]
         line = np.hstack([y[:, :, i], gap]).ravel()
-        ax.plot(broken, line, style, color=color, linewidth=1.4, label=name)
+        ax.plot(broken, line, style, color=color, linewidth=1.4, label=names[i] + side)
         if len(t) <= _MOST_MARKS:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)
         if curve.limits is not None:
             lower, upper = curve.limits.lower[kind, i], curve.limits.upper[kind, i]
             active = np.hstack([curve.active[:, :, kind, i], np.isinf(gap)]).ravel()
-            limited.append(Curve(name, color, broken, line, scale * lower, scale * upper, active))
+            limited.append(
+                Curve(names[i], color, broken, line, scale * lower, scale * upper, active)
+            )
     if limited:
         draw_limits(ax, limited)
     ax.set_xlim(0.0, trajectory.duration)
@@ -297,13 +309,18 @@ def _dress(ax: Axes, label: str) -> None:
     ax.spines["top"].set_visible(False)
 
 
-def _legend(figure: Figure, ax: Axes) -> None:
-    """One legend above the figure, for the lines of all axes that share the first panel."""
-    shared: Iterable[Axes] = [a for a in figure.axes if a.bbox.bounds == ax.bbox.bounds]
+def _legend(figure: Figure, ax: Axes, names: Sequence[str]) -> None:
+    """One legend above the figure, for the lines of all axes that share the first panel.
+
+    names: of the coordinates, in the order in which the legend has them.
+    """
+    shared = [a for a in figure.axes if a.bbox.bounds == ax.bbox.bounds]
     pairs = [pair for a in shared for pair in zip(*a.get_legend_handles_labels(), strict=True)]
+    place = {label: i for i, name in enumerate(names) for label in (name, name + _RIGHT)}
+    pairs.sort(key=lambda pair: place[pair[1]])
     pairs += legend_entries(figure.axes)
     handles, labels = zip(*pairs, strict=True)
-    columns = min(len(labels), 4)
+    columns = -(-len(labels) // -(-len(labels) // 4))  # at most 4, in rows as full as can be
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
 
 

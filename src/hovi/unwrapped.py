@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,6 +13,7 @@ from hovi.lie_groups import SE2, SE3, SO2, SO3
 Array = npt.NDArray[np.float64]
 
 _NOTHING = 1e-9
+_PARTS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
@@ -34,6 +37,18 @@ def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
         else:
             shown[:] = _rotation_vector(part)
     return numbers
+
+
+def shown_names(space: ConfigurationSpace, coordinates: Sequence[str]) -> tuple[str, ...]:
+    """What to call the numbers of `unwrapped`, (nv,), from the names of the coordinates, (nv,).
+
+    A base's are base[x] to base[z], and base[rx] to base[rz] of its rotation vector.
+    """
+    shown = list(coordinates)
+    for factor in space.curved:
+        joint = shown[factor.v.start].removesuffix("[0]")
+        shown[factor.v] = [f"{joint}[{_PARTS[place]}]" for place in factor.group.places]
+    return tuple(shown)
 
 
 def _angle(pair: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.trajectory import Trajectory
-from hovi.unwrapped import unwrapped
+from hovi.unwrapped import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +20,7 @@ MOST_SAMPLES = 20_000
 class Peaks:
     """Extremes over time, one per velocity coordinate.
 
-    names: of the coordinates.
+    names: of the coordinates. shown: what people are told of them, see `shown_names`.
     q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as
         `unwrapped` gives them.
     v, a, tau: largest |v|, |a| and |tau|.
@@ -28,6 +28,7 @@ class Peaks:
     """
 
     names: tuple[str, ...]
+    shown: tuple[str, ...]
     q_low: Array
     q_high: Array
     v: Array
@@ -65,7 +66,9 @@ def peaks(trajectory: Trajectory) -> Peaks:
         v_limit, tau_limit = _known(robot.velocity_limit), _known(robot.effort_limit)
     v, a, tau = (np.abs(x).max(axis=0) for x in (motion.v, motion.a, motion.tau))
     names = trajectory.coordinate_names
-    return Peaks(names, q.min(axis=0), q.max(axis=0), v, a, tau, lower, upper, v_limit, tau_limit)
+    shown = names if space is None else shown_names(space, names)
+    low, high = q.min(axis=0), q.max(axis=0)
+    return Peaks(names, shown, low, high, v, a, tau, lower, upper, v_limit, tau_limit)
 
 
 def _stated(limit: Array) -> Array:

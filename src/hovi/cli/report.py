@@ -135,7 +135,7 @@ def _room_table(extremes: Peaks, room: Closeness) -> Table:
     for kind in shown:
         table.add_column(kind if kind == "q" else f"|{kind}|", justify="right")
         table.add_column("room", justify="right")
-    for i, name in enumerate(extremes.names):
+    for i, name in enumerate(extremes.shown):
         cells = [(values[kind][i], room.in_words(kind, i)) for kind in shown]
         table.add_row(name, *(cell for pair in cells for cell in pair))
     return table
@@ -154,7 +154,7 @@ def _peaks_table(extremes: Peaks) -> Table:
     beyond = {
         key: ["!" if each else "" for each in flags] for key, flags in extremes.beyond().items()
     }
-    for i, name in enumerate(extremes.names):
+    for i, name in enumerate(extremes.shown):
         table.add_row(
             name,
             beyond["q"][i] + _range(extremes.q_low[i], extremes.q_high[i]),
