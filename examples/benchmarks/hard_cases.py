@@ -35,6 +35,14 @@ def families() -> dict[str, list[Any]]:
     return dict(sorted(found.items(), key=lambda item: _place(item[1][0].number)))
 
 
+def require_tests() -> None:
+    """End with a sentence where what the tests need is not installed."""
+    try:
+        families()
+    except ModuleNotFoundError as missing:
+        sys.exit(f"The cases are tests, which need {missing.name}: pip install '.[dev]' brings it.")
+
+
 def _place(number: str) -> int:
     return int("".join(c for c in number if c.isdigit()))
 
@@ -94,6 +102,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", metavar="NUMBER", help="these cases")
     parser.add_argument("--table", type=Path, metavar="FILE", help="where rows are kept")
     given = parser.parse_args()
+    require_tests()
     good, rows = True, rows_of(given.table)
     with threadpool_limits(1):
         for case in itertools.chain(*families().values()):
