@@ -133,6 +133,9 @@ def test_turns_that_are_none_are_refused() -> None:
     ):
         with pytest.raises(InputError, match=words):
             State(who.neutral(), turns=bad).turns_on(who, "goal")
+    for no_joints in ([1], 1, None):
+        with pytest.raises(InputError, match="turns are given by joint, such as"):
+            State(robot.neutral(), turns=no_joints)  # type: ignore[arg-type]
     np.testing.assert_array_equal(
         State(free.neutral(), turns={"j0": [0, 1, 0]}).turns_on(free, "goal"), np.eye(9)[4]
     )

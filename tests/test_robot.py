@@ -350,6 +350,28 @@ def test_a_quaternion_or_angle_without_unit_norm_is_refused() -> None:
         assert robot.check_configuration(nearly, "goal") == pytest.approx(q, abs=1e-15)
 
 
+@pytest.mark.parametrize("shape", [(), (2,), (1, 3), (1, 1, 2)])
+def test_places_are_those_of_rows_of_configurations(
+    two_link: Robot, shape: tuple[int, ...]
+) -> None:
+    with pytest.raises(InputError, match=re.escape(f"rows of shape (M, 2), got shape {shape}")):
+        two_link.frame_position("tip", np.zeros(shape))
+
+
+@pytest.mark.parametrize("key", ["mimic", "free_flyer"])
+def test_a_switch_is_true_or_false(key: str) -> None:
+    with pytest.raises(InputError, match=f"got a str; give {key}=True or {key}=False"):
+        load_robot("panda", **{key: "yes"})  # type: ignore[arg-type]
+
+
+def test_a_single_joint_to_lock_may_come_without_brackets() -> None:
+    assert load_robot("ur5", locked="elbow_joint").nv == 5
+
+
+def test_a_robot_prints_its_name_and_sizes(two_link: Robot) -> None:
+    assert repr(two_link) == "<Robot 'two_link': nq = 2, nv = 2>"
+
+
 def test_an_unknown_frame_is_answered_with_the_nearest_names(two_link: Robot) -> None:
     with pytest.raises(InputError, match=r"no frame 'tipp'.*'tip'"):
         two_link.frame_position("tipp", np.zeros((1, 2)))

@@ -179,3 +179,8 @@ def test_the_command_speaks(scene_file: Path, capsys: pytest.CaptureFixture[str]
     assert main(["simulate", str(scene_file), "--duration", "-1"]) == 2
     assert "--duration must be" in capsys.readouterr().err
     assert main(["simulate", str(scene_file), "--out", "x.txt"]) == 2
+
+
+def test_a_simulation_prints_its_robot_time_and_grid(two_link: Robot) -> None:
+    motion = simulate(Scene(two_link, [Gravity()]), np.zeros(2), 0.5, intervals=20)
+    assert repr(motion) == "<Simulation of 'two_link': 0.5 s in 20 intervals, order 4>"

@@ -30,7 +30,16 @@ def difference(model: pin.Model, q0: Array, q1: Array) -> Array:
 
 
 def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
-    """Origin of a frame in the world, in [m]: q (M, nq) -> (M, 3)."""
+    """Origin of a frame in the world, in [m]: q (M, nq) -> (M, 3).
+
+    Raises InputError for another shape.
+    """
+    if np.shape(q)[1:] != (model.nq,):
+        raise InputError(
+            f"configurations are rows of shape (M, {model.nq}), got shape {np.shape(q)}: a single "
+            "one is q[None]."
+        )
+    q = np.asarray(q, dtype=float)
     data = model.createData()
     positions = np.empty((len(q), 3))
     for position, one in zip(positions, q, strict=True):

@@ -22,10 +22,10 @@ from hovi import configuration, robot_model
 from hovi.chart import Chart
 from hovi.configuration_space import ConfigurationSpace, configuration_space
 from hovi.coupled_model import Coupling, PortableModel, couplings_of
-from hovi.errors import InputError, ModelError, nearest
+from hovi.errors import InputError, ModelError, expect, nearest
 from hovi.example_robots import BUILT_IN_CODE, build_in_code
 from hovi.robot_geometry import Shapes, load_shapes
-from hovi.robot_reading import example_source, file_source, is_path
+from hovi.robot_reading import as_names, example_source, file_source, is_path
 from hovi.robot_report import describe
 from hovi.robot_source import RobotSource
 from hovi.srdf import Srdf, parse_srdf, read_srdf_file
@@ -50,6 +50,10 @@ class Robot:
     model: pin.Model
     source: RobotSource
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None] = (None, None)
+
+    def __repr__(self) -> str:
+        """A name and sizes, for a terminal; `describe` says more."""
+        return f"<Robot {self.name!r}: nq = {self.nq}, nv = {self.nv}>"
 
     # Sizes and names
 
@@ -260,7 +264,7 @@ class Robot:
                 f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
             )
         index = robot_model.frame_id(self.model, frame)
-        return configuration.frame_position(self.model, index, np.asarray(q, dtype=float))
+        return configuration.frame_position(self.model, index, q)
 
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.
@@ -345,15 +349,18 @@ def load_robot(
         pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
     package_dirs: folders in which `package://` meshes are looked up.
     free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
-    locked: joints held at the neutral configuration.
+    locked: joints held at the neutral configuration; a single name may come without brackets.
     visual, collision: geometry that goes with a pinocchio.Model.
     srdf: path of an SRDF with named poses; an example robot's own is found without it.
     mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
         take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
-    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock.
+    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock;
+    InputError for a mimic or free_flyer that is neither True nor False.
     """
-    names = _names(locked)
-    folders = tuple(str(Path(folder).absolute()) for folder in _names(package_dirs))
+    expect(mimic, bool, "mimic=True or mimic=False")
+    expect(free_flyer or False, bool, "free_flyer=True or free_flyer=False")
+    names = as_names(locked)
+    folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
     semantics = None if srdf is None else Path(srdf)
     if isinstance(x, pin.Model):
         return _from_model(x, x.name, names, (visual, collision), semantics)
@@ -368,11 +375,6 @@ def load_robot(
         source = example_source(x, folders, names, free_flyer, semantics, mimic)
     model = robot_model.build_model(source)
     return Robot(source.reference if source.kind == "example" else model.name, model, source)
-
-
-def _names(values: Iterable[Any]) -> tuple[Any, ...]:
-    """Names as a tuple; a single one may come without brackets."""
-    return (values,) if isinstance(values, str | Path) else tuple(values)
 
 
 def _from_model(

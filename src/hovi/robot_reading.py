@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from hovi.example_robots import example_robot, rotor_armature
 from hovi.robot_model import build_full_model
@@ -15,6 +17,11 @@ from hovi.urdf_check import read_urdf
 def is_path(text: str) -> bool:
     """Whether a text means a file and not the name of an example."""
     return text.lower().endswith((".urdf", ".xml", ".xacro")) or "/" in text or "\\" in text
+
+
+def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
+    """Names as a tuple; a single one may come without brackets."""
+    return (values,) if isinstance(values, str | Path) else tuple(values)
 
 
 def file_source(

@@ -47,6 +47,11 @@ class Simulation:
     lagrangian: CasadiLagrangian
     flow: Flow
 
+    def __repr__(self) -> str:
+        """A robot, a time and a grid, for a terminal."""
+        name, N = self.scene.robot.name, len(self.t) - 1
+        return f"<Simulation of {name!r}: {self.t[-1]:g} s in {N} intervals, order {self.order}>"
+
     @property
     def t(self) -> Array:
         """Times of the nodes, shape (N + 1,), in [s]."""

@@ -30,6 +30,7 @@ class State:
     turns: of a goal, full turns that the first guess makes on top of the shortest way, by joint: a
         whole number where one coordinate turns, a rotation vector in the body's axes whose length
         is a whole number for orientations.
+    Raises InputError for turns that are not given by joint.
     """
 
     q: npt.ArrayLike
@@ -42,6 +43,11 @@ class State:
         for key in ("free", "free_velocity"):
             if isinstance(getattr(self, key), str):
                 object.__setattr__(self, key, (getattr(self, key),))
+        if not isinstance(self.turns, Mapping):
+            raise InputError(
+                "turns are given by joint, such as {'wrist': 1} or {'root_joint': [0, 0, 1]}, not "
+                f"{self.turns!r}."
+            )
 
     def on(self, robot: Robot, name: str) -> tuple[Array, Array]:
         """q and v as arrays that fit the robot.
