@@ -17,6 +17,7 @@ FLOORS = [
         "blas_threads",
         "bounded_file",
         "errors",
+        "interruption",
         "newton",
         "conditions",
         "budget",

@@ -15,6 +15,8 @@ IMPORTING = "<frozen importlib"
 """What the file names of Python's own frames begin with while a module is imported."""
 EXTENSION = "hovi.rigid_body._core"
 """What counts its objects at the end; those of a program that was interrupted are no leaks."""
+MEMORY = "hovi.interruption"
+"""What remembers an interrupt that comes where Python drops exceptions, as in a destructor."""
 PATIENCE = 0.05
 """Seconds after which Ctrl-C is heard again that came while a run imported what it needs."""
 
@@ -52,6 +54,9 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
         extension.ignore_leaks()
     asking = _asks_for_imports(frame)
     if asking is None:
+        memory = sys.modules.get(MEMORY)
+        if memory is not None:
+            memory.remember()
         raise KeyboardInterrupt
     if not any(map(_of_a_run, _outward(asking))):
         os._exit(_flushed(INTERRUPTED))  # nothing is there to finish

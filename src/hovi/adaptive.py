@@ -14,6 +14,7 @@ from hovi.carried_efforts import carried_efforts
 from hovi.error_estimate import estimate_against
 from hovi.finer_solution import FinerSolution
 from hovi.grid import DiscretePath, Grid
+from hovi.interruption import go_on, interrupted, interruptible, remember
 from hovi.known_error import Candidate, least_error
 from hovi.nearby_minimum import nearby_minimum
 from hovi.next_grid import moved_to, next_grid
@@ -23,6 +24,7 @@ from hovi.solver import Solution, solve
 from hovi.tolerance import Accuracy, Quantity, Round, Tolerance
 from hovi.trajectory import Trajectory
 from hovi.trajectory_objective import ActionObjective
+from hovi.verdict import Status
 
 Told = Callable[[Round], None]
 """What is told how far a search is."""
@@ -52,6 +54,7 @@ def first_grid(duration: float, intervals: int, smooth: bool = True) -> Grid:
     return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4))
 
 
+@interruptible
 def solve_to_tolerance(
     problem: TrajectoryProblem,
     tolerance: Tolerance,
@@ -75,6 +78,7 @@ def solve_to_tolerance(
     )
 
 
+@interruptible
 def refine_to_tolerance(
     solution: Solution,
     tolerance: Tolerance,
@@ -105,6 +109,7 @@ class _Search:
         try:
             reason = self._refine(solution)
         except KeyboardInterrupt:
+            remember()
             reason = "it was interrupted"
         return self._finished(self.best, reason)
 
@@ -128,6 +133,7 @@ class _Search:
 
     def _judged(self, solution: Solution) -> Candidate:
         """A solution with what is known of its error, as a round of its own."""
+        go_on()
         began = time.perf_counter()
         candidate = Candidate.of(solution, self.tolerance)
         grid = solution.trajectory.grid
@@ -142,6 +148,7 @@ class _Search:
 
     def _ended(self, candidate: Candidate, stalled: int) -> str:
         """Why no finer grid is tried, or ""."""
+        go_on()
         solution = candidate.solution
         if not solution.success:
             return f"the last solve ended in {solution.status}"
@@ -190,7 +197,7 @@ class _Search:
         if chosen.contradicted > 0:
             finer = None
             reason = f"{reason}, and the minimum moves when the grid becomes finer"
-        reached = chosen.error <= self.tolerance.size
+        reached = bool(chosen.error <= self.tolerance.size)
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,
@@ -205,6 +212,8 @@ class _Search:
             message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"
             message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
         told = {**solution.trajectory.metadata, "error_estimate": known}
+        if interrupted() and not reached:
+            solution = dataclasses.replace(solution, success=False, status=Status.INTERRUPTED)
         return dataclasses.replace(
             solution,
             trajectory=dataclasses.replace(solution.trajectory, metadata=told),

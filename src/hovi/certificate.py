@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hovi.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.error_estimate import estimate_error
 from hovi.errors import InputError, expect
+from hovi.interruption import interruptible
 from hovi.motion_error import MotionError, relative_difference
 from hovi.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
 from hovi.problem import TrajectoryProblem
@@ -74,6 +75,7 @@ class Certificate:
         return relative_difference(self.action, self.integral)
 
 
+@interruptible
 def certify(solution: Solution, frame: str | None = None, *, estimate: bool = True) -> Certificate:
     """What can be said for a solution.
 

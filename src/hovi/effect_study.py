@@ -13,6 +13,7 @@ import numpy.typing as npt
 from hovi.effect_candidates import effect_candidates
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
+from hovi.interruption import go_on, interruptible
 from hovi.scene import Scene
 from hovi.scene_account import seconds_per_point
 from hovi.solver import Solution
@@ -83,6 +84,7 @@ class EffectStudy:
         return trial.cost / self.solution.cost - 1.0 if self.solution.cost else np.inf
 
 
+@interruptible
 def study_effects(
     task: Task, candidates: Iterable[Effect] | None = None, progress: Progress | None = None
 ) -> EffectStudy:
@@ -146,7 +148,9 @@ def _trial(
 
 
 def _plan(task: Task, scene: Scene, guess: str | Trajectory, starts: int) -> Solution:
-    return plan_task(dataclasses.replace(task, scene=scene), starts=starts, guess=guess)
+    solution = plan_task(dataclasses.replace(task, scene=scene), starts=starts, guess=guess)
+    go_on()  # with the other plans, unless a person ended this one
+    return solution
 
 
 def _torque_change(scene: Scene, own: Trajectory) -> float:

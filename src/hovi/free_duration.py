@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hovi.errors import InputError
+from hovi.interruption import remember
 from hovi.solver import Solution
 from hovi.trajectory import Trajectory
 from hovi.verdict import Status
@@ -134,6 +135,7 @@ class _Search:
             except _FailedError as failed:
                 return self.unfinished(failed.solution)
             except KeyboardInterrupt:  # between two solves, each of which hears its own
+                remember()
                 self.ending = "The search for a better one was interrupted; the last duration is"
                 return dataclasses.replace(self.best, success=False, status=Status.INTERRUPTED)
             T, slope = further, next_slope

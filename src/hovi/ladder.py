@@ -16,6 +16,7 @@ from hovi.continuation import (
     other_durations,
 )
 from hovi.errors import HoviError
+from hovi.interruption import remember
 from hovi.multistart import Job, Progress
 from hovi.solver import Solution, solve
 from hovi.trajectory import Trajectory
@@ -77,6 +78,7 @@ def climb(
         try:
             found = ladder.go_on(best) if name == STEPS else ladder.climb(WAYS[name](job))
         except KeyboardInterrupt:
+            remember()
             found, ladder.ended = None, Status.INTERRUPTED
         if ladder.rungs > 0:
             tried.append(name)

@@ -16,6 +16,7 @@ from hovi.contradictions import contradiction, static_sentence
 from hovi.equality_rounds import first_multipliers, satisfy
 from hovi.grid import DiscretePath
 from hovi.guess import stretched, with_bump
+from hovi.interruption import remember
 from hovi.limit_check import excess_along, worst_sentence
 from hovi.limited_action import LimitedAction
 from hovi.limited_outcome import LimitedOutcome
@@ -87,11 +88,11 @@ def solve_limited(
         return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason=reason)
     deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
     search = _Search(problem, limits, options, deadline, report, path)
-    outcome, reason = search.found(path)
-    reason = reason or search.unmet
-    if reason or not _usable(outcome):
-        return search.finished(outcome, reason, 0.0)
-    return search.tightened(outcome)
+    try:
+        return search.run(path)
+    except KeyboardInterrupt:  # between two solves, each of which hears its own
+        remember()
+        return search.interrupted()
 
 
 @dataclass(eq=False)
@@ -110,12 +111,27 @@ class _Search:
     unmet: str = ""
 
     def __post_init__(self) -> None:
+        self.last = self.problem, self.guess
         self.history: list[Iteration] = []
         distances = self.problem.distances
         self.kept_clear = None
         if distances is not None:
             self.kept_clear = ClearanceOutputs(distances, self._margin() + CUSHION * SCALE)
         self.margins = self._no_margins()
+
+    def run(self, path: DiscretePath) -> LimitedOutcome:
+        """All stages."""
+        outcome, reason = self.found(path)
+        reason = reason or self.unmet
+        if reason or not _usable(outcome):
+            return self.finished(outcome, reason, 0.0)
+        return self.tightened(outcome)
+
+    def interrupted(self) -> LimitedOutcome:
+        """Where the last solve ended, and nothing else."""
+        problem, path = self.last
+        value, steps = problem.ld.action(path), self.iterations
+        return LimitedOutcome(problem, path, value, Stop.INTERRUPTED, steps, self.history, -1)
 
     def _margin(self) -> float:
         """The distance that counts as held to the tolerance where it is kept exactly, in [m]."""
@@ -346,6 +362,7 @@ class _Search:
     def _count(self, outcome: BoundedOutcome[DiscretePath]) -> BoundedOutcome[DiscretePath]:
         self.iterations += outcome.iterations
         self.history += outcome.history
+        self.last = self.problem, outcome.x
         return outcome
 
     def _options(self) -> Options:

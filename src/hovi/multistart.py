@@ -27,6 +27,7 @@ from hovi.frame_goal import FrameGoal
 from hovi.goals import Via
 from hovi.grid import DiscretePath, Grid
 from hovi.guess import Curve, stretched, with_bump, with_turns
+from hovi.interruption import remember
 from hovi.limits import Limits
 from hovi.problem import TrajectoryProblem
 from hovi.robot import Robot
@@ -177,6 +178,7 @@ def explore(
     except KeyboardInterrupt:
         if not solutions:
             raise
+        remember()
         interrupted = True
     interrupted = interrupted or any(s.status is Status.INTERRUPTED for s in solutions)
     return Exploration(distinct(solutions), len(solutions), interrupted)

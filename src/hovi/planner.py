@@ -22,6 +22,7 @@ from hovi.free_to_tolerance import free_to_tolerance
 from hovi.goals import Via
 from hovi.grid import Grid
 from hovi.inactive_limits import far_from_limits, with_limits_again, without_limits
+from hovi.interruption import go_on, interrupted, interruptible, remember
 from hovi.ladder import climb, may_help
 from hovi.limits import Limits, as_limits
 from hovi.multistart import Job, Pool, Progress, default_processes, distinct, explore
@@ -48,6 +49,7 @@ EXPLORING = 0.7
 
 
 @one_blas_thread
+@interruptible
 def plan(
     scene: Scene,
     start: State | npt.ArrayLike | str,
@@ -197,27 +199,33 @@ class _Search:
         pool = Pool(job, self.processes, self._explore_until(job))
         first = guess_path(job.problem(), guess)
         search = explore(pool, first, starts, seed, self.progress)
-        found = self._climbed(job, search.minima, guess)
-        if search.interrupted:
-            if job is not self.fine or self.tolerance is not None or self.free is not None:
-                found = _interrupted(found[:1])
-        elif self.tolerance is not None and self.free is None:
-            found = self._refine_to(self.tolerance, found)
-        elif job is not self.fine:
-            found = self._climbed(self.fine, self._refine(found), guess)
-        if not search.interrupted:
+        found = search.minima
+        try:
+            found = self._climbed(job, found, guess)
+            if self.tolerance is not None and self.free is None:
+                go_on()
+                found = self._refine_to(self.tolerance, found)
+            elif job is not self.fine:
+                go_on()
+                found = self._climbed(self.fine, self._refine(found), guess)
             found = [self._in_charts(found[0]), *found[1:]]
-        if self.free is not None and not search.interrupted:
-            found = self._freed(self.free, found[:REFINED])
+            if self.free is not None:
+                go_on()
+                found = self._freed(self.free, found[:REFINED])
+        except KeyboardInterrupt:
+            remember()
+            found = _interrupted(found[:1])
         best = found[0]
         if search.done < starts:
             ended = f"{best.message} The search ended after {search.done} of {starts} starts."
             best = dataclasses.replace(best, message=ended)
+        elif interrupted() and best.success:
+            best = dataclasses.replace(best, message=f"{best.message} The search was interrupted.")
         return best, tuple(s.cost for s in found if s.success)
 
     def _climbed(self, job: Job, found: list[Solution], guess: str | Trajectory) -> list[Solution]:
         """What continuation leads to where there is no minimum among what was found."""
-        if not self.continuation or not may_help(found[0]):
+        if interrupted() or not self.continuation or not may_help(found[0]):
             return found
         return [climb(job, found[0], guess, self.deadline, self.progress)]
 
@@ -229,6 +237,8 @@ class _Search:
         if self.fine.scene.robot.space.flat:
             return best
         for _ in range(CHART_ROUNDS):
+            if interrupted():
+                break
             grid = best.trajectory.grid
             problem = dataclasses.replace(self.fine, grid=grid).problem()
             wide = problem.ld.turns(best.trajectory.path) > np.pi
@@ -274,7 +284,8 @@ class _Search:
         """Minima to a tolerance, each on a grid of its own."""
         problem, refined = self.fine.problem(), []
         for i, solution in enumerate(found[:REFINED]):
-            if i > 0 and self.deadline is not None and time.monotonic() > self.deadline:
+            late = self.deadline is not None and time.monotonic() > self.deadline
+            if i > 0 and (late or interrupted()):
                 break
             which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
             known = dataclasses.replace(solution, problem=_on_grid_of(problem, solution))
@@ -309,7 +320,7 @@ class _Search:
         freed: list[Solution] = []
         for i, solution in enumerate(found):
             late = self.deadline is not None and time.monotonic() > self.deadline
-            if freed and (late or freed[-1].status is Status.INTERRUPTED):
+            if freed and (late or interrupted()):
                 break
             which = f"{i + 1} of {len(found)} motions"
             self.progress(f"best duration of {which}", 0.9)

@@ -20,6 +20,7 @@ from hovi.errors import InputError
 from hovi.frame_goal import FrameGoal
 from hovi.grid import DiscretePath
 from hovi.guess import check_path, moved, named_curve, stretched, with_turns
+from hovi.interruption import interruptible, remember
 from hovi.interval_batch import Jet
 from hovi.lagrangian import PointTerms
 from hovi.limited_solver import solve_limited
@@ -131,6 +132,7 @@ def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> Sta
 
 
 @one_blas_thread
+@interruptible
 def solve(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath = "cubic",
@@ -163,7 +165,11 @@ def solve(
     )
     started = time.perf_counter()
     method = _with_limits if problem.limited else _without_limits
-    answer = method(problem, path, options, report)
+    try:
+        answer = method(problem, path, options, report)
+    except KeyboardInterrupt:  # outside of the iterations, which keep what they have
+        remember()
+        answer = _interrupted(problem, path)
     return _dressed(answer, started - began, time.perf_counter() - started)
 
 
@@ -228,6 +234,12 @@ def minimum_at(
     message = f"a minimum of cost {value:.10g} after {steps} steps."
     answer = _Answer(problem, path, value, Status.MINIMUM, message, steps, 0, [], None)
     return _dressed(answer, 0.0, seconds)
+
+
+def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> _Answer:
+    """The guess, where an interrupt left nothing else."""
+    value, message = problem.ld.action(path), "the solve was interrupted; the motion is its guess."
+    return _Answer(problem, path, value, Status.INTERRUPTED, message, 0, -1, [], None)
 
 
 def _without_limits(

@@ -212,6 +212,60 @@ def test_ctrl_c_ends_every_command_without_noise(
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
+BETWEEN_SOLVES: dict[str, Sequence[str]] = {
+    "rounds among obstacles": ("plan", "{scene}"),
+    "grids to a tolerance": (
+        *("plan", "two_link_elbow_limited", "--starts", "1", "--tolerance", "0.1 mm"),
+    ),
+}
+ROUND_THE_BALL = """
+robot = "ur5"
+duration = 2.0
+limits = "none"
+obstacles = [{ kind = "sphere", position = [0.45, 0.25, 0.30], radius = 0.1 }]
+
+[start]
+q = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
+
+[goal]
+frame = "tool0"
+position = [0.45, 0.25, 0.25]
+axis = { frame = [0, 0, 1], world = [0, 0, -1] }
+
+[[via]]
+time = 1.0
+frame = "tool0"
+position = [0.45, 0.25, 0.45]
+"""
+"""The goal lies within the ball, so that one solve after the other looks for a way."""
+
+
+@pytest.mark.parametrize("command", BETWEEN_SOLVES)
+def test_one_ctrl_c_ends_a_plan_of_many_solves(command: str, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(ROUND_THE_BALL)
+    words = [word.format(scene=scene) for word in BETWEEN_SOLVES[command]]
+    process = start(*words)
+    while _processor_seconds(process.pid) < 2.5:  # imports are over, however busy the machine is
+        assert process.poll() is None
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGINT)
+    try:
+        out, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert "Traceback" not in err
+    assert process.returncode == 1
+    assert out.startswith("status   interrupted\n")
+    assert "the best so far" in out or "stopped early: it was interrupted" in out
+
+
+def _processor_seconds(pid: int) -> float:
+    """What a process has taken so far of a processor."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def test_a_home_that_cannot_be_written_to_does_no_harm(motion: Path, tmp_path: Path) -> None:
     process = start(
         *("plot", motion, "--out", tmp_path / "picture.png"),

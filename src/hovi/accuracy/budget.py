@@ -6,6 +6,7 @@ import math
 import time
 
 from hovi.errors import InputError
+from hovi.interruption import go_on
 
 
 class Budget:
@@ -35,5 +36,9 @@ class Budget:
         return min(self.spent / self.seconds, 1.0)
 
     def allows(self, seconds: float, share: float = 1.0) -> bool:
-        """Whether work of such a length ends before `share` of it is spent."""
+        """Whether work of such a length ends before `share` of it is spent.
+
+        Raises KeyboardInterrupt where a person ended the work before it.
+        """
+        go_on()
         return self.spent + seconds <= share * self.seconds

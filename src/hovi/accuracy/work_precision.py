@@ -16,6 +16,7 @@ from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
 from hovi.errors import InputError, UnmeasurableError, nearest
 from hovi.guess import Curve
+from hovi.interruption import go_on, interruptible
 from hovi.limits import as_limits
 from hovi.planner import plan
 from hovi.problem import TrajectoryProblem
@@ -47,6 +48,7 @@ Peer = Callable[[Setting], Method]
 """What makes a method of somebody else for a setting. Raises UnmeasurableError if it cannot."""
 
 
+@interruptible
 def work_precision(
     task: Task,
     *,
@@ -96,6 +98,7 @@ def work_precision(
         seed=task.seed,
         time_limit=SEARCHING * budget,
     )
+    go_on()
     if not found.success or found.problem is None:
         raise UnmeasurableError(f"no motion of {task.name} to measure against: {found.message}")
     report("resolving the motion", time.fraction)

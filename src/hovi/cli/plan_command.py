@@ -151,4 +151,7 @@ def _certificate(solution: Solution) -> Certificate | None:
     problem = solution.problem
     if problem is None or not solution.success or problem.grid.intervals > MOST_CERTIFIED:
         return None
-    return certify(solution, estimate=not (problem.limited or problem.constrained))
+    try:
+        return certify(solution, estimate=not (problem.limited or problem.constrained))
+    except KeyboardInterrupt:  # the plan is told all the same
+        return None

@@ -23,6 +23,7 @@ from typing import Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.interruption import go_on, remember
 from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import (
@@ -159,6 +160,7 @@ def minimize_bounded(
     try:
         _Iteration(objective, outcome, options, density, report).run()
     except KeyboardInterrupt:
+        remember()
         outcome.stop = Stop.INTERRUPTED
     except ArithmeticError:
         outcome.stop = Stop.DIVERGED
@@ -188,10 +190,12 @@ class _Iteration(Generic[X]):
 
     def run(self) -> None:
         """Until stationary, or a budget ends it."""
+        go_on()
         started = time.monotonic()
         limit = self.options.time_limit
         model = self._model()
         while self.outcome.iterations < self.options.max_iterations:
+            go_on()
             if limit is not None and time.monotonic() - started > limit:
                 self.outcome.stop = Stop.TIME_LIMIT
                 return

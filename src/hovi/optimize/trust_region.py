@@ -18,6 +18,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.interruption import go_on, remember
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 
 Array = npt.NDArray[np.float64]
@@ -154,6 +155,7 @@ def minimize(
     try:
         _iterate(objective, outcome, options, report)
     except KeyboardInterrupt:
+        remember()
         outcome.stop = Stop.INTERRUPTED
     except ArithmeticError:
         outcome.stop = Stop.DIVERGED
@@ -166,10 +168,12 @@ def _iterate(
     options: Options,
     report: Callable[[int, float], None] | None,
 ) -> None:
+    go_on()
     started = time.monotonic()
     radius, shift = options.radius, 0.0
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
+        go_on()
         if options.time_limit is not None and time.monotonic() - started > options.time_limit:
             outcome.stop = Stop.TIME_LIMIT
             return
