@@ -120,11 +120,13 @@ def test_unreachable_goals_and_via_points_are_infeasible_with_the_reason() -> No
     for limits in ("none", "urdf"):
         solution = hovi.plan(task.scene, task.start, far, 2.0, limits=limits)
         assert solution.status is hovi.Status.INFEASIBLE
+        assert "that reaches the goal was found" in solution.message
         assert "frame 'tool0' misses it by" in solution.message
     via = hovi.Via(1.0, far)
     solution = hovi.plan(task.scene, task.start, task.goal, 2.0, via=[via], limits="none")
     assert solution.status is hovi.Status.INFEASIBLE
     assert not solution.success
+    assert "that reaches the via point at 1 s was found" in solution.message
 
 
 def test_planning_again_to_a_turned_goal_turns_the_hand() -> None:
@@ -211,3 +213,38 @@ def test_a_bad_via_point_is_named_by_its_number_and_line(tmp_path, models) -> No
             hovi.load_task(tmp_path / "scene.toml")
         assert f"line {line}: " in str(refused.value)
         assert sentence in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "place", "sentence"),
+    [
+        (
+            "[[via]]\ntime = 5.0\nq = [0,0,0,0,0,0]",
+            2,
+            "a via point at 5 s is not inside the motion",
+        ),
+        (
+            "[[via]]\ntme = 0.5\nq = [0,0,0,0,0,0]",
+            2,
+            "unknown key `via[0].tme`; did you mean 'time'",
+        ),
+        (
+            "[[via]]\ntime = 0.5\nframe = 'tool0'\naxis = {frame = [0, 0, 1], wrld = [0, 0, 1]}",
+            4,
+            "unknown key `via[0].axis.wrld`; did you mean 'world'?",
+        ),
+        (
+            "[[via]]\ntime = 0.5\nq = [0,0,0,0,0,0]\nv = [0, 0, 0, 0, 0]",
+            4,
+            "via[0].v has shape (5,), expected (6,)",
+        ),
+    ],
+)
+def test_a_slip_in_a_via_point_has_its_line_and_a_hint(
+    tmp_path, models, wrong: str, place: int, sentence: str
+) -> None:
+    head = (models / "ur5_reach.toml").read_text() + "\n"
+    (tmp_path / "scene.toml").write_text(head + wrong)
+    with pytest.raises(hovi.errors.SceneError) as refused:
+        hovi.load_task(tmp_path / "scene.toml")
+    assert f"line {len(head.splitlines()) + place}: {sentence}" in str(refused.value)

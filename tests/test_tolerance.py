@@ -87,3 +87,21 @@ def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
         "tool0 asked for."
     )
     assert "nothing was estimated" in str(Accuracy(wanted, np.nan, False, "no minimum was found"))
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (1e-6, "1e-06 of the cost"),
+        ("0.1 %", "0.1 % of the cost"),
+        ("0.01 deg", "0.01 deg in the joints"),
+        ("3 mrad", "3 mrad in the joints"),
+        ("0.1 m", "0.1 m at the tip"),
+        ("2 um at tool0", "2 um at tool0"),
+    ],
+)
+def test_errors_are_stated_in_the_unit_that_was_asked_for(
+    ur5: Robot, said: float | str, words: str
+) -> None:
+    understood = Tolerance.of(Tolerance.of(said, ur5), ur5)
+    assert understood.in_words(understood.size) == words

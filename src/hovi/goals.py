@@ -57,7 +57,7 @@ def met(
 ) -> Met:
     """A state at the goal: itself, or by inverse kinematics.
 
-    name: what the goal is called in an error. near: where the search starts, shape (nq,).
+    name: what the goal is called in a sentence. near: where the search starts, shape (nq,).
     limits: those on q are kept.
     Raises InputError for what is no goal, or a frame that the robot does not have.
     """
@@ -67,7 +67,11 @@ def met(
         raise InputError(f"the {name} is a State or a FrameGoal, not {type(goal).__name__}.")
     reached = _reached(robot, goal, near.tobytes(), limits)
     state = State(reached.q, free=(ALL,), free_velocity=tuple(goal.free_velocity))
-    return Met(state, (_condition(robot, goal),), reached.reason)
+    reason = reached.reason and (
+        f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
+        "move it nearer, or hand in its guess"
+    )
+    return Met(state, (_condition(robot, goal),), reason)
 
 
 def via_conditions(via: Via, met: Met, robot: Robot) -> tuple[Condition, ...]:

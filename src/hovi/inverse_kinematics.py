@@ -33,7 +33,7 @@ MET = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Reached:
-    """A configuration, and why it does not meet the goal, in a sentence without its end.
+    """A configuration, and by how much it does not meet the goal, in words.
 
     q: shape (nq,). reason: "" where it meets the goal.
     """
@@ -69,12 +69,7 @@ def inverse_kinematics(
         if len(found) == ENOUGH:
             break
     if not found:
-        nearest = condition.describe(best, np.zeros(n))
-        reason = (
-            f"no configuration that reaches the goal was found: at the nearest, {nearest}; move "
-            "the goal nearer, or hand in its guess"
-        )
-        return Reached(best, reason)
+        return Reached(best, condition.describe(best, np.zeros(n)))
     return Reached(min(found, key=lambda q: float(np.linalg.norm(robot.difference(near, q)))))
 
 

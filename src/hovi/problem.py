@@ -78,7 +78,7 @@ class TrajectoryProblem:
         conditions = [NodeCondition(N, condition) for condition in end.conditions]
         unreachable = end.reason
         for via in self.via:
-            passed = met(via.goal, "via", robot, start[0], self.limits)
+            passed = met(via.goal, f"via point at {via.time:g} s", robot, start[0], self.limits)
             node = self.grid.node_at(via.time)
             conditions += [NodeCondition(node, each) for each in via_conditions(via, passed, robot)]
             unreachable = unreachable or passed.reason

@@ -57,7 +57,7 @@ class State:
         """
         q = robot.check_configuration(self.q, name)
         v = np.zeros(robot.nv) if self.v is None else self.v
-        return q, robot.check_velocity(v, name)
+        return q, robot.check_velocity(v, f"{name}.v")
 
     def free_on(self, robot: Robot, name: str) -> Mask:
         """Which components of q (in the tangent space) and of v are free, shape (2, nv).

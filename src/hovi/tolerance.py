@@ -36,11 +36,13 @@ class Tolerance:
     size: relative in the cost, in [rad] in the joints (a sliding joint may be off by as many
         metres), in [m] at a frame.
     quantity: which of the three. frame: name of the frame; the robot's tip_frame when None.
+    unit: in which sentences state it: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
     """
 
     size: float
     quantity: Quantity = Quantity.COST
     frame: str | None = None
+    unit: str = field(default="", compare=False)
 
     @classmethod
     def of(cls, tolerance: float | str | Tolerance, robot: Robot) -> Self:
@@ -52,7 +54,8 @@ class Tolerance:
         Raises InputError for anything else.
         """
         if isinstance(tolerance, Tolerance):
-            return cls(tolerance.size, tolerance.quantity, tolerance.frame)._checked(robot)
+            parts = tolerance.size, tolerance.quantity, tolerance.frame, tolerance.unit
+            return cls(*parts)._checked(robot)
         if isinstance(tolerance, str):
             return cls._parsed(tolerance)._checked(robot)
         if isinstance(tolerance, bool) or not isinstance(tolerance, float | int | np.number):
@@ -70,13 +73,13 @@ class Tolerance:
         except ValueError:
             raise InputError(_expected(text)) from None
         if unit in LENGTHS:
-            return cls(size * LENGTHS[unit], Quantity.FRAME, frame)
+            return cls(size * LENGTHS[unit], Quantity.FRAME, frame, unit)
         if frame is not None:
             raise InputError(f"tolerance {text!r}: only a length, such as '0.1 mm', is at a frame.")
         if unit in ANGLES:
-            return cls(size * ANGLES[unit], Quantity.JOINTS)
+            return cls(size * ANGLES[unit], Quantity.JOINTS, unit=unit)
         if unit in SHARES:
-            return cls(size * SHARES[unit])
+            return cls(size * SHARES[unit], unit=unit)
         units = [unit for unit in (*LENGTHS, *ANGLES, *SHARES) if unit]
         raise InputError(f"tolerance {text!r} has the unit {unit!r}: {nearest(unit, units)}")
 
@@ -101,11 +104,13 @@ class Tolerance:
     def in_words(self, size: float) -> str:
         """A size of this quantity with its unit."""
         if self.quantity is Quantity.COST:
-            return f"{size:.2g} of the cost"
+            number = f"{size / SHARES[self.unit]:.2g}"
+            return f"{number} {self.unit} of the cost".replace("  ", " ")
         if self.quantity is Quantity.JOINTS:
-            return f"{size:.2g} rad in the joints"
-        at = "at the tip" if self.frame is None else f"at {self.frame}"
-        return f"{1e3 * size:.2g} mm {at}"
+            unit = self.unit or "rad"
+            return f"{size / ANGLES[unit]:.2g} {unit} in the joints"
+        unit, at = self.unit or "mm", "the tip" if self.frame is None else self.frame
+        return f"{size / LENGTHS[unit]:.2g} {unit} at {at}"
 
 
 def _expected(tolerance: object) -> str:

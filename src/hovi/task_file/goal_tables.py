@@ -65,10 +65,22 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
     return state
 
 
-def read_via(tables: list[ViaTable], robot: Robot, toml: TomlText) -> tuple[Via, ...]:
-    """What the motion passes through."""
-    goals = [read_goal(each, ("via", i), robot, toml) for i, each in enumerate(tables)]
-    return tuple(Via(each.time, goal) for each, goal in zip(tables, goals, strict=True))
+def read_via(
+    tables: list[ViaTable], duration: float | tuple[float, float], robot: Robot, toml: TomlText
+) -> tuple[Via, ...]:
+    """What the motion passes through. duration: in [s], or its bounds."""
+    points = []
+    for i, table in enumerate(tables):
+        longest = float(np.max(duration))
+        if table.time >= longest:
+            sentence = f"a via point at {table.time:g} s is not inside the motion of {longest:g} s"
+            raise toml.error(("via", i, "time"), sentence)
+        goal = read_goal(table, ("via", i), robot, toml)
+        try:
+            points.append(Via(table.time, goal))
+        except InputError as wrong:
+            raise toml.error(("via", i), str(wrong)) from None
+    return tuple(points)
 
 
 def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:

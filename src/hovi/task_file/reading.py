@@ -40,13 +40,13 @@ def load_task(path: str | Path) -> Task:
     toml = _read_text(Path(path))
     table = _validated(toml)
     _check_names(table, toml)
-    robot = _load_robot(table, toml)
+    robot, duration = _load_robot(table, toml), _duration(table.duration, toml)
     return Task(
         scene=_scene(table, robot, toml),
         start=read_state(table.start, ("start",), robot, toml),
         goal=read_goal(table.goal, ("goal",), robot, toml),
-        via=read_via(table.via, robot, toml),
-        duration=_duration(table.duration, toml),
+        via=read_via(table.via, duration, robot, toml),
+        duration=duration,
         time_weight=table.time_weight,
         scheme=table.scheme.name,
         intervals=table.scheme.intervals,

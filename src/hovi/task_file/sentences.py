@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -123,11 +123,15 @@ def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:
 
 def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:
     for key in keys:
-        field = model.model_fields.get(str(key))
+        if isinstance(key, int):
+            continue  # into a list of tables, whose class is known
+        field = model.model_fields.get(key)
         annotation = field.annotation if field else None
-        if not (isinstance(annotation, type) and issubclass(annotation, BaseModel)):
+        kinds = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
+        tables = [kind for kind in kinds if issubclass(kind, BaseModel)]
+        if not tables:
             return None
-        model = annotation
+        model = tables[0]
     return model
 
 
