@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -103,6 +104,38 @@ def test_the_picture_has_a_bar_for_every_trial(study: EffectStudy) -> None:
             assert lowest <= bar.get_width() <= highest  # type: ignore[attr-defined]
 
 
+def test_an_effect_without_a_minimum_has_no_numbers_of_a_motion(study: EffectStudy) -> None:
+    found, *others = study.trials
+    failed = dataclasses.replace(found, success=False, tip=None)
+    study = dataclasses.replace(study, trials=(failed, *others))
+    row = dict(zip(COLUMNS, study_rows(study)[1], strict=True))
+    assert (row["cost"], row["change"], row["tip [mm]"]) == ("no minimum", "-", "-")
+    assert json.loads(study_json(study))["trials"][0]["cost_change"] is None
+    panel = study_figure(study).axes[1]
+    assert [text.get_text() for text in panel.texts].count("no minimum") == 1
+    widths = [bar.get_width() for bar in panel.patches]  # type: ignore[attr-defined]
+    assert widths[-1] == panel.get_xlim()[0] < min(widths[:-1])
+
+
+def test_a_study_that_is_interrupted_keeps_what_was_tried(study: EffectStudy, task: Task) -> None:
+    def interrupt(text: str, share: float) -> None:
+        if "velocity_cost" in text:
+            raise KeyboardInterrupt
+
+    part = study_effects(task, CANDIDATES, interrupt)
+    assert [trial.name for trial in part.trials] == [trial.name for trial in study.trials[:2]]
+    assert part.untried == CANDIDATES[2:]
+    assert json.loads(study_json(part))["untried"] == ["velocity_cost", "gravity"]
+
+
+def test_nothing_pushes_a_base_that_floats_without_motors() -> None:
+    robot = load_robot(with_arm("free-flyer"))
+    keys = {e.key for e in effect_candidates(robot)}
+    arm = {e.key for e in effect_candidates(robot, robot.joint_names[1:])}
+    adrift = {e.key for e in effect_candidates(robot, robot.joint_names[:1])}
+    assert keys == arm == adrift | {"gravity", "wrench"}
+
+
 def test_a_motion_that_runs_away_is_called_lost(task: Task) -> None:
     heavy = study_effects(task, [Payload(task.scene.robot.tip_frame, 1e5)]).trials[0]
     assert heavy.open_loop is None or math.isfinite(heavy.open_loop)
@@ -200,4 +233,5 @@ def test_the_command_prints_a_table_and_draws_a_picture(
     fields = json.loads(capsys.readouterr().out)
     assert [trial["effect"] for trial in fields["trials"]] == ["gravity", "viscous_friction"]
     assert main(["effects", str(scene), "--out", "effects.txt"]) == 2
+    assert main(["effects", str(scene), "--time-limit", "0"]) == 2
     assert main(["effects", str(tmp_path / "no.toml")]) == 2

@@ -7,6 +7,8 @@ the weight for a push. Whoever knows better names them in a scene file.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -33,8 +35,13 @@ BURDEN = 0.05
 _EARTH = 9.81
 
 
-def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
-    """One of each effect that most robots feel, in the order of the effects page."""
+def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect, ...]:
+    """One of each effect that most robots feel, in the order of the effects page.
+
+    passive: joints without motors. A base that floats without any gains the momentum that a steady
+        force gives it whatever the other motors do, and comes to rest nowhere: gravity and the
+        push are left out.
+    """
     tip, level = robot.tip_frame, _efforts(robot)
     mass = sum(inertia.mass for inertia in robot.model.inertias[1:])
     stated = {
@@ -59,8 +66,11 @@ def effect_candidates(robot: Robot) -> tuple[Effect, ...]:
             Wrench(tip, (0.0, push, 0.0)),
             Drag(tip, 0.05, wind=(0.0, 5.0, 0.0)),
         ]
-    floats = not borne.all()
-    return tuple(e for e in candidates if not (floats and isinstance(e, MovingBase)))
+    unfit: list[type[Effect]] = []
+    if not borne.all():
+        adrift = robot.joint_names[0] in passive
+        unfit = [MovingBase, Gravity, Wrench] if adrift else [MovingBase]
+    return tuple(e for e in candidates if not isinstance(e, tuple(unfit)))
 
 
 def _borne(robot: Robot) -> Array:

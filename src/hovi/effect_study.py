@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.budget import TimeLeft
 from hovi.effect_candidates import effect_candidates
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
-from hovi.interruption import go_on, interruptible
+from hovi.interruption import go_on, interruptible, remember
 from hovi.scene import Scene
 from hovi.scene_account import seconds_per_point
 from hovi.solver import Solution
@@ -28,6 +29,8 @@ Progress = Callable[[str, float], None]
 BANDWIDTH = 10.0
 """Of the feedback that holds a motion to its plan, in [rad/s]."""
 _SAMPLES = 20
+_PATIENCE = 10.0
+_LEAST_SECONDS = 10.0
 
 
 @dataclass(frozen=True)
@@ -37,9 +40,9 @@ class EffectTrial:
     effect: which. added: whether it was added, or taken away since the scene names it.
     torque: largest change of a torque that the scene's own motion needs, in [N m].
     cost: of the motion planned with it, from the scene's own as the guess. success: whether that
-        is a minimum. nit, plan_seconds: what planning took.
+        is a minimum; where it is not, the cost says nothing. nit, plan_seconds: what planning took.
     tip: largest distance of its tip from the scene's own motion, in [m]; None where the two do
-        not last equally long.
+        not last equally long, or no minimum was found.
     open_loop, held: how far the tip ends off when the scene's own torques are played with it,
         alone and held by a feedback of 10 rad/s, in [m]; None where the motion is lost.
     instructions: what it adds to the expression graph.
@@ -71,6 +74,7 @@ class EffectStudy:
 
     task: what was planned. solution: its motion. seconds: of an evaluation, per point.
     plan_seconds: of planning it again from its own motion.
+    untried: candidates that were not reached when time was up or a person ended the study.
     """
 
     task: Task
@@ -78,41 +82,64 @@ class EffectStudy:
     seconds: float
     plan_seconds: float
     trials: tuple[EffectTrial, ...]
+    untried: tuple[Effect, ...] = ()
 
     def change(self, trial: EffectTrial) -> float:
-        """Relative change of the cost."""
+        """Relative change of the cost; NaN where no minimum was found with the effect."""
+        if not trial.success:
+            return np.nan
         return trial.cost / self.solution.cost - 1.0 if self.solution.cost else np.inf
 
 
 @interruptible
 def study_effects(
-    task: Task, candidates: Iterable[Effect] | None = None, progress: Progress | None = None
+    task: Task,
+    candidates: Iterable[Effect] | None = None,
+    progress: Progress | None = None,
+    time_limit: float | None = None,
 ) -> EffectStudy:
     """Plan a task, then each candidate effect alone.
 
     candidates: effects to add; one that the scene names is taken away instead. When not given,
         those of `effect_candidates`.
+    time_limit: of everything, in [s], shared evenly by the candidates that are left: each is
+        planned within its share, and none is begun when time is up. When not given, planning one
+        takes at most ten times what the task took, or 10 s. A KeyboardInterrupt ends the study
+        with the trials so far.
     Raises SceneError when the task itself has no motion to compare with.
     """
     tell = progress or (lambda text, share: None)
+    left, began = TimeLeft(time_limit), time.perf_counter()
     tell("planning the scene as it is", 0.0)
-    solution = _plan(task, task.scene, "cubic", task.starts)
+    solution = _plan(task, task.scene, "cubic", task.starts, left())
     if not solution.success:
         raise SceneError(
             f"the effects of {task.name!r} cannot be compared, as no motion was found to compare "
             f"with: {solution.message}"
         )
+    patience = max(_PATIENCE * (time.perf_counter() - began), _LEAST_SECONDS)
     began = time.perf_counter()
     _plan(task, task.scene, solution.trajectory, 1)
     again = time.perf_counter() - began
-    tried = tuple(effect_candidates(task.scene.robot) if candidates is None else candidates)
-    scenes = [_changed(task.scene, effect) for effect in tried]
-    own_seconds, *times = seconds_per_point([task.scene, *scenes])
-    trials = []
-    for i, (effect, scene, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
-        tell(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
-        trials.append(_trial(task, solution.trajectory, effect, scene, seconds))
-    return EffectStudy(task, solution, own_seconds, again, tuple(trials))
+    scene = task.scene
+    tried = tuple(
+        effect_candidates(scene.robot, scene.passive) if candidates is None else candidates
+    )
+    scenes = [_changed(scene, effect) for effect in tried]
+    own_seconds, *times = seconds_per_point([scene, *scenes])
+    trials: list[EffectTrial] = []
+    try:
+        for i, (effect, changed, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
+            tell(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
+            rest = left()
+            limit = patience if rest is None else rest / (len(tried) - i)
+            if limit <= 0:
+                break
+            trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
+    except KeyboardInterrupt:
+        remember()
+    untried = tried[len(trials) :]
+    return EffectStudy(task, solution, own_seconds, again, tuple(trials), untried)
 
 
 def _changed(scene: Scene, effect: Effect) -> Scene:
@@ -124,11 +151,12 @@ def _changed(scene: Scene, effect: Effect) -> Scene:
 
 
 def _trial(
-    task: Task, own: Trajectory, effect: Effect, scene: Scene, seconds: float
+    task: Task, own: Trajectory, effect: Effect, scene: Scene, seconds: float, limit: float
 ) -> EffectTrial:
+    """The trial of an effect, planned in at most limit seconds. Raises KeyboardInterrupt."""
     named = {each.key: each for each in task.scene.effects}
     began = time.perf_counter()
-    found = _plan(task, scene, own, 1)
+    found = _plan(task, scene, own, 1, limit)
     took = time.perf_counter() - began
     moves = set(effect.touches) != {Touch.COST}
     return EffectTrial(
@@ -139,7 +167,7 @@ def _trial(
         found.success,
         found.nit,
         took,
-        _tip_distance(own, found.trajectory),
+        _tip_distance(own, found.trajectory) if found.success else None,
         _off(scene, own, "none") if moves else 0.0,
         _off(scene, own, "pd") if moves else 0.0,
         scene.graph().n_instructions() - task.scene.graph().n_instructions(),
@@ -147,8 +175,11 @@ def _trial(
     )
 
 
-def _plan(task: Task, scene: Scene, guess: str | Trajectory, starts: int) -> Solution:
-    solution = plan_task(dataclasses.replace(task, scene=scene), starts=starts, guess=guess)
+def _plan(
+    task: Task, scene: Scene, guess: str | Trajectory, starts: int, limit: float | None = None
+) -> Solution:
+    changed = dataclasses.replace(task, scene=scene)
+    solution = plan_task(changed, starts=starts, guess=guess, time_limit=limit)
     go_on()  # with the other plans, unless a person ended this one
     return solution
 

@@ -44,13 +44,12 @@ def study_rows(study: EffectStudy) -> list[list[str]]:
 
 
 def _row(study: EffectStudy, trial: EffectTrial) -> list[str]:
-    mark = "" if trial.success else " (no minimum)"
     return [
         trial.name,
         f"{trial.torque:.3g}",
-        f"{trial.cost:.6g}{mark}",
-        f"{100 * study.change(trial):+.3g} %",
-        _millimetres(trial.tip),
+        f"{trial.cost:.6g}" if trial.success else "no minimum",
+        f"{100 * study.change(trial):+.3g} %" if trial.success else "-",
+        "-" if trial.tip is None else _millimetres(trial.tip),
         _millimetres(trial.open_loop),
         _millimetres(trial.held),
         f"{trial.instructions:+d}",
@@ -93,6 +92,7 @@ def study_json(study: EffectStudy) -> str:
         "seconds_per_point": study.seconds,
         "plan_seconds": study.plan_seconds,
         "trials": trials,
+        "untried": [effect.key for effect in study.untried],
     }
     return json.dumps(fields, allow_nan=False)
 
@@ -107,15 +107,18 @@ def plot_study(study: EffectStudy, path: str | os.PathLike[str]) -> None:
 
 
 def study_figure(study: EffectStudy) -> Figure:
-    """What each effect changes (torque, cost, tip) beside what it costs in time, as bars."""
+    """What each effect changes (torque, cost, tip) beside what it costs in time, as bars.
+
+    Where no minimum was found with an effect, the cost has no bar.
+    """
     trials = study.trials[::-1]
     names = [trial.name for trial in trials]
     figure = Figure(figsize=(11.0, 1.4 + 0.38 * len(trials)), layout="constrained")
     panels = figure.subplots(1, 4, sharey=True)
     _bars(panels[0], names, [t.torque for t in trials], "change of torque [N m]")
     changes = [100 * abs(study.change(t)) for t in trials]
-    signs = ["+" if study.change(t) >= 0 else "-" for t in trials]
-    _bars(panels[1], names, changes, "change of the cost [%]", signs)
+    signs = ["-" if study.change(t) < 0 else "+" for t in trials]
+    _bars(panels[1], names, changes, "change of the cost [%]", signs, without="no minimum")
     off = [1e3 * (np.nan if t.held is None else t.held) for t in trials]
     _bars(panels[2], names, off, "tip off at the end, held [mm]")
     ratios = [t.seconds / study.seconds for t in trials]
@@ -132,18 +135,23 @@ def _bars(
     label: str,
     signs: list[str] | None = None,
     color: str = _EFFECT,
+    without: str | None = None,
 ) -> None:
-    """Bars on a logarithmic axis over six decades at most, each with its number."""
+    """Bars on a logarithmic axis over six decades at most, each with its number.
+
+    without: what is said, without a bar, where there is no number; when None, a full bar is lost.
+    """
     largest = max([v for v in values if np.isfinite(v)], default=1.0) or 1.0
     least = largest * 1e-6
-    shown = [max(v, least) if np.isfinite(v) else largest for v in values]
-    lowest = min(shown) / 3
+    lowest = min([max(v, least) for v in values if np.isfinite(v)], default=largest) / 3
+    full = largest if without is None else lowest
+    shown = [max(v, least) if np.isfinite(v) else full for v in values]
     ax.barh(names, shown, left=0.0, color=color, height=0.6)
     ax.set_xscale("log")
     ax.set_xlim(lowest, largest * 30)
     for i, (value, place) in enumerate(zip(values, shown, strict=True)):
         sign = signs[i] if signs else ""
-        text = sign + _short(value) if np.isfinite(value) else "lost"
+        text = sign + _short(value) if np.isfinite(value) else without or "lost"
         ax.annotate(text, (place, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
     ax.set_xlabel(label, fontsize=9)
     ax.tick_params(labelsize=9)
