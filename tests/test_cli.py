@@ -293,6 +293,7 @@ def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
         assert (code, err) == (0, "")
         assert "elbow" in out
     assert "joint_limit_potential" in run("info", "two_link_elbow")[1]
+    assert "Base: floating" in run("info", "ur5", "--free-flyer")[1]
 
 
 @pytest.mark.parametrize("name", ["ARM.URDF", "arm.xml", "arm.xacro", "folder/arm"])

@@ -68,10 +68,11 @@ FLOORS = [
         "mimic_joints",
         "mimic_kernel",
     },
-    {"chain_urdf", "robot_model", "robot_report", "torque_model", "chart"},
+    {"chain_urdf", "robot_model", "torque_model", "chart"},
     {
         "robot_geometry",
         "robot_reading",
+        "robot_report",
         "chart_expansion",
         "moving_base_torque",
         "continuity",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -479,3 +480,22 @@ def test_a_given_model_may_lock_joints_beside_its_mimics() -> None:
     assert len(robot.couplings) == 4
     at = points(robot)
     close(rnea(Scene(robot), *at), rnea(Scene(same), *at), 1e-14)
+
+
+def test_the_description_shows_followers_of_what_stands_still(tmp_path: Path) -> None:
+    text = urdf(
+        LINK.format("a", 0.0, 1.0, 0.1),
+        LINK.format("b", 0.0, 1.0, 0.1),
+        joint("first", "base", "a", follows=""),
+        joint("second", "a", "b", 0.5, follows=mimic("first", 0.0, 0.1)),
+    )
+    never = loaded(tmp_path, text)
+    assert (never.nv, re.findall("second +mimic += 0.1\n", never.describe()) != []) == (1, True)
+    stuck = loaded(tmp_path, text.replace('multiplier="0.0"', 'multiplier="2"'), locked="first")
+    assert (stuck.nv, re.findall("second +mimic += 0.1\n", stuck.describe()) != []) == (0, True)
+    assert "second" not in loaded(tmp_path, text, locked="second").describe().split("Base:")[0]
+
+
+def test_the_description_says_when_nothing_mimics() -> None:
+    assert "no joint of it mimics another" in load_robot("ur5", mimic=True).describe()
+    assert "no joint of it mimics another" not in load_robot("ur5").describe()

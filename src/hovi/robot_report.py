@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.coupled_model import couplings_of
+from hovi.mimic_joints import held_values
+from hovi.robot_model import couplings_in
 from hovi.robot_source import RobotSource
 from hovi.urdf_check import checked_urdf
 
@@ -39,7 +41,7 @@ def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -
     """The text of `hovi info`: joints, limits, mass, and what the URDF holds besides."""
     sections = [
         _headline(name, model, source),
-        "\n".join(_joint_table(model)),
+        "\n".join(_joint_table(model, _held_followers(source))),
         _place(model, source, tip_frame),
     ]
     parts = [f"  {line}" for line in _opt_in_parts(model)]
@@ -73,9 +75,15 @@ def _headline(name: str, model: pin.Model, source: RobotSource) -> str:
     )
 
 
-def _joint_table(model: pin.Model) -> Iterator[str]:
+def _held_followers(source: RobotSource) -> dict[str, float]:
+    """Followers of what does not move, which stand where their offset says and are no joints."""
+    held = held_values(couplings_in(source), source.locked)
+    return {name: value for name, value in held.items() if name not in source.locked}
+
+
+def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
     names = list(model.names)[1:]
-    width = max((len(name) for name in names), default=5)
+    width = max((len(name) for name in (*names, *held)), default=5)
     yield _ROW.format("joint", "type", "lower", "upper", "velocity", "effort", width=width)
     yield _ROW.format("", "", "[rad, m]", "[rad, m]", "[/s]", "[N m, N]", width=width)
     couplings = {coupling.follower: coupling for coupling in couplings_of(model)}
@@ -92,6 +100,8 @@ def _joint_table(model: pin.Model) -> Iterator[str]:
         speed = _number(max(model.velocityLimit[joint.idx_v : joint.idx_v + joint.nv]))
         effort = _number(max(model.effortLimit[joint.idx_v : joint.idx_v + joint.nv]))
         yield _ROW.format(name, joint_type(joint), *limits, speed, effort, width=width)
+    for name, value in held.items():
+        yield f"  {name:<{width}}  {'mimic':<11}  = {value:g}"
 
 
 def _place(model: pin.Model, source: RobotSource, tip_frame: str) -> str:
@@ -137,6 +147,8 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     mimics = [name for name in mimics if name in movable]
     if mimics and not source.mimic:
         yield f"{_some(mimics)}: <mimic> counts with mimic=True only; the joint moves freely"
+    if source.mimic and not couplings_in(source):
+        yield "no joint of it mimics another: mimic=True changes nothing"
     unbounded = [name for name in _ranges_not_kept(model, robot) if source.mimic]
     if unbounded:
         yield (

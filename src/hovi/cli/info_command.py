@@ -18,6 +18,9 @@ def info(
     mimic: Annotated[
         bool, typer.Option("--mimic", help="Joints of a URDF with <mimic> follow others.")
     ] = False,
+    free_flyer: Annotated[
+        bool, typer.Option("--free-flyer", help="The base of the robot floats.")
+    ] = False,
 ) -> None:
     """Describe a robot, or a scene and what it leaves out."""
     from hovi.errors import InputError, nearest
@@ -29,7 +32,7 @@ def info(
     if what.lower().endswith(".toml") or what in scenes:
         print(_scene(what))
     elif is_path(what) or what in robots:
-        print(_robot(what, mimic))
+        print(_robot(what, mimic, free_flyer))
     else:
         raise InputError(
             f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
@@ -45,7 +48,7 @@ def _scene(scene: str) -> str:
     return describe_task(load_task(find_scene(scene)))
 
 
-def _robot(robot: str, mimic: bool) -> str:
+def _robot(robot: str, mimic: bool, free_flyer: bool) -> str:
     from hovi.robot import load_robot
 
-    return load_robot(robot, mimic=mimic).describe()
+    return load_robot(robot, mimic=mimic, free_flyer=free_flyer or None).describe()
