@@ -88,6 +88,7 @@ FLOORS = [
     {"trajectory", "segment_lagrangian", "clearance_outputs", "carried_efforts"},
     {"guess", "legendre_transforms", "motion_error", "refinement", "clearance_check"},
     {
+        "goal_clearance",
         "limit_check",
         "saturation",
         "imposed_clearance",

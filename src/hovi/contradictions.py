@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.clearance_check import in_words
+from hovi.frame_goal import FrameGoal
+from hovi.goal_clearance import goal_in_obstacle
 from hovi.joint_condition import JointCondition
 from hovi.limits import KINDS, NAMES, Limits, unit_of
 from hovi.problem import TrajectoryProblem
@@ -103,6 +105,12 @@ def _too_near(problem: TrajectoryProblem) -> str:
                 f"at the {end} {pairs[k]} {in_words(float(d[k]))}{needed}; move the {end} or what "
                 "is in its way"
             )
+    goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
+    for goal, name in goals:
+        if isinstance(goal, FrameGoal):
+            sentence = goal_in_obstacle(goal, name, problem.distances, margin - ROUNDING)
+            if sentence:
+                return sentence
     return ""
 
 

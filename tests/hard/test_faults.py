@@ -222,7 +222,7 @@ ROUND_THE_BALL = """
 robot = "ur5"
 duration = 2.0
 limits = "none"
-obstacles = [{ kind = "sphere", position = [0.45, 0.25, 0.30], radius = 0.1 }]
+obstacles = [{ kind = "sphere", position = [0.45, 0.25, 0.39], radius = 0.1 }]
 
 [start]
 q = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
@@ -235,9 +235,9 @@ axis = { frame = [0, 0, 1], world = [0, 0, -1] }
 [[via]]
 time = 1.0
 frame = "tool0"
-position = [0.45, 0.25, 0.45]
+position = [0.45, 0.25, 0.6]
 """
-"""The goal lies within the ball, so that one solve after the other looks for a way."""
+"""The goal lies where the hand is in the ball: one solve after the other looks for a way."""
 
 
 @pytest.mark.parametrize("command", BETWEEN_SOLVES)
