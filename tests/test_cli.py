@@ -162,6 +162,33 @@ def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
     assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
 
 
+SWING_UP = """robot = "two_link.urdf"
+duration = {duration}
+limits = "none"
+start.q = [-1.5707963267948966, 0.0]
+goal.q = [1.5707963267948966, 0.0]
+[effects.gravity]
+"""
+
+
+def test_a_cost_that_means_nothing_is_called_so_right_below_it(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("plan", scene(tmp_path, SWING_UP.format(duration=200.0)))
+    assert code == 0
+    found = re.search(
+        r"^cost +(\S+)\n! +the grid is too coarse for this motion: discrete action (\S+), "
+        r"integral (\S+); use more intervals or a tolerance$",
+        out,
+        re.MULTILINE,
+    )
+    assert found is not None
+    cost, action, integral = (float(number) for number in found.groups())
+    assert action == pytest.approx(cost, rel=0.05)
+    assert abs(integral - action) > 0.5 * integral
+    out = run("plan", scene(tmp_path, SWING_UP.format(duration=5.0)))[1]
+    assert "the grid is too coarse" not in out
+    assert "! coarse the two differ by more than 1 %" in out
+
+
 def test_a_plan_comes_with_its_certificate(run: Run) -> None:
     told = json.loads(run("plan", "two_link_reach", "--json")[1])
     certificate = told["certificate"]

@@ -15,6 +15,10 @@ NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
 
 COARSE = 0.01
 """Relative difference of two integrals beyond which a grid is too coarse to be believed."""
+MEANINGLESS = 0.5
+"""That beyond which the cost says nothing about the motion."""
+ROUNDING = 1e-20
+"""Difference of two integrals that rounding leaves, as of a robot that stays where it is."""
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
@@ -45,8 +49,7 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             f"{certificate.integral:.10g}",
         ),
     ]
-    gap = abs(certificate.integral - certificate.action)
-    if gap > COARSE * abs(certificate.integral):
+    if COARSE < _gap(certificate) <= MEANINGLESS:
         lines.append(
             (
                 "! coarse",
@@ -62,6 +65,22 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     )
     lines.append(("replay", _or(certificate.replay, _replay, missing, "replay")))
     return lines
+
+
+def coarse_grid(certificate: Certificate | None) -> str:
+    """That the cost of a plan means nothing on its grid; "" where it means something."""
+    if certificate is None or _gap(certificate) <= MEANINGLESS:
+        return ""
+    return (
+        f"the grid is too coarse for this motion: discrete action {certificate.action:.2g}, "
+        f"integral {certificate.integral:.3g}; use more intervals or a tolerance"
+    )
+
+
+def _gap(certificate: Certificate) -> float:
+    """The relative difference of the integral along the curve and the discrete action."""
+    gap = abs(certificate.integral - certificate.action)
+    return gap / max(abs(certificate.integral), ROUNDING) if gap > ROUNDING else 0.0
 
 
 def _or(statement: Any, words: Any, missing: dict[str, str], name: str) -> str:

@@ -14,7 +14,7 @@ from rich.table import Table
 
 from hovi.certificate import Certificate
 from hovi.cli.accuracy_report import accuracy_json, scheme_in_words, steps_in_words
-from hovi.cli.certificate_report import certificate_json, certificate_lines
+from hovi.cli.certificate_report import certificate_json, certificate_lines, coarse_grid
 from hovi.cli.closeness import Closeness, closeness
 from hovi.cli.nearest_approach import least_distance
 from hovi.cli.peaks import Peaks, peaks
@@ -60,7 +60,7 @@ def print_report(
     solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
 ) -> None:
     """A summary, the peaks of the motion, and where it was written, on stdout."""
-    for label, text in _summary(solution, task):
+    for label, text in _summary(solution, task, coarse_grid(certificate)):
         print(f"{label:9s}{text}")
     extremes, room = peaks(solution.trajectory), closeness(solution.trajectory)
     console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
@@ -89,12 +89,14 @@ def _estimate(solution: Solution, certificate: Certificate | None) -> float | No
     return None if certificate.errors is None else certificate.errors.cost
 
 
-def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
+def _summary(solution: Solution, task: Task, coarse: str) -> list[tuple[str, str]]:
+    """Labels and what they say. coarse: why the cost means nothing, or ""."""
     grid = solution.trajectory.grid
     rows = [
         ("status", str(solution.status)),
         ("message", solution.message),
         ("cost", f"{solution.cost:.10g}{_caveat(solution)}"),
+        *([("!", coarse)] if coarse else []),
         ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
         ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
