@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -175,10 +176,32 @@ def test_the_command_prints_one_object(
 
 def test_the_command_speaks(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", str(scene_file), "--duration", "0.2", "--intervals", "7"]) == 0
-    assert "0.2 s in 7 steps of order 4" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "0.2 s in 7 steps of order 4" in printed
+    assert re.search(r"shoulder +\S+ +rad +\S+ +rad/s", printed)
+    assert "feedback" not in printed
     assert main(["simulate", str(scene_file), "--duration", "-1"]) == 2
     assert "--duration must be" in capsys.readouterr().err
     assert main(["simulate", str(scene_file), "--out", "x.txt"]) == 2
+
+
+def test_a_limit_that_is_passed_is_told(
+    models: Path, scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, narrow = tmp_path / "fall.npz", tmp_path / "narrow.urdf"
+    assert main(["simulate", str(scene_file), "--out", str(out)]) == 0
+    assert "not simulated" not in capsys.readouterr().out
+    fall = Trajectory.load(out)
+    urdf = (models / "two_link.urdf").read_text()
+    narrow.write_text(urdf.replace('lower="-1000"', 'lower="-0.1"', 1))
+    scene_file.write_text(SCENE.replace("two_link.urdf", str(narrow)))
+    assert main(["simulate", str(scene_file)]) == 0
+    t = fall.t[np.argmax(fall.q[:, 0] < -0.1)]
+    sentence = f"shoulder passes its limit of -0.1 rad at t = {t:.4g} s: limits are not simulated"
+    assert sentence in capsys.readouterr().out
+    assert main(["simulate", str(scene_file), "--json"]) == 0
+    (passed,) = json.loads(capsys.readouterr().out)["limits_passed"]
+    assert passed == {"joint": "shoulder", "limit": -0.1, "unit": "rad", "t": pytest.approx(t)}
 
 
 def test_a_simulation_prints_its_robot_time_and_grid(two_link: Robot) -> None:

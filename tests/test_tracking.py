@@ -202,6 +202,8 @@ def test_the_command_reports_the_deviation(
     assert loose["tip_deviation_end"] > 5 * held["tip_deviation_end"] > 0
     assert loose["work_of_effects"] < 0
     assert loose["energy_error"] < 1e-4
+    assert main(arguments) == 0
+    assert "feedback" not in capsys.readouterr().out
     assert main([*arguments, "--feedback", "computed-torque"]) == 0
     text = capsys.readouterr().out
     assert "feedback: computed-torque of 10 rad/s" in text

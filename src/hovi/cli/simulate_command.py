@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -64,7 +65,12 @@ def simulate(
         report = _report(task, motion, out) | _deviation(tracking, plan, feedback, bandwidth)
     if out is not None:
         motion.trajectory.save(out)
-    _print(report, json)
+    if json:
+        from json import dumps
+
+        print(dumps(report))
+    else:
+        _print(report, motion)
 
 
 def _free(
@@ -105,6 +111,8 @@ def _played(
 
 
 def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
+    from hovi.cli.simulation_report import passed_limits
+
     energy, (driven, resisted) = motion.energy, motion.work
     balance = energy - energy[0] - driven - resisted
     return {
@@ -119,15 +127,15 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
         "work_of_torques": float(driven[-1]),
         "work_of_effects": float(resisted[-1]),
         "energy_error": float(abs(balance).max()),
+        "limits_passed": [asdict(each) for each in passed_limits(motion)],
         "out": None if out is None else str(out),
     }
 
 
 def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) -> dict[str, Any]:
-    from hovi.motion_error import sliding_coordinates
+    from hovi.cli.simulation_report import units_of
 
     joints, tip = abs(tracking.joint_deviation), tracking.tip_deviation
-    robot = tracking.simulation.scene.robot
     return {
         "plan": str(plan),
         "feedback": feedback,
@@ -136,26 +144,28 @@ def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) 
         "tip_deviation_max": float(tip.max()),
         "joint_deviation_end": joints[-1].tolist(),
         "joint_deviation_max": joints.max(axis=0).tolist(),
-        "joint_units": ["m" if slides else "rad" for slides in sliding_coordinates(robot)],
+        "joint_units": units_of(tracking.simulation.scene.robot),
         "feedback_torque_max": abs(tracking.feedback_torque).max(axis=0).tolist(),
     }
 
 
-def _print(report: dict[str, Any], json: bool) -> None:
-    if json:
-        from json import dumps
+def _print(report: dict[str, Any], motion: Simulation) -> None:
+    from rich.console import Console
 
-        print(dumps(report))
-        return
+    from hovi.cli.simulation_report import end_state, end_table, limits_sentence, passed_limits
+
     drive = f"playing {report['plan']}" if "plan" in report else "no torques"
     print(f"{report['scene']}: {report['duration']:g} s in {report['intervals']} steps", end="")
     print(f" of order {report['order']}, {drive}")
-    print(f"end: q = {_list(report['q'])}, v = {_list(report['v'])}")
+    Console(highlight=False, markup=False).print(end_table(end_state(motion)))
     print(
         f"energy {report['energy']:.9g} J to {report['energy_end']:.9g} J: torques "
         f"{report['work_of_torques']:+.6g} J, effects {report['work_of_effects']:+.6g} J, "
         f"balanced to {report['energy_error']:.2g} J"
     )
+    passed = passed_limits(motion)
+    if passed:
+        print(limits_sentence(passed))
     if "plan" in report:
         _print_deviation(report)
     if report["out"] is not None:
@@ -163,11 +173,11 @@ def _print(report: dict[str, Any], json: bool) -> None:
 
 
 def _print_deviation(report: dict[str, Any]) -> None:
-    held = "" if report["bandwidth"] is None else f" of {report['bandwidth']:g} rad/s"
-    print(f"feedback: {report['feedback']}{held}", end="")
     units = report["joint_units"]
-    efforts = ["N" if unit == "m" else "N m" for unit in units]
-    print(f", at most {_measured(report['feedback_torque_max'], efforts)}")
+    if report["bandwidth"] is not None:
+        efforts = ["N" if unit == "m" else "N m" for unit in units]
+        most = _measured(report["feedback_torque_max"], efforts)
+        print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {most}")
     print(
         f"the tip is off by {1e3 * report['tip_deviation_end']:.4g} mm at the end, "
         f"by {1e3 * report['tip_deviation_max']:.4g} mm at most"
