@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
 import json
 import math
@@ -218,8 +219,20 @@ def test_the_picture_has_a_curve_for_every_scheme(reach: Diagram) -> None:
     ]
     assert len(figure.axes) == 4
     named = [text.get_text() for text in figure.axes[0].texts]
-    assert named == ["1e-03", "1e-05", "1e-07", "1e-09"]
+    assert named[0].startswith("1e-03")
+    assert named[-1].endswith("1e-09")
     assert all(ax.get_yscale() == "log" for ax in figure.axes)
+
+
+def test_stars_that_coincide_have_one_label(reach: Diagram) -> None:
+    errors = (1e-3, 1.1e-3, 1e-6, 1e-9)
+    chosen = tuple(
+        dataclasses.replace(choice, error=dataclasses.replace(choice.error, cost=error))
+        for choice, error in zip(reach.choices, errors, strict=True)
+    )
+    apart = dataclasses.replace(reach, choices=chosen)
+    named = [text.get_text() for text in work_precision_figure(apart).axes[0].texts]
+    assert named == ["1e-03 to 1e-05", "1e-07", "1e-09"]
 
 
 def test_the_csv_has_a_line_per_run(reach: Diagram) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 
@@ -21,6 +22,7 @@ _LABELS = {
 _PEERS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a")
 _MILLISECONDS = 1e3
 _LEAST = 1e-16  # what stands for an error of zero
+_ONE_HEIGHT = 0.3  # decades of the error within which stars coincide
 _MARKS = "osD^vP*X<>"
 
 Time = Callable[[Run], float]
@@ -130,14 +132,19 @@ def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
 
 
 def _name_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]) -> None:
-    """The tolerance beside its star; where several chose the same motion, one above the other."""
-    lines: dict[float, int] = {}
-    for choice, below in zip(diagram.choices, y, strict=True):
-        line = lines[below] = lines.get(below, -1) + 1
+    """The tolerance beside its star, or from the first to the last of stars at one height."""
+    groups: list[list[int]] = []
+    for i, error in enumerate(y):
+        if groups and abs(math.log10(error / y[groups[-1][0]])) < _ONE_HEIGHT:
+            groups[-1].append(i)
+        else:
+            groups.append([i])
+    for group in groups:
+        ends = (diagram.choices[i].tolerance for i in (group[0], group[-1]))
         ax.annotate(
-            f"{choice.tolerance:.0e}",
-            (max(a for a, b in zip(x, y, strict=True) if b == below), below),
-            xytext=(8, -3 + 9 * line),
+            " to ".join(dict.fromkeys(f"{tolerance:.0e}" for tolerance in ends)),
+            (max(x[i] for i in group), y[group[0]]),
+            xytext=(8, -3),
             textcoords="offset points",
             color="#d00000",
             fontsize="small",
