@@ -76,9 +76,8 @@ def main() -> None:
     columns = ["joint", "+0.05: steps", "motion moves [rad]", "-0.05: steps", "motion moves [rad]"]
     print_table(columns, rows)
     print(
-        "The prediction, with its factorisation, counts as a step; its corrections, which cost a "
-        "gradient each, do not, nor does the last step with the exact Hessian, as in every "
-        "solve.\n"
+        "The prediction, with its factorisation, counts as a step, and so does the last one, with "
+        "the exact Hessian; corrections, which cost a gradient each, do not.\n"
     )
     print_machine(threads=1)
 
