@@ -17,7 +17,9 @@ from pathlib import Path
 
 import hovi
 from hovi.errors import SceneError
-from hovi.task_file import Task, load_task, save_task
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
+from hovi.planning.task_file.writing import save_task
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)

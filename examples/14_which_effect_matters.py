@@ -16,11 +16,11 @@ import tempfile
 from pathlib import Path
 
 import hovi
-from hovi.effect_study import study_effects
-from hovi.effect_study_table import plot_study
+from hovi.accuracy.effect_study.study import study_effects
+from hovi.accuracy.effect_study.tables import plot_study
+from hovi.discrete.state import State
 from hovi.effects import Armature, DryFriction, Gravity, Payload, ViscousFriction, Wrench
-from hovi.state import State
-from hovi.task_file import Task
+from hovi.planning.task_file.task import Task
 
 robot = hovi.load_robot(hovi.example("two_link.urdf"))
 simple = hovi.Scene(robot, [Gravity(9.8)])

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import hovi
-from hovi.distances import Distances
+from hovi.planning.clearance.distances import Distances
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)

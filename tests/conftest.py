@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from hovi.effects import Gravity
-from hovi.robot import Robot, load_robot
-from hovi.scene import Scene
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 

@@ -22,8 +22,8 @@ def test_a_first_plan_imports_nothing_that_it_does_not_use() -> None:
 
 
 def test_a_report_in_the_terminal_draws_nothing() -> None:
-    code = "import sys, hovi.cli.report; print(*sys.modules)"
+    code = "import sys, hovi.cli.reports.plan; print(*sys.modules)"
     run = [sys.executable, "-c", code]
     loaded = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
-    assert "hovi.cli.report" in loaded
+    assert "hovi.cli.reports.plan" in loaded
     assert not {"matplotlib", "meshcat", "scipy"} & set(loaded)

@@ -1,8 +1,9 @@
-"""The package is a tower: a module imports only from the floors below its own."""
+"""The packages are floors of a house: a file imports only from the floors below its own."""
 
 from __future__ import annotations
 
 import ast
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -11,153 +12,104 @@ import hovi
 
 SOURCE = Path(hovi.__file__).parent
 
-# From the ground up. A package stands here as one module, and may import within itself.
+# From the ground up. A package may import within itself, in the order that INSIDE gives.
 FLOORS = [
-    {
-        "blas_threads",
-        "bounded_file",
-        "errors",
-        "interruption",
-        "newton",
-        "conditions",
-        "budget",
-        "whole_file",
-        "skeleton",
-        "meshcat_page",
-        "json_numbers",
-        "rebuilt_model",
-    },
-    {
-        "obstacles",
-        "schemes",
-        "optimize",
-        "compiled",
-        "configuration",
-        "lie_groups",
-        "urdf_rules",
-        "robot_source",
-        "coupled_model",
-        "srdf",
-        "example_robots",
-    },
-    {
-        "carried_momenta",
-        "clearance",
-        "mass_matrix",
-        "configuration_space",
-        "point_function",
-        "rigid_body",
-        "urdf_check",
-        "grid",
-        "regularized",
-        "model_files",
-        "meshcat_server",
-        "figure_file",
-        "aligned_axes",
-    },
-    {
-        "interval_batch",
-        "plain_urdf",
-        "stored_torque",
-        "finer_grid",
-        "trajectory_file",
-        "effort_term",
-        "segment",
-        "tangent",
-        "unwrapped",
-        "mimic_joints",
-        "mimic_kernel",
-    },
-    {"chain_urdf", "robot_model", "torque_model", "chart"},
-    {
-        "robot_geometry",
-        "robot_reading",
-        "robot_report",
-        "chart_expansion",
-        "moving_base_torque",
-        "continuity",
-    },
-    {"robot"},
-    {"state", "lagrangian", "effects", "limits"},
-    {"frame_goal", "joint_condition", "convex_shapes", "point_outputs"},
-    {"inverse_kinematics", "distances"},
-    {"goals", "scene_account", "scene_terms"},
+    {"errors", "system", "_native"},
+    {"schemes", "optimize", "robot"},
+    {"dynamics"},
+    {"effects"},
     {"scene"},
-    {"free_fall", "discrete_lagrangian", "lagrangians"},
-    {"action_structure", "charted_lagrangian"},
-    {"trajectory", "segment_lagrangian", "clearance_outputs", "carried_efforts"},
-    {"guess", "legendre_transforms", "motion_error", "refinement", "clearance_check"},
-    {
-        "goal_clearance",
-        "limit_check",
-        "saturation",
-        "imposed_clearance",
-        "limit_bands",
-        "problem",
-        "euler_lagrange",
-        "exact_discrete_lagrangian",
-        "symmetry",
-    },
-    {
-        "multipliers",
-        "non_finite",
-        "tolerance",
-        "stepper",
-        "variational_error",
-        "contradictions",
-        "highlights",
-        "nodal_hamiltonian",
-        "dynamics_replay",
-        "distance_panel",
-    },
-    {"trajectory_objective"},
-    {"limited_action", "equality_rounds", "predictor"},
-    {"penalized_action", "limited_outcome"},
-    {"limited_solver"},
-    {"verdict"},
-    {"solver", "task_file", "simulator", "controllers"},
-    {"nearby_minimum", "multistart", "free_duration", "tracking", "easing"},
-    {"finer_solution", "continuation"},
-    {"error_estimate"},
-    {"known_error", "certificate", "ladder", "inactive_limits"},
-    {"next_grid"},
-    {"adaptive", "free_to_tolerance"},
-    {"planner", "effect_candidates"},
-    {"task_plan"},
-    {"effect_study"},
-    {"effect_study_table"},
-    {"playback", "plotting", "export", "accuracy"},
-    {"work_precision_plot", "peers"},
+    {"discrete"},
+    {"flows"},
+    {"planning"},
+    {"viewing"},
+    {"accuracy"},
     {"cli"},
     {"__main__"},
 ]
-FLOOR_OF = {module: floor for floor, modules in enumerate(FLOORS) for module in modules}
+# "" stands for the files of the package itself.
+INSIDE = {
+    "robot": [{"space", "urdf"}, {""}],
+    "effects": [{"expressions"}, {""}],
+    "planning": [
+        {"clearance"},
+        {"problem"},
+        {"solver"},
+        {"refinement"},
+        {"search"},
+        {"task_file"},
+    ],
+    "accuracy": [{""}, {"peers", "effect_study"}],
+    "cli": [{"reports"}, {"commands"}, {""}],
+}
+FLOOR_OF = {package: floor for floor, packages in enumerate(FLOORS) for package in packages}
+FOLDER_OF = {
+    (package, folder): floor
+    for package, floors in INSIDE.items()
+    for floor, folders in enumerate(floors)
+    for folder in folders
+}
 FILES = sorted(path for path in SOURCE.rglob("*.py") if path != SOURCE / "__init__.py")
 
 
-def module_of(path: Path) -> str:
-    return path.relative_to(SOURCE).with_suffix("").parts[0]
+def parts_of(path: Path) -> tuple[str, ...]:
+    """A file's module below hovi; a package's __init__ is the package."""
+    parts = path.relative_to(SOURCE).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
 
 
-def imported_modules(tree: ast.Module) -> set[str]:
-    """The parts of hovi that are named in imports, wherever in the file they stand."""
+MODULES = {parts_of(path): path for path in FILES}
+
+
+def imports_of(path: Path) -> set[tuple[str, ...]]:
+    """The modules of hovi that a file imports, wherever in it, for types alone too."""
     names = set()
-    for node in ast.walk(tree):
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"line {node.lineno}: relative import"
+            assert node.level == 0, f"{path}, line {node.lineno}: relative import"
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return {name.split(".")[1] for name in names if name.startswith("hovi.")}
+    found = set()
+    for name in names:
+        first, *parts = name.split(".")
+        if first == "hovi" and parts != ["__version__"]:
+            found.add(next(p for k in (0, 1) if (p := tuple(parts[: len(parts) - k])) in KNOWN))
+    return found
+
+
+KNOWN = set(MODULES) | {("_native",)}
+KNOWN |= {("_native", path.stem) for path in (SOURCE / "_native").glob("*.pyi")}
+
+
+def folder(module: tuple[str, ...]) -> str:
+    """The folder of its package that a module stands in; "" for the package itself."""
+    is_folder = module in MODULES and MODULES[module].name == "__init__.py"
+    return module[1] if len(module) > 2 or (len(module) == 2 and is_folder) else ""
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_a_module_imports_only_from_lower_floors(path: Path) -> None:
-    module = module_of(path)
-    assert module in FLOOR_OF, f"{module} has no floor: give it one in {Path(__file__).name}"
-    for imported in imported_modules(ast.parse(path.read_text())) - {module, "__version__"}:
-        assert FLOOR_OF[imported] < FLOOR_OF[module], f"{module} imports {imported} from above"
+def test_a_file_imports_only_from_lower_floors(path: Path) -> None:
+    module = parts_of(path)
+    assert module[0] in FLOOR_OF, f"{module[0]} has no floor: give it one in {Path(__file__).name}"
+    for imported in imports_of(path):
+        here, there = FLOOR_OF[module[0]], FLOOR_OF[imported[0]]
+        if imported[0] != module[0]:
+            assert there < here, f"{'.'.join(module)} imports {'.'.join(imported)} from above"
+        elif module[0] in INSIDE and folder(module) != folder(imported):
+            here = FOLDER_OF[module[0], folder(module)]
+            there = FOLDER_OF[module[0], folder(imported)]
+            assert there < here, f"{'.'.join(module)} imports {'.'.join(imported)} from above"
 
 
-def test_the_tower_has_no_floor_without_a_module() -> None:
-    assert set(FLOOR_OF) - {module_of(path) for path in FILES} == set()
+def test_no_files_import_each_other_in_a_circle() -> None:
+    graph = {module: imports_of(path) for module, path in MODULES.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as circle:
+        pytest.fail(" -> ".join(".".join(module) for module in circle.args[1]))
+
+
+def test_no_floor_is_empty() -> None:
+    packages = {module[0] for module in KNOWN}
+    assert set(FLOOR_OF) == packages

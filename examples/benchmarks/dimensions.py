@@ -11,7 +11,7 @@ import numpy as np
 from measuring import alone, exponent, print_machine, print_table
 
 import hovi
-from hovi.chain_urdf import write_chain
+from hovi.robot.urdf.planar_chain import write_chain
 
 LINKS = (2, 3, 5, 7, 10, 14, 20, 30)
 INTERVALS = (16, 32, 64, 128, 256, 512)

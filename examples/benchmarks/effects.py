@@ -8,9 +8,9 @@ from pathlib import Path
 from measuring import print_machine, print_table
 
 import hovi
-from hovi.effect_study import study_effects
-from hovi.effect_study_table import COLUMNS, plot_study, study_rows
-from hovi.task_file import load_task
+from hovi.accuracy.effect_study.study import study_effects
+from hovi.accuracy.effect_study.tables import COLUMNS, plot_study, study_rows
+from hovi.planning.task_file.reading import load_task
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 

@@ -10,7 +10,7 @@ import numpy as np
 from measuring import print_machine, print_table
 
 import hovi
-from hovi.example_robots import BUILT_IN_CODE, example_names
+from hovi.robot.example_robots import BUILT_IN_CODE, example_names
 
 INTERVALS = 4
 SIZE = 0.1

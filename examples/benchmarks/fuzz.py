@@ -25,13 +25,13 @@ from random import Random
 
 from measuring import print_machine, print_table
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "hard"))
-from verdict import Mutant, Verdict
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+from hard.verdict import Mutant, Verdict
 
 KINDS = {
-    "urdf": ("mutated_urdf", 10_000),
-    "scene": ("mutated_scene", 6_000),
-    "trajectory": ("mutated_motion", 6_000),
+    "urdf": ("hard.mutated_urdf", 10_000),
+    "scene": ("hard.mutated_scene", 6_000),
+    "trajectory": ("hard.mutated_motion", 6_000),
 }
 HANG, STARTUP = 10.0, 120.0  # [s]
 FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)

@@ -16,8 +16,12 @@ from random import Random
 import atheris
 
 TOP = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(TOP / "tests" / "hard"))
-MODULES = {"urdf": "mutated_urdf", "scene": "mutated_scene", "trajectory": "mutated_motion"}
+sys.path.insert(0, str(TOP / "tests"))
+MODULES = {
+    "urdf": "hard.mutated_urdf",
+    "scene": "hard.mutated_scene",
+    "trajectory": "hard.mutated_motion",
+}
 CORPUS, LARGEST = 300, 60_000  # inputs to begin with; bytes of an input
 HANG = 10  # [s]
 
@@ -25,10 +29,17 @@ HANG = 10  # [s]
 def main() -> None:
     kind, seconds = sys.argv[1], sys.argv[2]
     # Only the readers: what computes is slow to trace.
-    readers = ["hovi.urdf_check", "hovi.urdf_rules", "hovi.plain_urdf", "hovi.trajectory_file"]
-    with atheris.instrument_imports(include=[*readers, "hovi.task_file", "hovi.continuity"]):
+    readers = [
+        "hovi.robot.urdf.check",
+        "hovi.robot.urdf.rules",
+        "hovi.robot.urdf.normalize",
+        "hovi.discrete.trajectory_file",
+    ]
+    with atheris.instrument_imports(
+        include=[*readers, "hovi.planning.task_file", "hovi.discrete.trajectory_file_check"]
+    ):
         module = import_module(MODULES[kind])
-        verdict = import_module("verdict")
+        verdict = import_module("hard.verdict")
     good = (verdict.Verdict.REFUSED, verdict.Verdict.ACCEPTED)
     folder = Path(tempfile.mkdtemp(prefix="hovi-fuzz-"))
     corpus = folder / "corpus"

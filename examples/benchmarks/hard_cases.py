@@ -22,14 +22,14 @@ from measuring import machine, print_machine
 from threadpoolctl import threadpool_limits
 
 TESTS = Path(__file__).resolve().parents[2] / "tests"
-sys.path[:0] = [str(TESTS / "hard"), str(TESTS)]
+sys.path.insert(0, str(TESTS))
 
 
 def families() -> dict[str, list[Any]]:
     """The cases of every file of tests/hard, in the order of their numbers."""
     found = {}
     for path in TESTS.glob("hard/test_*.py"):
-        cases = getattr(importlib.import_module(path.stem), "CASES", ())
+        cases = getattr(importlib.import_module(f"hard.{path.stem}"), "CASES", ())
         if cases:
             found[path.stem.removeprefix("test_").replace("_", " ")] = list(cases)
     return dict(sorted(found.items(), key=lambda item: _place(item[1][0].number)))

@@ -11,8 +11,9 @@ import numpy as np
 from measuring import alone, best_time, print_machine, print_table
 
 import hovi
-from hovi.rigid_body import InverseDynamicsKernel, casadi_functions
-from hovi.torque_model import CasadiTorque
+from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.dynamics.torque_model import CasadiTorque
 
 ROBOTS = {
     "UR5": ("ur5", ()),

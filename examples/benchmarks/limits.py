@@ -13,12 +13,12 @@ from measuring import alone, best_time, print_machine, print_table
 from transcription import IPOPT, Transcription
 
 import hovi
-from hovi.limited_action import LimitedAction
-from hovi.limits import Limits, as_limits
+from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.trust_region import Options
-from hovi.rigid_body import casadi_functions
-from hovi.solver import guess_path
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.solver import guess_path
 
 SCENES = ("ur5_reach_limited", "panda_reach_limited")
 SCHEME, INTERVALS = "galerkin-2", 16

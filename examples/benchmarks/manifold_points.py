@@ -14,8 +14,8 @@ import pinocchio as pin
 from measuring import alone, print_machine, print_table
 
 import hovi
-from hovi.rigid_body import InverseDynamicsKernel
-from hovi.solver import guess_path
+from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel
+from hovi.planning.solver.solver import guess_path
 
 INTERVALS = (16, 256)
 BESIDE = {"kinova": "kinova, revolute", "free-flyer, 3 joints": "nine joints"}

@@ -21,15 +21,15 @@ PERIOD = 1e-3  # [s]
 PACKAGE = str(Path(hovi.__file__).parent)
 
 PARTS = {
-    "kernel": ("rigid_body/", "point_function"),
+    "kernel": ("dynamics/inverse_dynamics_kernel", "dynamics/point_function"),
     "assembly": (
-        "discrete_lagrangian",
-        "lagrangian",
-        "torque_model",
-        "trajectory_objective",
-        "optimize/contraction",
+        "discrete/discrete_lagrangian",
+        "scene/lagrangian",
+        "dynamics/torque_model",
+        "planning/solver/action_objective",
+        "discrete/contraction",
     ),
-    "factorisation": ("optimize/band", "optimize/merge_tree"),
+    "factorisation": ("optimize/banded_model", "optimize/merge_tree"),
 }
 """Modules of each part; the rest is Python."""
 ASSEMBLING = {"assemble", "scatter", "gather"}

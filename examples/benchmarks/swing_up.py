@@ -12,8 +12,8 @@ from measuring import print_machine, print_table
 from scipy.integrate import solve_ivp
 
 import hovi
-from hovi.plotting import angles_figure, plot_angles, plot_swept_surface
 from hovi.schemes import by_name
+from hovi.viewing.plotting import angles_figure, plot_angles, plot_swept_surface
 
 Array = npt.NDArray[np.float64]
 

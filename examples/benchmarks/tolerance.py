@@ -20,7 +20,7 @@ from measuring import alone, print_machine, print_table
 from pontryagin import extremal_cost
 
 import hovi
-from hovi.motion_error import deviation
+from hovi.discrete.motion_error import deviation
 from hovi.schemes import galerkin
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach", "z1", "chain of 4")

@@ -17,8 +17,8 @@ import numpy.typing as npt
 import scipy.sparse as sparse
 
 import hovi
-from hovi.rigid_body import casadi_functions
-from hovi.solver import guess_path
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.planning.solver.solver import guess_path
 
 Array = npt.NDArray[np.float64]
 

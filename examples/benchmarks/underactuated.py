@@ -13,8 +13,8 @@ from measuring import alone, best_time, exponent, print_machine, print_table
 from transcription import IPOPT, Transcription
 
 import hovi
-from hovi.rigid_body import casadi_functions
-from hovi.trajectory_objective import ActionObjective
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.planning.solver.action_objective import ActionObjective
 
 SCENES = ("acrobot_swing_up", "pendubot_swing_up", "cart_pole_swing_up")
 INTERVALS, MODES = 40, 2

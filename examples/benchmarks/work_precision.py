@@ -21,10 +21,10 @@ from measuring import alone, print_machine, print_table
 
 import hovi
 from hovi.accuracy import Diagram, MotionError, Run, work_precision
+from hovi.accuracy.peers.external_method import crocoddyl_peers, drake_peers
+from hovi.accuracy.peers.ipopt_method import ipopt_peers
+from hovi.accuracy.picture import plot_work_precision
 from hovi.accuracy.tables import as_json
-from hovi.peers.ipopt_method import ipopt_peers
-from hovi.peers.outside_method import crocoddyl_peers, drake_peers
-from hovi.work_precision_plot import plot_work_precision
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
 SHARES = {"two_link_reach": 0.4}

@@ -9,134 +9,134 @@ if TYPE_CHECKING:
     from hovi import accuracy as accuracy
     from hovi import effects as effects
     from hovi import schemes as schemes
-    from hovi.certificate import Certificate as Certificate
-    from hovi.certificate import certify as certify
-    from hovi.chain_urdf import chain as chain
-    from hovi.clearance import Clearance as Clearance
-    from hovi.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
-    from hovi.error_estimate import estimate_error as estimate_error
+    from hovi.discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
+    from hovi.discrete.grid import DiscretePath as DiscretePath
+    from hovi.discrete.grid import Grid as Grid
+    from hovi.discrete.motion_error import MotionError as MotionError
+    from hovi.discrete.state import State as State
+    from hovi.discrete.trajectory import Trajectory as Trajectory
     from hovi.errors import HoviError as HoviError
-    from hovi.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
-    from hovi.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map
-    from hovi.euler_lagrange import euler_lagrange_residual as euler_lagrange_residual
-    from hovi.euler_lagrange import regularity as regularity
-    from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagrangian
-    from hovi.exact_discrete_lagrangian import conjugate_time as conjugate_time
-    from hovi.export import write_csv as write_csv
-    from hovi.frame_goal import FrameGoal as FrameGoal
-    from hovi.goals import Via as Via
-    from hovi.grid import DiscretePath as DiscretePath
-    from hovi.grid import Grid as Grid
-    from hovi.lagrangian import CasadiLagrangian as CasadiLagrangian
-    from hovi.lagrangians import mechanics as mechanics
-    from hovi.lagrangians import riemannian_cubic as riemannian_cubic
-    from hovi.lagrangians import spline as spline
-    from hovi.legendre_transforms import hamiltonian as hamiltonian
-    from hovi.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
-    from hovi.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus
-    from hovi.legendre_transforms import legendre as legendre
-    from hovi.legendre_transforms import legendre_minus as legendre_minus
-    from hovi.legendre_transforms import legendre_plus as legendre_plus
-    from hovi.limits import Limits as Limits
-    from hovi.model_files import example as example
-    from hovi.motion_error import MotionError as MotionError
-    from hovi.obstacles import Box as Box
-    from hovi.obstacles import Capsule as Capsule
-    from hovi.obstacles import Sphere as Sphere
-    from hovi.planner import plan as plan
-    from hovi.playback import replay as replay
-    from hovi.plotting import plot as plot
-    from hovi.problem import TrajectoryProblem as TrajectoryProblem
-    from hovi.robot import Robot as Robot
-    from hovi.robot import load_robot as load_robot
-    from hovi.scene import Scene as Scene
-    from hovi.segment_lagrangian import SchemeLagrangian as SchemeLagrangian
-    from hovi.simulator import Simulation as Simulation
-    from hovi.simulator import simulate as simulate
-    from hovi.solver import Solution as Solution
-    from hovi.solver import solve as solve
-    from hovi.state import State as State
-    from hovi.stepper import Flow as Flow
-    from hovi.stepper import flow as flow
-    from hovi.symmetry import Symmetry as Symmetry
-    from hovi.symmetry import base_rotation as base_rotation
-    from hovi.symmetry import base_translation as base_translation
-    from hovi.task_file import Task as Task
-    from hovi.task_file import load_task as load_task
-    from hovi.task_plan import plan_task as plan_task
-    from hovi.tolerance import Accuracy as Accuracy
-    from hovi.tolerance import Tolerance as Tolerance
-    from hovi.tracking import Tracking as Tracking
-    from hovi.tracking import play as play
-    from hovi.trajectory import Trajectory as Trajectory
-    from hovi.variational_error import variational_order as variational_order
-    from hovi.verdict import Status as Status
+    from hovi.flows.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
+    from hovi.flows.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map
+    from hovi.flows.euler_lagrange import euler_lagrange_residual as euler_lagrange_residual
+    from hovi.flows.euler_lagrange import regularity as regularity
+    from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagrangian
+    from hovi.flows.exact_lagrangian import conjugate_time as conjugate_time
+    from hovi.flows.legendre_transforms import hamiltonian as hamiltonian
+    from hovi.flows.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
+    from hovi.flows.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus
+    from hovi.flows.legendre_transforms import legendre as legendre
+    from hovi.flows.legendre_transforms import legendre_minus as legendre_minus
+    from hovi.flows.legendre_transforms import legendre_plus as legendre_plus
+    from hovi.flows.order_of_accuracy import variational_order as variational_order
+    from hovi.flows.scheme_lagrangian import SchemeLagrangian as SchemeLagrangian
+    from hovi.flows.simulator import Simulation as Simulation
+    from hovi.flows.simulator import simulate as simulate
+    from hovi.flows.stepper import Flow as Flow
+    from hovi.flows.stepper import flow as flow
+    from hovi.flows.symmetry import Symmetry as Symmetry
+    from hovi.flows.symmetry import base_rotation as base_rotation
+    from hovi.flows.symmetry import base_translation as base_translation
+    from hovi.flows.tracking import Tracking as Tracking
+    from hovi.flows.tracking import play as play
+    from hovi.planning.clearance.clearance import Clearance as Clearance
+    from hovi.planning.clearance.obstacles import Box as Box
+    from hovi.planning.clearance.obstacles import Capsule as Capsule
+    from hovi.planning.clearance.obstacles import Sphere as Sphere
+    from hovi.planning.problem.frame_goal import FrameGoal as FrameGoal
+    from hovi.planning.problem.goals import Via as Via
+    from hovi.planning.problem.limits import Limits as Limits
+    from hovi.planning.problem.problem import TrajectoryProblem as TrajectoryProblem
+    from hovi.planning.problem.tolerance import Accuracy as Accuracy
+    from hovi.planning.problem.tolerance import Tolerance as Tolerance
+    from hovi.planning.refinement.certificate import Certificate as Certificate
+    from hovi.planning.refinement.certificate import certify as certify
+    from hovi.planning.refinement.error_estimate import estimate_error as estimate_error
+    from hovi.planning.search.planner import plan as plan
+    from hovi.planning.solver.solver import Solution as Solution
+    from hovi.planning.solver.solver import solve as solve
+    from hovi.planning.solver.status import Status as Status
+    from hovi.planning.task_file.reading import load_task as load_task
+    from hovi.planning.task_file.task import Task as Task
+    from hovi.planning.task_file.task_plan import plan_task as plan_task
+    from hovi.robot.bundled_models import example as example
+    from hovi.robot.robot import Robot as Robot
+    from hovi.robot.robot import load_robot as load_robot
+    from hovi.robot.urdf.planar_chain import chain as chain
+    from hovi.scene.lagrangian import CasadiLagrangian as CasadiLagrangian
+    from hovi.scene.scene import Scene as Scene
+    from hovi.scene.standard_lagrangians import mechanics as mechanics
+    from hovi.scene.standard_lagrangians import riemannian_cubic as riemannian_cubic
+    from hovi.scene.standard_lagrangians import spline as spline
+    from hovi.viewing.csv_table import write_csv as write_csv
+    from hovi.viewing.playback import replay as replay
+    from hovi.viewing.plotting import plot as plot
 
     __version__: str
 
 _PLACES = {
-    "Accuracy": "hovi.tolerance",
-    "Box": "hovi.obstacles",
-    "Capsule": "hovi.obstacles",
-    "CasadiLagrangian": "hovi.lagrangian",
-    "Certificate": "hovi.certificate",
-    "Clearance": "hovi.clearance",
-    "DiscreteLagrangian": "hovi.discrete_lagrangian",
-    "DiscretePath": "hovi.grid",
-    "ExactDiscreteLagrangian": "hovi.exact_discrete_lagrangian",
-    "Flow": "hovi.stepper",
-    "FrameGoal": "hovi.frame_goal",
-    "Grid": "hovi.grid",
+    "Accuracy": "hovi.planning.problem.tolerance",
+    "Box": "hovi.planning.clearance.obstacles",
+    "Capsule": "hovi.planning.clearance.obstacles",
+    "CasadiLagrangian": "hovi.scene.lagrangian",
+    "Certificate": "hovi.planning.refinement.certificate",
+    "Clearance": "hovi.planning.clearance.clearance",
+    "DiscreteLagrangian": "hovi.discrete.discrete_lagrangian",
+    "DiscretePath": "hovi.discrete.grid",
+    "ExactDiscreteLagrangian": "hovi.flows.exact_lagrangian",
+    "Flow": "hovi.flows.stepper",
+    "FrameGoal": "hovi.planning.problem.frame_goal",
+    "Grid": "hovi.discrete.grid",
     "HoviError": "hovi.errors",
-    "Limits": "hovi.limits",
-    "MotionError": "hovi.motion_error",
-    "Robot": "hovi.robot",
-    "Scene": "hovi.scene",
-    "SchemeLagrangian": "hovi.segment_lagrangian",
-    "Simulation": "hovi.simulator",
-    "Solution": "hovi.solver",
-    "Sphere": "hovi.obstacles",
-    "State": "hovi.state",
-    "Status": "hovi.verdict",
-    "Symmetry": "hovi.symmetry",
-    "Task": "hovi.task_file",
-    "Tolerance": "hovi.tolerance",
-    "Tracking": "hovi.tracking",
-    "Trajectory": "hovi.trajectory",
-    "TrajectoryProblem": "hovi.problem",
-    "Via": "hovi.goals",
-    "base_rotation": "hovi.symmetry",
-    "base_translation": "hovi.symmetry",
-    "certify": "hovi.certificate",
-    "chain": "hovi.chain_urdf",
-    "conjugate_time": "hovi.exact_discrete_lagrangian",
-    "discrete_hamiltonian_flow": "hovi.euler_lagrange",
-    "discrete_lagrangian_map": "hovi.euler_lagrange",
-    "estimate_error": "hovi.error_estimate",
-    "euler_lagrange_residual": "hovi.euler_lagrange",
-    "example": "hovi.model_files",
-    "flow": "hovi.stepper",
-    "hamiltonian": "hovi.legendre_transforms",
-    "inverse_legendre_minus": "hovi.legendre_transforms",
-    "inverse_legendre_plus": "hovi.legendre_transforms",
-    "legendre": "hovi.legendre_transforms",
-    "legendre_minus": "hovi.legendre_transforms",
-    "legendre_plus": "hovi.legendre_transforms",
-    "load_robot": "hovi.robot",
-    "load_task": "hovi.task_file",
-    "mechanics": "hovi.lagrangians",
-    "plan": "hovi.planner",
-    "play": "hovi.tracking",
-    "plan_task": "hovi.task_plan",
-    "plot": "hovi.plotting",
-    "regularity": "hovi.euler_lagrange",
-    "replay": "hovi.playback",
-    "riemannian_cubic": "hovi.lagrangians",
-    "simulate": "hovi.simulator",
-    "solve": "hovi.solver",
-    "spline": "hovi.lagrangians",
-    "variational_order": "hovi.variational_error",
-    "write_csv": "hovi.export",
+    "Limits": "hovi.planning.problem.limits",
+    "MotionError": "hovi.discrete.motion_error",
+    "Robot": "hovi.robot.robot",
+    "Scene": "hovi.scene.scene",
+    "SchemeLagrangian": "hovi.flows.scheme_lagrangian",
+    "Simulation": "hovi.flows.simulator",
+    "Solution": "hovi.planning.solver.solver",
+    "Sphere": "hovi.planning.clearance.obstacles",
+    "State": "hovi.discrete.state",
+    "Status": "hovi.planning.solver.status",
+    "Symmetry": "hovi.flows.symmetry",
+    "Task": "hovi.planning.task_file.task",
+    "Tolerance": "hovi.planning.problem.tolerance",
+    "Tracking": "hovi.flows.tracking",
+    "Trajectory": "hovi.discrete.trajectory",
+    "TrajectoryProblem": "hovi.planning.problem.problem",
+    "Via": "hovi.planning.problem.goals",
+    "base_rotation": "hovi.flows.symmetry",
+    "base_translation": "hovi.flows.symmetry",
+    "certify": "hovi.planning.refinement.certificate",
+    "chain": "hovi.robot.urdf.planar_chain",
+    "conjugate_time": "hovi.flows.exact_lagrangian",
+    "discrete_hamiltonian_flow": "hovi.flows.euler_lagrange",
+    "discrete_lagrangian_map": "hovi.flows.euler_lagrange",
+    "estimate_error": "hovi.planning.refinement.error_estimate",
+    "euler_lagrange_residual": "hovi.flows.euler_lagrange",
+    "example": "hovi.robot.bundled_models",
+    "flow": "hovi.flows.stepper",
+    "hamiltonian": "hovi.flows.legendre_transforms",
+    "inverse_legendre_minus": "hovi.flows.legendre_transforms",
+    "inverse_legendre_plus": "hovi.flows.legendre_transforms",
+    "legendre": "hovi.flows.legendre_transforms",
+    "legendre_minus": "hovi.flows.legendre_transforms",
+    "legendre_plus": "hovi.flows.legendre_transforms",
+    "load_robot": "hovi.robot.robot",
+    "load_task": "hovi.planning.task_file.reading",
+    "mechanics": "hovi.scene.standard_lagrangians",
+    "plan": "hovi.planning.search.planner",
+    "play": "hovi.flows.tracking",
+    "plan_task": "hovi.planning.task_file.task_plan",
+    "plot": "hovi.viewing.plotting",
+    "regularity": "hovi.flows.euler_lagrange",
+    "replay": "hovi.viewing.playback",
+    "riemannian_cubic": "hovi.scene.standard_lagrangians",
+    "simulate": "hovi.flows.simulator",
+    "solve": "hovi.planning.solver.solver",
+    "spline": "hovi.scene.standard_lagrangians",
+    "variational_order": "hovi.flows.order_of_accuracy",
+    "write_csv": "hovi.viewing.csv_table",
 }
 _SUBPACKAGES = ("accuracy", "effects", "schemes")
 

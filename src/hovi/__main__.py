@@ -13,9 +13,9 @@ from types import FrameType
 INTERRUPTED = 130
 IMPORTING = "<frozen importlib"
 """What the file names of Python's own frames begin with while a module is imported."""
-EXTENSION = "hovi.rigid_body._core"
+EXTENSION = "hovi._native._core"
 """What counts its objects at the end; those of a program that was interrupted are no leaks."""
-MEMORY = "hovi.interruption"
+MEMORY = "hovi.system.interruption"
 """What remembers an interrupt that comes where Python drops exceptions, as in a destructor."""
 PATIENCE = 0.05
 """Seconds after which Ctrl-C is heard again that came while a run imported what it needs."""

@@ -17,14 +17,14 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-import mutated_urdf
 import numpy as np
-from mutated_bytes import mutated_bytes
-from verdict import Mutant, Verdict, judge
 
 import hovi
-from hovi.model_files import example
-from hovi.trajectory import Trajectory
+from hard import mutated_urdf
+from hard.mutated_bytes import mutated_bytes
+from hard.verdict import Mutant, Verdict, judge
+from hovi.discrete.trajectory import Trajectory
+from hovi.robot.bundled_models import example
 
 TOKENS = (b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06", b"\x93NUMPY", b"\0" * 8, b"\xff" * 8, b"nan")
 STRANGE_VALUES: tuple[Any, ...] = (

@@ -16,12 +16,13 @@ from typing import Any
 
 import numpy as np
 import tomlkit
-from mutated_bytes import mutated_bytes
-from verdict import Mutant, Verdict, judge
 
-from hovi.model_files import example, example_scenes
-from hovi.task_file import Task, load_task
-from hovi.task_plan import plan_task
+from hard.mutated_bytes import mutated_bytes
+from hard.verdict import Mutant, Verdict, judge
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
+from hovi.planning.task_file.task_plan import plan_task
+from hovi.robot.bundled_models import example, example_scenes
 
 MOST_INTERVALS = 64  # of a plan that is tried
 TOKENS = (

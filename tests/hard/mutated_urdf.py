@@ -17,13 +17,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
-from mutated_bytes import mutated_bytes
-from verdict import Mutant, Verdict, judge
 
+from hard.mutated_bytes import mutated_bytes
+from hard.verdict import Mutant, Verdict, judge
 from hovi.errors import HoviError
-from hovi.example_robots import example_robot
-from hovi.model_files import example
-from hovi.robot import Robot, load_robot
+from hovi.robot.bundled_models import example
+from hovi.robot.example_robots import example_robot
+from hovi.robot.robot import Robot, load_robot
 
 STRANGE_NUMBERS = (
     *("NaN", "-nan", "inf", "-inf", "1,5", "1abc", "0x10", "1_0", "1e308", "-1e308", "1e999"),

@@ -16,10 +16,10 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from hovi.problem import TrajectoryProblem
-from hovi.solver import guess_path
-from hovi.trajectory_objective import ActionObjective
-from paper_arm import symbols
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import guess_path
+from samples.paper_arm import symbols
 
 Array = npt.NDArray[np.float64]
 

@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from hovi.chain_urdf import write_chain
-from hovi.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
 from hovi.effects import Gravity
-from hovi.grid import Grid
-from hovi.model_files import example
-from hovi.problem import TrajectoryProblem
-from hovi.robot import load_robot
-from hovi.scene import Scene
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import Solution
+from hovi.robot.bundled_models import example
+from hovi.robot.robot import load_robot
+from hovi.robot.urdf.planar_chain import write_chain
+from hovi.scene.scene import Scene
 from hovi.schemes import by_name
-from hovi.solver import Solution
-from hovi.state import State
-from paper_arm import HANG, REACH_Q, REACH_V
-from uneven_chain import uneven_chain
+from samples.paper_arm import HANG, REACH_Q, REACH_V
+from samples.uneven_chain import uneven_chain
 
 Array = npt.NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pinocchio as pin
-from case import Outcome
 
+from hard.case import Outcome
 from hovi.errors import HoviError
-from hovi.model_files import example
-from hovi.robot import Robot, load_robot
+from hovi.robot.bundled_models import example
+from hovi.robot.robot import Robot, load_robot
 
 ARM = example("two_link.urdf").read_text()
 MASS = 'mass value="0.375"'

@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from case import Case, Outcome, parameters
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from hovi.blas_threads import one_blas_thread
-from hovi.solver import solve
+from hard.case import Case, Outcome, parameters
+from hovi.planning.solver.solver import solve
+from hovi.system.blas_threads import one_blas_thread
 
 PLAN = """
 import sys, hovi
-from hovi.chain_urdf import write_chain
+from hovi.robot.urdf.planar_chain import write_chain
 from pathlib import Path
 
 robot, processes, starts = sys.argv[2], int(sys.argv[3]), int(sys.argv[4])

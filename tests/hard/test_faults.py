@@ -19,14 +19,14 @@ from pathlib import Path
 import pytest
 
 from hovi.cli import main
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import TrajectoryFileError
-from hovi.trajectory import Trajectory
-from hovi.whole_file import whole_file
+from hovi.system.files import whole_file
 
 KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
-from hovi.whole_file import whole_file
+from hovi.system.files import whole_file
 
 folder, random = Path(sys.argv[1]), random.Random(3)
 target, old, new = folder / "file", b"old" * 10**6, b"new" * 10**6
@@ -106,7 +106,7 @@ def test_a_file_has_no_name_until_it_is_whole(tmp_path: Path) -> None:
 def test_a_file_system_without_nameless_files_is_written_to_as_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hovi.whole_file._DESCRIPTORS", tmp_path / "no proc")
+    monkeypatch.setattr("hovi.system.files._DESCRIPTORS", tmp_path / "no proc")
     with whole_file(tmp_path / "file") as stream:
         stream.write(b"whole")
         assert [path.suffix for path in tmp_path.iterdir()] == [".tmp"]

@@ -9,21 +9,21 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from case import Case, Outcome, at_most, parameters
-from scenes import arm
 
+from hard.case import Case, Outcome, at_most, parameters
+from hard.scenes import arm
 from hovi.errors import InputError
-from hovi.euler_lagrange import discrete_lagrangian_map, legendre_plus
-from hovi.exact_discrete_lagrangian import ExactDiscreteLagrangian
-from hovi.lagrangian import CasadiLagrangian, Lagrangian
-from hovi.legendre_transforms import legendre
-from hovi.model_files import example
-from hovi.robot import load_robot
-from hovi.scene import Scene
+from hovi.flows.euler_lagrange import discrete_lagrangian_map, legendre_plus
+from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
+from hovi.flows.legendre_transforms import legendre
+from hovi.flows.scheme_lagrangian import SchemeLagrangian
+from hovi.flows.stepper import Flow, flow
+from hovi.robot.bundled_models import example
+from hovi.robot.robot import load_robot
+from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
-from hovi.segment_lagrangian import SchemeLagrangian
-from hovi.stepper import Flow, flow
-from long_flows import JET, arm_energy, costless, quarters, quartic, quartic_energy
+from samples.long_flows import JET, arm_energy, costless, quarters, quartic, quartic_energy
 
 Array = npt.NDArray[np.float64]
 

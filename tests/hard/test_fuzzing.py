@@ -7,13 +7,12 @@ from pathlib import Path
 from random import Random
 from types import ModuleType
 
-import mutated_motion
-import mutated_scene
-import mutated_urdf
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from verdict import Verdict
+
+from hard import mutated_motion, mutated_scene, mutated_urdf
+from hard.verdict import Verdict
 
 MUTATED = (mutated_urdf, mutated_scene, mutated_motion)
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)

@@ -6,11 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
-import naive
 import numpy as np
 import pytest
-from case import Case, Outcome, parameters
-from scenes import (
+
+from hard import naive
+from hard.case import Case, Outcome, parameters
+from hard.scenes import (
     HANG_JET,
     REACH,
     REACH_JET,
@@ -24,23 +25,22 @@ from scenes import (
     said,
     uneven,
 )
-
-from hovi.action_structure import ActionStructure
-from hovi.discrete_lagrangian import DiscreteLagrangian
-from hovi.grid import DiscretePath, Grid
-from hovi.interval_batch import Coordinates
-from hovi.lagrangian import CasadiLagrangian
-from hovi.model_files import example
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_batch import Coordinates
+from hovi.discrete.state import State
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum
-from hovi.planner import plan
-from hovi.scene import Scene
+from hovi.planning.problem.hessian_structure import ActionStructure
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.planning.task_file.reading import load_task
+from hovi.robot.bundled_models import example
+from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
-from hovi.solver import Solution, solve
-from hovi.state import State
-from hovi.task_file import load_task
-from hovi.verdict import Status
-from paper_arm import HANG, REACH_COST
+from samples.paper_arm import HANG, REACH_COST
 
 SCHEMES = "taylor-midpoint", "hermite-simpson", "galerkin-0", "galerkin-2"
 LEVEL = np.zeros(4)

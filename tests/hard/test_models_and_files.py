@@ -12,23 +12,21 @@ from random import Random
 from typing import Any
 
 import casadi as ca
-import mutated_motion
-import mutated_scene
-import mutated_urdf
 import numpy as np
 import pinocchio as pin
 import pytest
-from case import Case, Outcome, parameters
-from strange_files import ARM, MASS, alone, by_pinocchio, loaded, long_chain, refusals
-from verdict import Verdict
 
-from hovi.compiled import compiled, library_folder
+from hard import mutated_motion, mutated_scene, mutated_urdf
+from hard.case import Case, Outcome, parameters
+from hard.strange_files import ARM, MASS, alone, by_pinocchio, loaded, long_chain, refusals
+from hard.verdict import Verdict
+from hovi.discrete.grid import Grid
+from hovi.discrete.trajectory import Trajectory
+from hovi.dynamics.function_cache import compiled, library_folder
 from hovi.effects import Gravity
-from hovi.grid import Grid
-from hovi.planner import plan
-from hovi.scene import Scene
+from hovi.planning.search.planner import plan
+from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
-from hovi.trajectory import Trajectory
 
 AXIS = '<axis xyz="0 -1 0"/>'
 LIMIT = 'lower="-1000" upper="1000"'
@@ -135,7 +133,7 @@ def naive_meshes() -> str:
 
 def contained_meshes() -> Outcome:
     from hovi.errors import ModelError
-    from hovi.robot import load_robot
+    from hovi.robot.robot import load_robot
 
     kept = 0
     with tempfile.TemporaryDirectory() as name:

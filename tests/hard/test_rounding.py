@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import naive
 import numpy as np
 import pytest
-from case import Case, Outcome, at_most, parameters
-from scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, said
 
-from hovi.lagrangians import spline
+from hard import naive
+from hard.case import Case, Outcome, at_most, parameters
+from hard.scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, said
+from hovi.flows.scheme_lagrangian import SchemeLagrangian
+from hovi.flows.stepper import flow
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import galerkin
-from hovi.segment_lagrangian import SchemeLagrangian
-from hovi.solver import Solution, solve
-from hovi.stepper import flow
-from hovi.verdict import Status
-from long_flows import noether_errors, spline_error
-from paper_arm import HANG, REACH_COST
-from test_splines import exact_recursion
+from laws.test_splines import exact_recursion
+from samples.long_flows import noether_errors, spline_error
+from samples.paper_arm import HANG, REACH_COST
 
 STEPS = 10.0 ** -np.arange(1, 9)
 Q, V, A, J = 0.7, -0.3, 1.3, 0.4  # of a cubic

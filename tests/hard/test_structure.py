@@ -10,22 +10,22 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import naive
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 import pytest
-from case import Case, Outcome, parameters
-from scenes import HANG_JET, UP_JET, hanging, links, uneven
 
-from hovi.discrete_lagrangian import DiscreteLagrangian
+from hard import naive
+from hard.case import Case, Outcome, parameters
+from hard.scenes import HANG_JET, UP_JET, hanging, links, uneven
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath
 from hovi.errors import HoviError
-from hovi.grid import DiscretePath
 from hovi.optimize.trust_region import Options, minimize
-from hovi.planner import plan
-from hovi.problem import TrajectoryProblem
-from hovi.robot import Robot, load_robot
-from hovi.trajectory_objective import ActionObjective
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.robot.robot import Robot, load_robot
 
 Array = npt.NDArray[np.float64]
 

@@ -6,15 +6,15 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from interval_problems import SIZES, IntervalProblem, random_problem
 
-from hovi.discrete_lagrangian import DiscreteLagrangian
-from hovi.grid import DiscretePath, Grid
-from hovi.lagrangian import CasadiLagrangian
-from hovi.optimize.band import BandLayout, BandModel
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.optimize.banded_model import BandLayout, BandModel
 from hovi.optimize.merge_tree import MergeTree, MergeTreeModel, merge_levels
 from hovi.optimize.quadratic_model import IntervalSum
+from hovi.scene.lagrangian import CasadiLagrangian
 from hovi.schemes import galerkin
+from samples.interval_problems import SIZES, IntervalProblem, random_problem
 
 Array = npt.NDArray[np.float64]
 

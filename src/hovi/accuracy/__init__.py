@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from hovi.accuracy.choice import Choice
 from hovi.accuracy.diagram import MEASURES, Diagram
-from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.reference_motion import MotionError
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
+from hovi.accuracy.tolerance_method import Choice
 from hovi.accuracy.variational_method import SCHEMES
 from hovi.accuracy.work_precision import Peer, Setting, work_precision
 

@@ -6,7 +6,7 @@ import math
 import time
 
 from hovi.errors import InputError
-from hovi.interruption import go_on
+from hovi.system.interruption import go_on
 
 
 class Budget:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hovi.accuracy.choice import Choice
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
+from hovi.accuracy.tolerance_method import Choice
 
 MEASURES = ("cost", "joints", "tip")
 """Fields of MotionError."""

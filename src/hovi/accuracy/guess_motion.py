@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.guess import Curve, cubic, stretched
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, nearest
-from hovi.guess import Curve, cubic, stretched
-from hovi.problem import TrajectoryProblem
-from hovi.trajectory import Trajectory
+from hovi.planning.problem.problem import TrajectoryProblem
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
-from hovi.accuracy.motion_error import MotionError, Yardstick
+from hovi.accuracy.reference_motion import MotionError, Yardstick
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
 

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hovi.accuracy.motion_error import Configurations
+from hovi.accuracy.reference_motion import Configurations
 
 
 @dataclass(frozen=True, eq=False)

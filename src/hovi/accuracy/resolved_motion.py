@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hovi.accuracy.motion_error import MotionError, Yardstick
+from hovi.accuracy.reference_motion import MotionError, Yardstick
 from hovi.accuracy.variational_method import on_grid
+from hovi.discrete.grid import Grid
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import UnmeasurableError
-from hovi.grid import Grid
-from hovi.problem import TrajectoryProblem
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import Solution, solve
 from hovi.schemes import galerkin
-from hovi.solver import Solution, solve
-from hovi.trajectory import Trajectory
 
 MODES = 8
 """Inner modes of the resolved motion: more than those of any scheme that is measured by default."""

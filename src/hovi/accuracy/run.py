@@ -6,7 +6,7 @@ import statistics
 from dataclasses import dataclass
 from typing import Any
 
-from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.reference_motion import MotionError
 
 ASTRAY = 0.1
 """[rad] or [m] beyond which a motion is taken for another one than that which was looked for."""

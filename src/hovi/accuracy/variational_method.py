@@ -8,13 +8,13 @@ import dataclasses
 import numpy as np
 
 from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
-from hovi.discrete_lagrangian import DiscreteLagrangian
-from hovi.grid import Grid
-from hovi.guess import Curve
-from hovi.lagrangian import EffortLagrangian
-from hovi.problem import TrajectoryProblem
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.guess import Curve
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import solve
+from hovi.scene.lagrangian import EffortLagrangian
 from hovi.schemes import by_name
-from hovi.solver import solve
 
 SCHEMES = (
     "taylor-midpoint",

@@ -6,21 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
-from hovi.accuracy.choice import choices
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import NEARER, guess_curve
 from hovi.accuracy.measuring import ENOUGH, REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import CLOCKS, Method
-from hovi.accuracy.motion_error import MotionError
+from hovi.accuracy.reference_motion import MotionError
 from hovi.accuracy.resolved_motion import resolve
+from hovi.accuracy.tolerance_method import choices
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
+from hovi.discrete.guess import Curve
 from hovi.errors import InputError, UnmeasurableError, nearest
-from hovi.guess import Curve
-from hovi.interruption import go_on, interruptible
-from hovi.limits import as_limits
-from hovi.planner import plan
-from hovi.problem import TrajectoryProblem
-from hovi.task_file import Task
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.planner import plan
+from hovi.planning.task_file.task import Task
+from hovi.system.interruption import go_on, interruptible
 
 SEARCHING = 0.3
 """Share of the budget in which the motion may be found and resolved."""

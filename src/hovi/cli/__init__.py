@@ -10,7 +10,7 @@ from typer.exceptions import TyperException
 
 from hovi.cli.application import app
 from hovi.errors import HoviError
-from hovi.whole_file import reason
+from hovi.system.files import reason
 
 __all__ = ["app", "main"]
 

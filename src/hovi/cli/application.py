@@ -7,17 +7,15 @@ from typing import Annotated
 import typer
 
 from hovi import __version__
-from hovi.cli import (
-    accuracy_command,
-    effects_command,
-    export_command,
-    info_command,
-    plan_command,
-    plot_command,
-    replay_command,
-    schema_command,
-    simulate_command,
-)
+from hovi.cli.commands import accuracy as accuracy_command
+from hovi.cli.commands import effects as effects_command
+from hovi.cli.commands import export as export_command
+from hovi.cli.commands import info as info_command
+from hovi.cli.commands import plan as plan_command
+from hovi.cli.commands import plot as plot_command
+from hovi.cli.commands import replay as replay_command
+from hovi.cli.commands import schema as schema_command
+from hovi.cli.commands import simulate as simulate_command
 
 app = typer.Typer(
     help="Least-torque motions of URDF robots by higher-order variational integrators.",

@@ -6,8 +6,9 @@ from hovi.effects.armature import Armature
 from hovi.effects.custom import Custom
 from hovi.effects.drag import Drag
 from hovi.effects.dry_friction import DryFriction
-from hovi.effects.effect import Effect, SceneSymbols, Touch
+from hovi.effects.effect import Effect, Touch
 from hovi.effects.effort_weight import EffortWeight
+from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.effects.gravity import Gravity
 from hovi.effects.joint_limit_potential import JointLimitPotential
 from hovi.effects.joint_springs import JointSprings

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.effects.effect import Effect, Touch
-from hovi.effects.joint_values import (
+from hovi.effects.expressions.joint_values import (
     JointValues,
     in_words,
     joint_values,
@@ -20,7 +20,7 @@ from hovi.effects.joint_values import (
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
-from hovi.effects.effect import Effect, SceneSymbols, Touch
-from hovi.effects.formula import Number, Symbols, expression
-from hovi.effects.positions import positioned, positions
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.expressions.formula import Number, Symbols, expression
+from hovi.effects.expressions.joint_positions import positioned, positions
+from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

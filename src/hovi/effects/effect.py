@@ -12,10 +12,12 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.effects.expressions.symbols import SceneSymbols
+
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -29,31 +31,6 @@ class Touch(StrEnum):
     """The balance of torques: it adds to tau, in plans and in simulations."""
     COST = "cost"
     """What is minimised: plans alone."""
-
-
-@dataclass(frozen=True)
-class SceneSymbols:
-    """The CasADi symbols that an effect's expressions are written in.
-
-    q: shape (nq,). v, a: shape (nv,). t: a number, in [s].
-    base: where the base is at t, (x, y, z, yaw, pitch, roll) in [m] and [rad]; None where it rests.
-    """
-
-    q: ca.SX
-    v: ca.SX
-    a: ca.SX
-    t: ca.SX
-    base: ca.SX | None = None
-
-    @classmethod
-    def of(cls, robot: Robot) -> SceneSymbols:
-        """New symbols for a robot."""
-        sym = ca.SX.sym
-        return cls(sym("q", robot.nq), sym("v", robot.nv), sym("a", robot.nv), sym("t"))
-
-    def columns(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-        """(q, v, a, t)."""
-        return self.q, self.v, self.a, self.t
 
 
 @dataclass(frozen=True)

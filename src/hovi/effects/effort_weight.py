@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.effects.effect import Effect, Touch
-from hovi.effects.joint_values import JointValues, in_words, joint_values
+from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
 from hovi.errors import SceneError
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 

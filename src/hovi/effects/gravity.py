@@ -13,7 +13,7 @@ from hovi.errors import SceneError
 if TYPE_CHECKING:
     import pinocchio as pin
 
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

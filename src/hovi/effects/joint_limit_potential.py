@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from hovi.effects.effect import Effect, SceneSymbols, Touch
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from hovi.effects.effect import Effect, SceneSymbols
-from hovi.effects.joint_values import JointValues, in_words, joint_values
-from hovi.effects.positions import positions, require_positions
+from hovi.effects.effect import Effect
+from hovi.effects.expressions.joint_positions import positions, require_positions
+from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
+from hovi.effects.expressions.symbols import SceneSymbols
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
-from hovi.effects.effect import Effect, SceneSymbols, Touch
-from hovi.effects.joint_values import JointValues, in_words, joint_values
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
+from hovi.effects.expressions.symbols import SceneSymbols
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
-from hovi.effects.effect import Effect, SceneSymbols
-from hovi.effects.time_vector import TimeVector, in_words, time_vector
+from hovi.effects.effect import Effect
+from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.effects.expressions.time_vector import TimeVector, in_words, time_vector
 from hovi.errors import SceneError
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 
 from hovi.effects.effect import Effect, Touch
-from hovi.effects.frame_motion import require_frame
+from hovi.effects.expressions.frame_motion import require_frame
 from hovi.errors import SceneError
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 import numpy as np
 
-from hovi.effects.effect import Effect, SceneSymbols, Touch
-from hovi.effects.formula import Number, expression
-from hovi.effects.positions import positions, require_positions
+from hovi.effects.effect import Effect, Touch
+from hovi.effects.expressions.formula import Number, expression
+from hovi.effects.expressions.joint_positions import positions, require_positions
+from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,18 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from hovi.effects.effect import Effect, SceneSymbols
-from hovi.effects.joint_values import (
+from hovi.effects.effect import Effect
+from hovi.effects.expressions.joint_values import (
     JointValues,
     in_words,
     joint_values,
     of_urdf,
     require_one_source,
 )
+from hovi.effects.expressions.symbols import SceneSymbols
 
 if TYPE_CHECKING:
-    from hovi.robot import Robot
+    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,6 @@ from typing import Generic, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.interruption import go_on, remember
 from hovi.optimize.barrier import Barrier, Bounds
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import (
@@ -36,6 +35,7 @@ from hovi.optimize.trust_region import (
     next_shift,
     solve_subproblem,
 )
+from hovi.system.interruption import go_on, remember
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")

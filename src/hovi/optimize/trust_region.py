@@ -18,8 +18,8 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.interruption import go_on, remember
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.system.interruption import go_on, remember
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")

@@ -14,7 +14,7 @@ from hovi.schemes.classic import (
     trapezoid_difference,
 )
 from hovi.schemes.galerkin_table import galerkin
-from hovi.schemes.jets import end_basis, gamma, inverse_gamma
+from hovi.schemes.interval_curve import end_basis, gamma, inverse_gamma
 from hovi.schemes.regularity import is_regular, regularity_matrix, require_regular
 from hovi.schemes.scheme import Scheme
 

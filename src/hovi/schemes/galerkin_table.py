@@ -8,7 +8,7 @@ from numbers import Integral
 import numpy as np
 
 from hovi.errors import SchemeError
-from hovi.schemes.jets import jet_rows
+from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows
 from hovi.schemes.scheme import Scheme
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi.schemes.jets import jet_rows
+from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows, legendre
 
 Array = npt.NDArray[np.float64]

@@ -1,0 +1,1 @@
+"""Which effect matters on a scene, and what it costs."""

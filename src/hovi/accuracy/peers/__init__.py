@@ -1,0 +1,1 @@
+"""Other tools as methods of a work-precision diagram."""

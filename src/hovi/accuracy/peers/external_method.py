@@ -1,0 +1,134 @@
+"""Tools that live in a Python of their own, as methods of a work-precision diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+
+from hovi.accuracy import Setting
+from hovi.accuracy.method import Answer, Method, Prepared
+from hovi.accuracy.peers.bare_urdf import bare_urdf
+from hovi.accuracy.peers.supported_scenes import require_plain
+from hovi.accuracy.peers.worker import Worker
+
+Array = npt.NDArray[np.float64]
+
+_CHECKS = 5
+STARTING = 20.0
+"""Seconds that a tool may need to be imported."""
+
+
+class OutsideMethod(Method):
+    """A tool that answers questions in JSON: see serve.py.
+
+    setting: what is planned. python: of the tool's environment. tool: its worker.
+    options: what the worker needs to know of the method. nearer: start from the nearer guess.
+    """
+
+    coarsest = 24
+
+    def __init__(
+        self,
+        setting: Setting,
+        python: Path,
+        tool: str,
+        name: str,
+        family: str,
+        order: int | None,
+        options: Mapping[str, Any],
+        nearer: bool = False,
+    ) -> None:
+        require_plain(setting)
+        self._setting = setting
+        self._guess = setting.nearer if nearer else setting.guess
+        self.name, self.family, self.order = name, family, order
+        scene = _scene(setting) | {"options": dict(options)}
+        self._worker = Worker(python, tool, patience=2 * setting.longest + STARTING)
+        try:
+            self._worker.ask(scene)
+        except BaseException:
+            self.close()
+            raise
+
+    def prepare(self, intervals: int) -> Prepared:
+        """What the tool builds for N intervals, in its own process."""
+        T = self._setting.problem.grid.duration
+        t = np.linspace(0.0, T, 2 * intervals + 1)
+        q, v, a = (x.tolist() for x in self._guess(t))
+        guess = {"q": q, "v": v, "a": a}
+        answer = self._worker.ask({"prepare": intervals, "guess": guess})
+        return Prepared(partial(self._solve, intervals), float(answer["seconds"]))
+
+    def _solve(self, intervals: int) -> Answer:
+        answer = self._worker.ask({"solve": intervals})
+        q, v = np.array(answer["q"]), np.array(answer["v"])
+        t = np.linspace(0.0, self._setting.problem.grid.duration, intervals + 1)
+        where: Callable[[Array], Array] = CubicHermiteSpline(t, q, v)
+        said = bool(answer["success"]), str(answer["message"]), float(answer["cost"])
+        return Answer(*said, where, int(answer["steps"]), float(answer["seconds"]))
+
+    def close(self) -> None:
+        """End the tool's process."""
+        self._worker.close()
+
+
+def crocoddyl_peers(python: Path) -> list[partial[OutsideMethod]]:
+    """Crocoddyl's FDDP with RK4 and two ways to write the torque in an interval.
+
+    From the near guess it leaves for other minima on the arms, so it starts from the nearer one.
+    """
+    kinds = {"zero": ("constant torque", 2), "two": ("quadratic torque", 4)}
+    return [
+        partial(
+            OutsideMethod,
+            python=python,
+            tool="crocoddyl_worker",
+            name=f"Crocoddyl, RK4, {words}",
+            family="Crocoddyl",
+            order=order,
+            options={"control": control},
+            nearer=True,
+        )
+        for control, (words, order) in kinds.items()
+    ]
+
+
+def drake_peers(python: Path) -> list[partial[OutsideMethod]]:
+    """Drake's DirectCollocation with Ipopt and with SNOPT."""
+    return [
+        partial(
+            OutsideMethod,
+            python=python,
+            tool="drake_worker",
+            name=f"Drake, DirectCollocation, {solver}",
+            family="Drake",
+            order=None,
+            options={"solver": solver},
+        )
+        for solver in ("Ipopt", "SNOPT")
+    ]
+
+
+def _scene(setting: Setting) -> dict[str, Any]:
+    """The robot, its ends, and torques by which a tool can tell whether it has the same robot."""
+    problem = setting.problem
+    model, n = problem.scene.model, problem.robot.nv
+    q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, _CHECKS, n))
+    tau = problem.scene.inverse_dynamics(q, v, a)
+    check = {"q": q, "v": v, "a": a, "tau": tau}
+    return {
+        "urdf": bare_urdf(model),
+        "gravity": np.asarray(model.gravity.linear).tolist(),
+        "armature": np.asarray(model.armature).tolist(),
+        "longest": setting.longest,
+        "clock": setting.clock,
+        "duration": problem.grid.duration,
+        "ends": [np.asarray(x).tolist() for x in problem.boundary],
+        "check": {name: x.tolist() for name, x in check.items()},
+    }

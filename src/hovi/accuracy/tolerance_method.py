@@ -1,0 +1,99 @@
+"""What a tolerance chooses, measured like any other method."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hovi.accuracy.budget import Budget
+from hovi.accuracy.method import Stopwatch
+from hovi.accuracy.reference_motion import MotionError, Yardstick
+from hovi.accuracy.variational_method import on_grid
+from hovi.discrete.guess import Curve
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.refinement.adaptive import first_grid, solve_to_tolerance
+from hovi.planning.solver.solver import Solution
+
+TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What `plan(tolerance=)` chose, with the time that it took and the error that it has.
+
+    tolerance: relative, in the cost. scheme, intervals: of the grid that it ended on.
+    estimate: the error of the cost that it states. error: the true one, and those of the motion.
+    success: whether it says that the tolerance is met. repeats: all solves, coarser grids and
+    estimates included, in [s].
+    """
+
+    tolerance: float
+    scheme: str
+    intervals: int
+    estimate: float | None
+    error: MotionError
+    success: bool
+    repeats: tuple[float, ...]
+
+    @property
+    def seconds(self) -> float:
+        """The median of the repeats."""
+        return statistics.median(self.repeats)
+
+    @property
+    def best_seconds(self) -> float:
+        """The fastest of the repeats."""
+        return min(self.repeats)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON holds it, times in [s]."""
+        return {**vars(self), "error": vars(self.error), "seconds": self.seconds}
+
+
+def choices(
+    problem: TrajectoryProblem,
+    guess: Curve,
+    yardstick: Yardstick,
+    budget: Budget,
+    intervals: int,
+    repeats: int,
+    clock: str,
+) -> tuple[Choice, ...]:
+    """One choice per tolerance in TOLERANCES, as far as the budget allows.
+
+    problem: on any grid. intervals: of the scene; see first_grid.
+    clock: in CLOCKS.
+    """
+    coarse = on_grid(problem, first_grid(problem.grid.duration, intervals))
+    path = coarse.path(guess)
+    found = []
+    for size in TOLERANCES:
+        tolerance = Tolerance(size)
+        times: list[float] = []
+        while len(times) <= repeats and budget.allows(max(times, default=0.0)):
+            watch = Stopwatch(clock)
+            solution = solve_to_tolerance(coarse, tolerance, path, time_limit=budget.left)
+            times.append(watch.seconds)
+        if times:
+            found.append(_choice(size, solution, times, yardstick))
+    return tuple(found)
+
+
+def _choice(
+    size: float, solution: Solution, times: Sequence[float], yardstick: Yardstick
+) -> Choice:
+    grid = solution.trajectory.grid
+    names = sorted({scheme.name for scheme, _ in grid.groups})
+    accuracy = solution.accuracy
+    return Choice(
+        tolerance=size,
+        scheme=" and ".join(names),
+        intervals=grid.intervals,
+        estimate=solution.error_estimate,
+        error=yardstick.error(solution.cost, solution.trajectory.configurations),
+        success=accuracy is not None and accuracy.reached,
+        repeats=tuple(times),
+    )

@@ -1,0 +1,85 @@
+"""`hovi effects`: which effect matters on a scene, and what it costs."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from hovi.accuracy.effect_study.study import EffectStudy
+
+
+def effects(
+    scene: Annotated[
+        str,
+        typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
+    ],
+    candidates: Annotated[
+        str | None,
+        typer.Option(
+            "--with", metavar="RICH.toml", help="A scene whose effects are tried; else stand-ins."
+        ),
+    ] = None,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Of everything; each candidate gets a share."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="PNG", help="Where the picture goes (or .pdf, .svg).")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Add each candidate effect alone to a scene, and tabulate what it changes and costs.
+
+    Effects that the scene names are taken away instead. Ctrl-C ends it with what was tried. Exit
+    code 0, 1 when candidates were left untried, or 2 for bad input.
+    """
+    from hovi.accuracy.effect_study.study import study_effects
+    from hovi.accuracy.effect_study.tables import plot_study, study_json
+    from hovi.cli.commands.files import check_output, find_scene
+    from hovi.cli.commands.progress import progress
+    from hovi.errors import InputError
+    from hovi.planning.task_file.reading import load_task
+
+    if time_limit is not None and not 0 < time_limit < float("inf"):
+        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    if out is not None:
+        check_output(out, ".png", ".pdf", ".svg")
+    task = load_task(find_scene(scene))
+    tried = None if candidates is None else load_task(find_scene(candidates)).scene.effects
+    with progress(quiet=json) as report:
+        study = study_effects(task, tried, report, time_limit)
+    if out is not None:
+        plot_study(study, out)
+    if json:
+        print(study_json(study))
+    else:
+        _print(study)
+        if out is not None:
+            print(f"wrote {out}")
+    raise typer.Exit(1 if study.untried else 0)
+
+
+def _print(study: EffectStudy) -> None:
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    from hovi.accuracy.effect_study.tables import COLUMNS, NOTE, study_rows
+
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title=study.task.name)
+    for column in COLUMNS:
+        first = column == "effect"
+        table.add_column(column, justify="left" if first else "right", no_wrap=first)
+    for row in study_rows(study):
+        table.add_row(*row)
+    width = None if sys.stdout.isatty() else 140
+    Console(highlight=False, markup=False, width=width).print(table)
+    for trial in study.trials:
+        print(f"{'+' if trial.added else '-'} {trial.effect.describe()}")
+    print(NOTE)
+    if study.untried:
+        print(f"not tried: {', '.join(effect.key for effect in study.untried)}")

@@ -1,0 +1,47 @@
+"""Files that a command is given: found, or refused before any work is done."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from hovi.errors import InputError, SceneError, nearest
+from hovi.robot.bundled_models import example, example_scenes
+
+if TYPE_CHECKING:
+    from hovi.discrete.trajectory import Trajectory
+
+
+def find_scene(scene: str) -> Path:
+    """The scene file at a path, or the scene of that name that travels with hovi."""
+    path = Path(scene)
+    if path.exists():
+        return path
+    if scene in example_scenes():
+        return example(f"{scene}.toml")
+    hint = nearest(path.stem, example_scenes())
+    raise SceneError(
+        f"there is no scene file {scene!r}; among the scenes shipped with hovi, {hint}"
+    )
+
+
+def check_output(path: Path, *endings: str) -> Path:
+    """The path if a file can be written there. Raises InputError otherwise."""
+    if path.suffix.lower() not in endings:
+        raise InputError(f"the output file must end in {' or '.join(endings)}, not {path.name!r}.")
+    folder = path.parent
+    if not folder.is_dir():
+        raise InputError(
+            f"the folder {str(folder)!r} of the output file does not exist; make it first."
+        )
+    if path.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"{str(path)!r} cannot be written; choose another place.")
+    return path
+
+
+def load_trajectory(path: Path) -> Trajectory:
+    """The motion that `hovi plan --out` wrote."""
+    from hovi.discrete.trajectory import Trajectory
+
+    return Trajectory.load(path)

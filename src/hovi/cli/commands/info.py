@@ -1,0 +1,54 @@
+"""`hovi info`: what a robot or a scene holds."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def info(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT|SCENE.toml",
+            help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name.",
+        ),
+    ],
+    mimic: Annotated[
+        bool, typer.Option("--mimic", help="Joints of a URDF with <mimic> follow others.")
+    ] = False,
+    free_flyer: Annotated[
+        bool, typer.Option("--free-flyer", help="The base of the robot floats.")
+    ] = False,
+) -> None:
+    """Describe a robot, or a scene and what it leaves out."""
+    from hovi.errors import InputError, nearest
+    from hovi.robot.bundled_models import example_scenes
+    from hovi.robot.example_robots import example_names
+    from hovi.robot.loading import is_path
+
+    robots, scenes = example_names(), example_scenes()
+    if what.lower().endswith(".toml") or what in scenes:
+        print(_scene(what))
+    elif is_path(what) or what in robots:
+        print(_robot(what, mimic, free_flyer))
+    else:
+        raise InputError(
+            f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
+            "(A path ends in .urdf or .toml.)"
+        )
+
+
+def _scene(scene: str) -> str:
+    from hovi.cli.commands.files import find_scene
+    from hovi.cli.reports.task import describe_task
+    from hovi.planning.task_file.reading import load_task
+
+    return describe_task(load_task(find_scene(scene)))
+
+
+def _robot(robot: str, mimic: bool, free_flyer: bool) -> str:
+    from hovi.robot.robot import load_robot
+
+    return load_robot(robot, mimic=mimic, free_flyer=free_flyer or None).describe()

@@ -1,0 +1,66 @@
+"""`hovi replay`: a motion in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from hovi.discrete.trajectory import Trajectory
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE.npz", help="A motion.")],
+    speed: Annotated[float, typer.Option(help="1 is real time.")] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Play again and again.")] = False,
+    html: Annotated[
+        Path | None,
+        typer.Option(metavar="OUT.html", help="Write one page that plays the motion instead."),
+    ] = None,
+    browser: Annotated[bool, typer.Option(help="Open the page, or only print its address.")] = True,
+) -> None:
+    """Play a motion on a page of this machine until Ctrl-C, or write it as a page."""
+    from hovi.cli.commands.files import check_output, load_trajectory
+
+    if html is None:
+        _serve(load_trajectory(file), speed, loop, browser)
+        return
+    from hovi.viewing.playback import write_html
+
+    check_output(html, ".html")
+    write_html(load_trajectory(file), html, speed=speed, loop=loop)
+    print(f"wrote {html}")
+
+
+def _serve(trajectory: Trajectory, speed: float, loop: bool, browser: bool) -> None:
+    """Play, and keep the page until Ctrl-C, which is how a replay is meant to end."""
+    import contextlib
+    import threading
+
+    from hovi.viewing.playback import replay as play
+
+    with contextlib.suppress(KeyboardInterrupt):
+        play(
+            trajectory,
+            speed=speed,
+            loop=loop,
+            open_browser=browser and _has_browser(),
+            announce=_announce,
+        )
+        threading.Event().wait()
+
+
+def _announce(address: str) -> None:
+    print(f"playing at {address}; Ctrl-C ends it", flush=True)
+
+
+def _has_browser() -> bool:
+    import webbrowser
+
+    try:
+        webbrowser.get()
+    except webbrowser.Error:
+        return False
+    return True

@@ -1,0 +1,197 @@
+"""`hovi simulate`: how a scene moves by itself, or under the torques of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from hovi.flows.simulator import Simulation
+    from hovi.flows.tracking import Tracking
+    from hovi.planning.task_file.task import Task
+
+
+def simulate(
+    scene: Annotated[
+        str,
+        typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
+    ],
+    plan: Annotated[
+        Path | None,
+        typer.Option(metavar="F.npz", help="A motion whose torques are played from its start."),
+    ] = None,
+    feedback: Annotated[
+        str,
+        typer.Option(metavar="none|pd|computed-torque", help="What holds the motion to the plan."),
+    ] = "none",
+    bandwidth: Annotated[float, typer.Option(help="Of the feedback, in rad/s.")] = 10.0,
+    duration: Annotated[
+        float | None, typer.Option(metavar="SECONDS", help="Instead of the scene's.")
+    ] = None,
+    intervals: Annotated[
+        int | None,
+        typer.Option(help="Steps; when not given, 100 a second, or 400 with a plan."),
+    ] = None,
+    inner_modes: Annotated[int, typer.Option(help="R; the order is 2 (R + 1).")] = 1,
+    out: Annotated[
+        Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Simulate a scene by a variational integrator: without torques, or playing a plan.
+
+    Exit code 0, or 2 for bad input.
+    """
+    from hovi.cli.commands.files import check_output, find_scene
+    from hovi.errors import InputError
+    from hovi.planning.task_file.reading import load_task
+
+    if out is not None:
+        check_output(out, ".npz")
+    if plan is not None and duration is not None:
+        raise InputError("--duration does not go with --plan, which lasts as long as it lasts.")
+    if plan is None and feedback != "none":
+        raise InputError("--feedback holds a motion to a plan: name one with --plan F.npz.")
+    task = load_task(find_scene(scene))
+    if plan is None:
+        motion = _free(task, duration, intervals, inner_modes)
+        report = _report(task, motion, out)
+    else:
+        tracking = _played(task, plan, feedback, bandwidth, intervals, inner_modes)
+        motion = tracking.simulation
+        report = _report(task, motion, out) | _deviation(tracking, plan, feedback, bandwidth)
+    if out is not None:
+        motion.trajectory.save(out)
+    if json:
+        from json import dumps
+
+        print(dumps(report))
+    else:
+        _print(report, motion)
+
+
+def _free(
+    task: Task, duration: float | None, intervals: int | None, inner_modes: int
+) -> Simulation:
+    import math
+
+    from hovi.errors import InputError
+    from hovi.flows.simulator import simulate as simulate_motion
+
+    longest = max(task.duration) if isinstance(task.duration, tuple) else task.duration
+    T = longest if duration is None else duration
+    if not 0 < T < math.inf:
+        raise InputError(f"--duration must be a positive number of seconds, not {T}.")
+    N = max(1, math.ceil(100 * T)) if intervals is None else intervals
+    return simulate_motion(task.scene, task.start, T, intervals=N, inner_modes=inner_modes)
+
+
+def _played(
+    task: Task,
+    plan: Path,
+    feedback: str,
+    bandwidth: float,
+    intervals: int | None,
+    inner_modes: int,
+) -> Tracking:
+    from hovi.cli.commands.files import load_trajectory
+    from hovi.flows.tracking import play
+
+    return play(
+        task.scene,
+        load_trajectory(plan),
+        feedback,
+        bandwidth=bandwidth,
+        intervals=intervals,
+        inner_modes=inner_modes,
+    )
+
+
+def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
+    from hovi.cli.reports.simulation import passed_limits
+
+    energy, (driven, resisted) = motion.energy, motion.work
+    balance = energy - energy[0] - driven - resisted
+    return {
+        "scene": task.name,
+        "duration": float(motion.t[-1]),
+        "intervals": len(motion.t) - 1,
+        "order": motion.order,
+        "q": motion.q[-1].tolist(),
+        "v": motion.v[-1].tolist(),
+        "energy": float(energy[0]),
+        "energy_end": float(energy[-1]),
+        "work_of_torques": float(driven[-1]),
+        "work_of_effects": float(resisted[-1]),
+        "energy_error": float(abs(balance).max()),
+        "limits_passed": [asdict(each) for each in passed_limits(motion)],
+        "out": None if out is None else str(out),
+    }
+
+
+def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) -> dict[str, Any]:
+    from hovi.cli.reports.simulation import units_of
+
+    joints, tip = abs(tracking.joint_deviation), tracking.tip_deviation
+    return {
+        "plan": str(plan),
+        "feedback": feedback,
+        "bandwidth": None if feedback == "none" else bandwidth,
+        "tip_deviation_end": float(tip[-1]),
+        "tip_deviation_max": float(tip.max()),
+        "joint_deviation_end": joints[-1].tolist(),
+        "joint_deviation_max": joints.max(axis=0).tolist(),
+        "joint_units": units_of(tracking.simulation.scene.robot),
+        "feedback_torque_max": abs(tracking.feedback_torque).max(axis=0).tolist(),
+    }
+
+
+def _print(report: dict[str, Any], motion: Simulation) -> None:
+    from rich.console import Console
+
+    from hovi.cli.reports.simulation import end_state, end_table, limits_sentence, passed_limits
+
+    drive = f"playing {report['plan']}" if "plan" in report else "no torques"
+    print(f"{report['scene']}: {report['duration']:g} s in {report['intervals']} steps", end="")
+    print(f" of order {report['order']}, {drive}")
+    Console(highlight=False, markup=False).print(end_table(end_state(motion)))
+    print(
+        f"energy {report['energy']:.9g} J to {report['energy_end']:.9g} J: torques "
+        f"{report['work_of_torques']:+.6g} J, effects {report['work_of_effects']:+.6g} J, "
+        f"balanced to {report['energy_error']:.2g} J"
+    )
+    passed = passed_limits(motion)
+    if passed:
+        print(limits_sentence(passed))
+    if "plan" in report:
+        _print_deviation(report)
+    if report["out"] is not None:
+        print(f"written to {report['out']}")
+
+
+def _print_deviation(report: dict[str, Any]) -> None:
+    units = report["joint_units"]
+    if report["bandwidth"] is not None:
+        efforts = ["N" if unit == "m" else "N m" for unit in units]
+        most = _measured(report["feedback_torque_max"], efforts)
+        print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {most}")
+    print(
+        f"the tip is off by {1e3 * report['tip_deviation_end']:.4g} mm at the end, "
+        f"by {1e3 * report['tip_deviation_max']:.4g} mm at most"
+    )
+    print(f"joints at the end: {_measured(report['joint_deviation_end'], units)}")
+    print(f"joints at most:    {_measured(report['joint_deviation_max'], units)}")
+
+
+def _measured(values: list[float], units: list[str]) -> str:
+    """Values with their unit: once where all have the same."""
+    if len(set(units)) == 1:
+        return f"{_list(values)} {units[0]}"
+    return "[" + ", ".join(f"{x:.4g} {unit}" for x, unit in zip(values, units, strict=True)) + "]"
+
+
+def _list(values: list[float]) -> str:
+    return "[" + ", ".join(f"{each:.4g}" for each in values) + "]"

@@ -1,0 +1,77 @@
+"""How accurate a plan is, for programs and for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hovi.discrete.grid import Grid
+from hovi.discrete.motion_error import MotionError
+from hovi.planning.solver.solver import Solution
+from hovi.planning.task_file.task import Task
+
+
+def scheme_in_words(task: Task, grid: Grid) -> str:
+    """The scheme of a motion: the task's, or those that a tolerance chose."""
+    if task.tolerance is None:
+        return task.scheme
+    names = [scheme.name for scheme, _ in grid.groups]
+    modes = sorted(scheme.inner_modes for scheme, _ in grid.groups)
+    return names[0] if len(names) == 1 else f"galerkin-{modes[0]} to galerkin-{modes[-1]}"
+
+
+def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
+    """What was asked for, what was reached, and the grids on the way; {} without a tolerance."""
+    accuracy = solution.accuracy
+    if accuracy is None:
+        return {}
+    rounds = [
+        {
+            "intervals": done.intervals,
+            "points": done.points,
+            "cost": done.cost,
+            "error": done.error,
+            "nit": done.nit,
+            "seconds": done.seconds,
+        }
+        for done in accuracy.rounds
+    ]
+    return {
+        "tolerance": task.tolerance,
+        "tolerance_reached": accuracy.reached,
+        "tolerance_reason": accuracy.reason or None,
+        "errors": None if accuracy.estimate is None else errors_json(accuracy.estimate),
+        "grids": rounds,
+    }
+
+
+def errors_json(error: MotionError) -> dict[str, Any]:
+    """The largest errors over the whole motion."""
+    return {
+        "cost": error.cost,
+        "q_rad": error.angle,
+        "q_m": error.slide if error.sliding.any() else None,
+        "v": error.largest_v,
+        "tau": error.largest_tau,
+        "tip_mm": 1e3 * error.largest_tip,
+        "frame": error.frame,
+    }
+
+
+def errors_in_words(error: MotionError) -> str:
+    """The same on one line."""
+    parts = [f"cost {error.cost:.1e}"]
+    if not error.sliding.all():
+        parts.append(f"q {error.angle:.1e} rad")
+    if error.sliding.any():
+        parts.append(f"q {1e3 * error.slide:.1e} mm")
+    parts += [f"v {error.largest_v:.1e}", f"tau {error.largest_tau:.1e}"]
+    parts.append(f"{error.frame} {1e3 * error.largest_tip:.1e} mm")
+    return ", ".join(parts)
+
+
+def steps_in_words(grid: Grid) -> str:
+    """The range of the intervals' lengths, where they differ; "" where they do not."""
+    short, long = float(np.min(grid.steps)), float(np.max(grid.steps))
+    return "" if long - short <= 1e-9 * long else f" of {short:.3g} to {long:.3g} s"

@@ -1,0 +1,68 @@
+"""How close each joint of a motion comes to each of its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.limit_violation import closeness as closeness_along
+from hovi.planning.problem.limits import KINDS, Limits
+from hovi.viewing.recorded_limits import AT_LIMIT, imposed_limits
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Closeness:
+    """What is left to the limits, one per kind and velocity coordinate.
+
+    names: of the coordinates.
+    room: share of the range that is left to the nearest bound, shape (4, nv); negative beyond it,
+        infinite where there is none.
+    limits: what was imposed.
+    """
+
+    names: tuple[str, ...]
+    room: Array
+    limits: Limits
+
+    @property
+    def excess(self) -> float:
+        """The largest share of a range by which a limit is exceeded; 0 where all hold."""
+        return max(0.0, -float(self.room.min()))
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether a limit is exceeded by more than its tolerance."""
+        return self.excess > self.limits.tolerance
+
+    def is_limited(self, kind: str) -> bool:
+        """Whether any joint has a limit of this kind."""
+        return bool(self.limits.bounded[KINDS.index(kind)].any())
+
+    def in_words(self, kind: str, joint: int) -> str:
+        """Percent of the range that is left, with a mark at or beyond a limit."""
+        room = self.room[KINDS.index(kind), joint]
+        if not np.isfinite(room):
+            return "-"
+        if room < -self.limits.tolerance:
+            return f"!{100 * room:.3g} %"
+        return f"*{100 * max(room, 0.0):.1f} %" if room <= AT_LIMIT else f"{100 * room:.1f} %"
+
+    def by_kind(self) -> dict[str, dict[str, float]]:
+        """The shares that are left, by kind and joint."""
+        return {
+            kind: dict(zip(self.names, row.tolist(), strict=True))
+            for kind, row in zip(KINDS, self.room, strict=True)
+        }
+
+
+def closeness(trajectory: Trajectory) -> Closeness | None:
+    """The room that a motion leaves to the limits it was planned under; None without any."""
+    limits = imposed_limits(trajectory)
+    if limits is None:
+        return None
+    return Closeness(trajectory.coordinate_names, closeness_along(trajectory, limits), limits)

@@ -1,0 +1,86 @@
+"""The largest values of a motion, beside the limits that the URDF states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.viewing.unwrapped_angles import shown_names, unwrapped
+
+Array = npt.NDArray[np.float64]
+
+SAMPLES_PER_INTERVAL = 20
+MOST_SAMPLES = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Peaks:
+    """Extremes over time, one per velocity coordinate.
+
+    names: of the coordinates. shown: what people are told of them, see `shown_names`.
+    q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as
+        `unwrapped` gives them.
+    v, a, tau: largest |v|, |a| and |tau|.
+    lower, upper, v_limit, tau_limit: what the URDF states; infinite where it states nothing.
+    """
+
+    names: tuple[str, ...]
+    shown: tuple[str, ...]
+    q_low: Array
+    q_high: Array
+    v: Array
+    a: Array
+    tau: Array
+    lower: Array
+    upper: Array
+    v_limit: Array
+    tau_limit: Array
+
+    def beyond(self) -> dict[str, npt.NDArray[np.bool_]]:
+        """Which limits the motion does not keep: "q", "v" and "tau", each of shape (nv,)."""
+        above, below = _above(self.q_high, self.upper), _above(-self.q_low, -self.lower)
+        return {
+            "q": above | below,
+            "v": _above(self.v, self.v_limit),
+            "tau": _above(self.tau, self.tau_limit),
+        }
+
+
+def peaks(trajectory: Trajectory) -> Peaks:
+    """Extremes of q, v, a and tau, from up to 20 samples per interval."""
+    N = trajectory.grid.intervals
+    per_interval = max(1, min(SAMPLES_PER_INTERVAL, MOST_SAMPLES // N))
+    s = np.linspace(0.0, 1.0, per_interval + 1)
+    motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
+    nv, space = motion.v.shape[1], trajectory.space
+    q = motion.q if space is None else unwrapped(space, motion.q)
+    lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
+    robot = trajectory.robot
+    v_limit, tau_limit = np.full(nv, np.inf), np.full(nv, np.inf)
+    if robot is not None:
+        in_q, in_v = robot.space.plain
+        lower[in_v], upper[in_v] = -_stated(-robot.lower[in_q]), _stated(robot.upper[in_q])
+        v_limit, tau_limit = _known(robot.velocity_limit), _known(robot.effort_limit)
+    v, a, tau = (np.abs(x).max(axis=0) for x in (motion.v, motion.a, motion.tau))
+    names = trajectory.coordinate_names
+    shown = names if space is None else shown_names(space, names)
+    low, high = q.min(axis=0), q.max(axis=0)
+    return Peaks(names, shown, low, high, v, a, tau, lower, upper, v_limit, tau_limit)
+
+
+def _stated(limit: Array) -> Array:
+    """Infinite where Pinocchio's largest double says that the URDF states nothing."""
+    return np.where(limit < np.finfo(float).max, limit, np.inf)
+
+
+def _known(limit: Array) -> Array:
+    """A velocity or effort limit of zero says that nobody knew it."""
+    return np.where(limit > 0, _stated(limit), np.inf)
+
+
+def _above(value: Array, limit: Array) -> npt.NDArray[np.bool_]:
+    """value > limit by more than rounding."""
+    return value > limit + 1e-9 * (1.0 + np.abs(limit))

@@ -1,0 +1,197 @@
+"""What a plan came to: one JSON object for programs, tables for people."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from hovi.cli.reports.accuracy import accuracy_json, scheme_in_words, steps_in_words
+from hovi.cli.reports.certificate import certificate_json, certificate_lines, coarse_grid
+from hovi.cli.reports.limit_margins import Closeness, closeness
+from hovi.cli.reports.nearest_approach import least_distance
+from hovi.cli.reports.peaks import Peaks, peaks
+from hovi.planning.refinement.certificate import Certificate
+from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
+from hovi.planning.task_file.task import Task
+from hovi.system.json_numbers import finite
+
+
+def as_json(
+    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+) -> str:
+    """The one JSON object of `hovi plan --json`; numbers are finite or null."""
+    trajectory = solution.trajectory
+    room = closeness(trajectory)
+    fields = {
+        "success": bool(solution.success),
+        "status": str(solution.status),
+        "message": solution.message,
+        "cost": solution.cost,
+        "error_estimate": _estimate(solution, certificate),
+        "scheme": scheme_in_words(task, trajectory.grid),
+        "intervals": trajectory.grid.intervals,
+        "nit": solution.nit,
+        "n_neg": solution.n_neg,
+        "setup_seconds": solution.setup_seconds,
+        "solve_seconds": solution.solve_seconds,
+        "starts": task.starts,
+        "seed": task.seed,
+        "minima": list(solution.minima),
+        "peaks": _peaks_json(peaks(trajectory)),
+        "limits": None if room is None else room.by_kind(),
+        "excess": None if room is None else room.excess,
+        "least_distance": least_distance(trajectory),
+        "out": None if out is None else str(out),
+        **accuracy_json(solution, task),
+        "certificate": None if certificate is None else certificate_json(certificate),
+    }
+    return json.dumps(finite(fields), allow_nan=False)
+
+
+def print_report(
+    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+) -> None:
+    """A summary, the peaks of the motion, and where it was written, on stdout."""
+    for label, text in _summary(solution, task, coarse_grid(certificate)):
+        print(f"{label:9s}{text}")
+    extremes, room = peaks(solution.trajectory), closeness(solution.trajectory)
+    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
+    if room is not None:
+        console.print(_room_table(extremes, room))
+        print(_room_note(room))
+    else:
+        console.print(_peaks_table(extremes))
+        if any(each.any() for each in extremes.beyond().values()):
+            print("! beyond a limit of the URDF: the motion was planned without it.")
+    distance = least_distance(solution.trajectory)
+    if distance is not None:
+        kept = task.clearance.margin
+        print(f"distance {distance:.4g} m at the nearest approach, the margin is {kept:g} m")
+    if certificate is not None:
+        for label, text in certificate_lines(certificate):
+            print(f"{label:9s}{text}")
+    if out is not None:
+        print(f"wrote {out}" + ("" if solution.success else ", which is no minimum"))
+
+
+def _estimate(solution: Solution, certificate: Certificate | None) -> float | None:
+    """Of the cost: the solution's own, or the certificate's."""
+    if solution.error_estimate is not None or certificate is None:
+        return solution.error_estimate
+    return None if certificate.errors is None else certificate.errors.cost
+
+
+def _summary(solution: Solution, task: Task, coarse: str) -> list[tuple[str, str]]:
+    """Labels and what they say. coarse: why the cost means nothing, or ""."""
+    grid = solution.trajectory.grid
+    rows = [
+        ("status", str(solution.status)),
+        ("message", solution.message),
+        ("cost", f"{solution.cost:.10g}{_caveat(solution)}"),
+        *([("!", coarse)] if coarse else []),
+        ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
+        ("nit", f"{solution.nit}"),
+        ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
+        ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
+    ]
+    if len(solution.minima) > 1:
+        costs = [f"{cost:.6g}" for cost in solution.minima]
+        more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
+        rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
+    return rows
+
+
+def _caveat(solution: Solution) -> str:
+    """What the cost of an infeasible answer belongs to."""
+    unfit = solution.status == Status.INFEASIBLE
+    return " of the motion below, which is no answer" if unfit else ""
+
+
+def _intervals(solution: Solution, task: Task) -> str:
+    taken = solution.trajectory.grid.intervals
+    if task.tolerance is not None:
+        return f"{taken} intervals{steps_in_words(solution.trajectory.grid)}"
+    asked = "" if taken == task.intervals else f" ({task.intervals} asked for)"
+    return f"{taken} intervals{asked}"
+
+
+def _room_table(extremes: Peaks, room: Closeness) -> Table:
+    """The extremes of each output that is limited, each with what is left to its limit."""
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("joint", overflow="fold")
+    values = {
+        "q": [_range(*ends) for ends in zip(extremes.q_low, extremes.q_high, strict=True)],
+        "v": [_short(each) for each in extremes.v],
+        "a": [_short(each) for each in extremes.a],
+        "tau": [_short(each) for each in extremes.tau],
+    }
+    shown = [kind for kind in values if kind != "a" or room.is_limited("a")]
+    for kind in shown:
+        table.add_column(kind if kind == "q" else f"|{kind}|", justify="right")
+        table.add_column("room", justify="right")
+    for i, name in enumerate(extremes.shown):
+        cells = [(values[kind][i], room.in_words(kind, i)) for kind in shown]
+        table.add_row(name, *(cell for pair in cells for cell in pair))
+    return table
+
+
+def _room_note(room: Closeness) -> str:
+    note = "room: what is left to the nearest limit, in percent of the range; * at a limit"
+    return note + (", ! beyond one." if room.exceeded else ".")
+
+
+def _peaks_table(extremes: Peaks) -> Table:
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("joint", overflow="fold")
+    for column in ("q", "limits", "|v|", "limit", "|tau|", "limit"):
+        table.add_column(column, justify="right")
+    beyond = {
+        key: ["!" if each else "" for each in flags] for key, flags in extremes.beyond().items()
+    }
+    for i, name in enumerate(extremes.shown):
+        table.add_row(
+            name,
+            beyond["q"][i] + _range(extremes.q_low[i], extremes.q_high[i]),
+            _range(extremes.lower[i], extremes.upper[i]),
+            beyond["v"][i] + _short(extremes.v[i]),
+            _short(extremes.v_limit[i]),
+            beyond["tau"][i] + _short(extremes.tau[i]),
+            _short(extremes.tau_limit[i]),
+        )
+    return table
+
+
+def _peaks_json(extremes: Peaks) -> dict[str, dict[str, Any]]:
+    beyond = extremes.beyond()
+    return {
+        name: {
+            "q": [float(extremes.q_low[i]), float(extremes.q_high[i])],
+            "v": float(extremes.v[i]),
+            "tau": float(extremes.tau[i]),
+            "beyond": [key for key, flags in beyond.items() if flags[i]],
+        }
+        for i, name in enumerate(extremes.names)
+    }
+
+
+def _range(low: float, high: float) -> str:
+    """A range in little room; nothing where neither end is known."""
+    if math.isinf(low) and math.isinf(high):
+        return "-"
+    if low == -high:
+        return f"+-{_short(high)}"
+    return f"{_short(low)} .. {_short(high)}"
+
+
+def _short(number: float) -> str:
+    if not math.isfinite(number):
+        return "-"
+    return f"{number:.3g}" if abs(number) < 100 else f"{number:.4g}"

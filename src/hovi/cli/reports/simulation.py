@@ -1,0 +1,84 @@
+"""What a simulation ends in, joint by joint, and which position limits it passes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.table import Table
+
+from hovi.discrete.motion_error import sliding_coordinates
+from hovi.planning.problem.limits import urdf_limits
+from hovi.viewing.unwrapped_angles import shown_names, unwrapped
+
+if TYPE_CHECKING:
+    from hovi.flows.simulator import Simulation
+    from hovi.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Passed:
+    """A position limit of the URDF that a motion passes, and when: limit in unit, t in [s]."""
+
+    joint: str
+    limit: float
+    unit: str
+    t: float
+
+
+def passed_limits(motion: Simulation) -> list[Passed]:
+    """The first limit that each joint is beyond at a node by more than rounding, by time."""
+    robot, found = motion.scene.robot, []
+    limits, units = urdf_limits(robot), units_of(robot)
+    for iq, iv in zip(*robot.space.plain, strict=True):
+        low, high = limits.lower[0, iv], limits.upper[0, iv]
+        q = motion.q[:, iq]
+        room = np.minimum(q - low, high - q)
+        beyond = np.flatnonzero(room < -limits.tolerance * limits.ranges[0, iv])
+        if beyond.size:
+            k = beyond[0]
+            limit = float(low if q[k] < low else high)
+            name = robot.coordinate_names[iv]
+            found.append(Passed(name, limit, units[iv], float(motion.t[k])))
+    return sorted(found, key=lambda each: each.t)
+
+
+def limits_sentence(passed: list[Passed]) -> str:
+    """One line about the first limit that is passed; the other joints by name."""
+    first, *others = passed
+    also = f", as are those of {', '.join(each.joint for each in others)} later" if others else ""
+    return (
+        f"{first.joint} passes its limit of {first.limit:.4g} {first.unit} at t = {first.t:.4g} s"
+        f"{also}: limits are not simulated"
+    )
+
+
+def units_of(robot: Robot) -> list[str]:
+    """The unit of each coordinate."""
+    return ["m" if slides else "rad" for slides in sliding_coordinates(robot)]
+
+
+def end_state(motion: Simulation) -> list[dict[str, Any]]:
+    """A row for each coordinate: joint, q, v and unit at the end, as `unwrapped` shows them."""
+    robot = motion.scene.robot
+    names = shown_names(robot.space, robot.coordinate_names)
+    rows = zip(names, unwrapped(robot.space, motion.q)[-1], motion.v[-1], strict=True)
+    units = units_of(robot)
+    return [
+        {"joint": name, "q": q, "v": v, "unit": unit}
+        for (name, q, v), unit in zip(rows, units, strict=True)
+    ]
+
+
+def end_table(rows: list[dict[str, Any]]) -> Table:
+    """The end state as a table, one joint a line."""
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("at the end", overflow="fold")
+    for column in ("q", "", "v", ""):
+        table.add_column(column, justify="left" if not column else "right")
+    for row in rows:
+        unit = row["unit"]
+        table.add_row(row["joint"], f"{row['q']:.4g}", unit, f"{row['v']:.4g}", f"{unit}/s")
+    return table

@@ -1,0 +1,85 @@
+"""The text of `hovi info SCENE.toml`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hovi.discrete.state import State
+    from hovi.planning.problem.frame_goal import FrameGoal
+    from hovi.planning.task_file.task import Task
+    from hovi.robot.robot import Robot
+
+
+def describe_task(task: Task) -> str:
+    """The ends, the scheme, the scene and the robot of a task."""
+    robot = task.scene.robot
+    how = f"{task.scheme} on {task.intervals} intervals"
+    if task.tolerance is not None:
+        how = f"tolerance {task.tolerance}"
+    lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
+    lines.append(f"starts {task.starts}, seed {task.seed}, limits {_limits(task)}")
+    if task.clearance.wanted:
+        lines.append(f"keeps {task.clearance.margin:g} m from {_kept_from(task)}")
+    lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)
+    for via in task.via:
+        lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
+    return "\n".join([*lines, "", task.scene.describe(), "", robot.describe()])
+
+
+def _duration(task: Task) -> str:
+    """How long the motion takes, in words."""
+    if isinstance(task.duration, tuple):
+        low, high = task.duration
+        return f"{low:g} to {high:g} s, {task.time_weight:g} per second"
+    return f"{task.duration:g} s"
+
+
+def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
+    """What is asked of an end of the motion, a line each."""
+    from hovi.planning.problem.frame_goal import FrameGoal
+
+    if isinstance(goal, FrameGoal):
+        return [f"{name}: frame {goal.frame!r}", *_frame_parts(goal)]
+    q, v = goal.on(robot, name)
+    lines = [f"{name} q = {_numbers(q)}", f"{name} v = {_numbers(v)}"]
+    for key in ("free", "free_velocity"):
+        if getattr(goal, key):
+            lines.append(f"{name} {key} = {', '.join(getattr(goal, key))}")
+    return lines
+
+
+def _frame_parts(goal: FrameGoal) -> list[str]:
+    parts = []
+    if goal.position is not None:
+        parts.append(f"  position {_numbers(np.asarray(goal.position))} m")
+    if goal.rotation is not None:
+        parts += [f"  rotation {_numbers(row)}" for row in np.asarray(goal.rotation)]
+    if goal.axis is not None:
+        inner, world = (_numbers(np.asarray(each)) for each in goal.axis)
+        parts.append(f"  its axis {inner} along {world}")
+    return parts
+
+
+def _kept_from(task: Task) -> str:
+    names = [repr(each.name) for each in task.clearance.obstacles]
+    return ", ".join(names + (["itself"] if task.clearance.self_collision else []))
+
+
+def _limits(task: Task) -> str:
+    from hovi.planning.problem.limits import Limits
+
+    if isinstance(task.limits, str):
+        return task.limits
+    if isinstance(task.limits, Limits):
+        return "given"
+    base = task.limits.get("base", "urdf")
+    given = [f"{key} = {value}" for key, value in task.limits.items() if key != "base"]
+    return "; ".join([base, *given])
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return "[" + ", ".join(f"{each:.6g}" for each in values) + "]"

@@ -1,0 +1,1 @@
+"""A motion on a grid: nodes, discrete action, interpolant, file."""

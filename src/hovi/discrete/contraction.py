@@ -1,0 +1,35 @@
+"""Derivatives at points, contracted with a scheme's table into those of the intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _packed
+
+Array = npt.NDArray[np.float64]
+
+
+def contract(
+    table: Array, weights: Array, steps: Array, gradient: Array, hessian: Array
+) -> tuple[Array, Array]:
+    """Gradient and Hessian of sum_q h w_q L(A_q x) in the m columns x of every interval.
+
+    A_q = table_q / (1, h, h^2) gives (q, v, a) at a point: with the derivatives of L there, the
+    sums of h w_q A_q^T g_q and of h w_q A_q^T H_q A_q.
+
+    table: shape (Q, 3, m). weights: w, shape (Q,). steps: h of the intervals, shape (B,).
+    gradient: of L at the B Q points, 3 n numbers each. hessian: symmetric, (3 n)^2 numbers each.
+    Returns gradient (B, m, n) and hessian (B, m, m, n, n).
+    """
+    Q, _, m = table.shape
+    P = len(steps) * Q
+    g = np.ascontiguousarray(gradient.reshape(P, -1))
+    n = g.shape[1] // 3
+    H = np.ascontiguousarray(hessian.reshape(P, 3 * n, 3 * n))
+    columns_gradient = np.empty((len(steps), m, n))
+    columns_hessian = np.empty((len(steps), m, m, n, n))
+    _packed.contract(
+        np.ascontiguousarray(table), weights, steps, g, H, columns_gradient, columns_hessian
+    )
+    return columns_gradient, columns_hessian

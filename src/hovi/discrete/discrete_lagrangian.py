@@ -1,0 +1,333 @@
+"""The discrete Lagrangian L_d on TQ x TQ: the action over one interval, by a scheme's table.
+
+Everything here is linear algebra on top of the pointwise Lagrangian, so nothing is derived,
+differentiated or compiled again when the scheme, the step or the number of intervals changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.contraction import contract
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
+from hovi.discrete.interval_charts import IntervalCharts
+from hovi.robot.space.chart import Chart
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.scene.lagrangian import EffortLagrangian, Lagrangian, PointTerms
+from hovi.scene.squared_effort import predict
+from hovi.schemes.scheme import regular_from_nodal
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
+
+    Columns are (q0, h v0, q1, h v1, c) when nodal, (q0, h v0, Z0, Z1, c) when regular, with m of
+    them; inner modes that an interval does not have are zero.
+
+    values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
+    torque, jacobian: tau and d tau / d(q, v, a) at the quadrature points for an effort
+        Lagrangian, one pair per batch, for lifted Newton steps.
+    charts: those of the intervals, one per batch, where configurations are not vectors.
+    """
+
+    values: Array
+    gradient: Array
+    hessian: Array
+    torque: list[tuple[Array, Array]]
+    charts: list[IntervalCharts] | None = None
+
+    @property
+    def action(self) -> float:
+        """The discrete action, the sum of all L_d."""
+        return float(np.sum(self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class DiscreteLagrangian:
+    """L_d = h sum_j w_j L(q_j, v_j, a_j) on every interval of a grid.
+
+    [ColomboFerraroMartin2016, sections 3 and 5]
+
+    lagrangian: L on T^(2)Q.
+    grid: the intervals and their schemes.
+    """
+
+    lagrangian: Lagrangian
+    grid: Grid
+
+    @cached_property
+    def chart(self) -> Chart | None:
+        """The chart of the intervals; None where tangent vectors are added to configurations."""
+        space = self.lagrangian.space
+        return None if space is None or space.flat else Chart(space)
+
+    def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
+        """L_d of every interval, shape (N,).
+
+        jets: what `jets` gave for this path, where it is known already.
+        """
+        values = np.empty(self.grid.intervals)
+        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
+            values[batch.index] = batch.sums(self.lagrangian.value(*jet, t=batch.t))
+        return values
+
+    def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
+        """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
+        triples = zip(self._batches, jets or self.jets(path), self.point_weights, strict=True)
+        value = self.lagrangian.value
+        return sum(float(weights @ value(*jet, t=batch.t)) for batch, jet, weights in triples)
+
+    def expand(
+        self,
+        path: DiscretePath,
+        coordinates: Coordinates = "nodal",
+        multipliers: list[Array] | None = None,
+        terms: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
+    ) -> Expansion:
+        """Value, gradient and Hessian of every L_d: see Expansion.
+
+        multipliers: weights of the curvature of tau, one array per batch, as `predict` gives
+            them; the torque itself when None.
+        terms: what limits add at the points, one per batch; the values stay those of L_d.
+        jets: as for `values`.
+        """
+        parts = []
+        known = jets or self.jets(path)
+        charts = self._charts(path)
+        for i, batch in enumerate(self._batches):
+            multiplier = None if multipliers is None else multipliers[i]
+            term = None if terms is None else terms[i]
+            value, point_gradient, point_hessian, torque = self._evaluate(
+                batch, known[i], multiplier, term
+            )
+            if charts is not None:
+                gradient, hessian = charts[i].expand(point_gradient, point_hessian)
+                parts.append(Expansion(value, gradient, hessian, torque, [charts[i]]))
+                continue
+            table = batch.tables[coordinates]
+            gradient, hessian = contract(
+                table, batch.scheme.weights, batch.h, point_gradient, point_hessian
+            )
+            parts.append(Expansion(value, gradient, hessian, torque))
+        return parts[0] if len(parts) == 1 else self._joined(parts)
+
+    def gradient(
+        self,
+        path: DiscretePath,
+        coordinates: Coordinates = "nodal",
+        jets: list[Jet] | None = None,
+    ) -> Array:
+        """The gradient of every L_d in the columns of the coordinates, shape (N, m, n).
+
+        jets: as for `values`.
+        """
+        m = 4 + self.grid.inner_modes
+        gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
+        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
+            point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
+            if self.chart is None:
+                part = batch.contracted(point_gradient, coordinates)
+            else:
+                part = _charts_on(self.chart, batch, path).nodal_gradient(point_gradient)
+            gradient[batch.index, : part.shape[1]] = part
+        return gradient
+
+    def _joined(self, parts: list[Expansion]) -> Expansion:
+        """The expansion of all intervals from those of the batches."""
+        N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv
+        values = np.empty(N)
+        gradient = np.zeros((N, m, n))
+        hessian = np.zeros((N, m, m, n, n))
+        for batch, part in zip(self._batches, parts, strict=True):
+            k = part.gradient.shape[1]
+            values[batch.index] = part.values
+            gradient[batch.index, :k] = part.gradient
+            hessian[batch.index, :k, :k] = part.hessian
+        torque = [tau_J for part in parts for tau_J in part.torque]
+        charts = [each for part in parts for each in part.charts or ()] or None
+        return Expansion(values, gradient, hessian, torque, charts)
+
+    def predict(
+        self, expansion: Expansion, step: Array, coordinates: Coordinates
+    ) -> list[Array] | None:
+        """R (tau + J dx) at the quadrature points after a step: multipliers for `expand`.
+
+        step: in the intervals' scaled coordinates, shape (N, m, n).
+        """
+        if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
+            return None
+        steps = self.point_steps(step, coordinates, expansion)
+        weight = self.lagrangian.weight
+        pairs = zip(expansion.torque, steps, strict=True)
+        return [predict(tau, weight, J, dx) for (tau, J), dx in pairs]
+
+    def point_steps(
+        self, step: Array, coordinates: Coordinates, expansion: Expansion
+    ) -> list[Array]:
+        """Change of (q, v, a) at the quadrature points in a step, (P, 3 n) per batch.
+
+        expansion: at the path from which the step is taken.
+        """
+        steps = []
+        for i, batch in enumerate(self._batches):
+            columns = step[batch.index, : 4 + batch.scheme.inner_modes]
+            if expansion.charts is not None:
+                moved = expansion.charts[i].point_steps(columns)
+            else:
+                moved = np.matmul(batch.step_tables[coordinates], columns)  # (B, 3 Q, n)
+            steps.append(moved.reshape(len(batch.t), -1))
+        return steps
+
+    def jets(self, path: DiscretePath) -> list[Jet]:
+        """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
+        return [self._jet(batch, path) for batch in self._batches]
+
+    def turns(self, path: DiscretePath) -> Array:
+        """The largest turn of an orientation in the chart of every interval, shape (N,), in [rad].
+
+        At its quadrature points and its end; zero where there are no charts.
+        """
+        turns = np.zeros(self.grid.intervals)
+        for batch, charts in zip(self._batches, self._charts(path) or (), strict=False):
+            turns[batch.index] = charts.turns
+        return turns
+
+    @cached_property
+    def point_weights(self) -> list[Array]:
+        """h w_j of every quadrature point, shape (P,), per batch."""
+        return [batch.weights.ravel() for batch in self._batches]
+
+    @cached_property
+    def point_times(self) -> list[Array]:
+        """Time of every quadrature point, shape (P,), per batch."""
+        return [batch.t for batch in self._batches]
+
+    @cached_property
+    def point_intervals(self) -> list[Index]:
+        """Number of the interval of every quadrature point, shape (P,), per batch."""
+        numbers = np.arange(self.grid.intervals)
+        return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self._batches]
+
+    def momenta(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
+        """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
+
+        p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k (F-), and
+        p_N = D3 L_d, p~_N = D4 L_d of the last (F+). [ColomboFerraroMartin2016, section 3, with F+
+        and F- the other way round, as the paper's later text uses them]
+        forces: as for `derivatives`.
+        """
+        g = self.derivatives(path, forces)
+        return np.concatenate([-g[:, :2], g[-1:, 2:]])
+
+    def derivatives(
+        self,
+        path: DiscretePath,
+        forces: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
+    ) -> Array:
+        """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
+
+        At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
+        forces: multipliers of limits and of torques that vanish, whose work belongs to L_d.
+        jets: as for `values`.
+        """
+        N, n = self.grid.intervals, self.lagrangian.nv
+        g = np.empty((N, 4, n))
+        gradients = self.point_gradients(path, forces, jets)
+        for batch, gradient in zip(self._batches, gradients, strict=True):
+            if self.chart is not None:
+                g[batch.index] = _charts_on(self.chart, batch, path).end_gradient(gradient)
+                continue
+            regular = batch.contracted(gradient, "regular")
+            g[batch.index] = regular[:, :4]
+        return np.asarray(np.matmul(self._end_columns, g))
+
+    @cached_property
+    def _end_columns(self) -> Array:
+        """What makes D1 .. D4 of the derivatives in an interval's first four columns, (N, 4, 4)."""
+        scales = self.grid.steps[:, None] ** [0, 1, 0, 1]
+        nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0).T
+        return np.asarray(scales[:, :, None] * nodal)
+
+    def point_gradients(
+        self,
+        path: DiscretePath,
+        forces: list[PointTerms] | None = None,
+        jets: list[Jet] | None = None,
+    ) -> list[Array]:
+        """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
+        gradients = []
+        known = jets or self.jets(path)
+        for i, (batch, jet) in enumerate(zip(self._batches, known, strict=True)):
+            if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
+                gradients.append(self.lagrangian.gradient(*jet, t=batch.t, terms=forces[i]))
+            else:
+                gradients.append(self.lagrangian.gradient(*jet, t=batch.t))
+        return gradients
+
+    def duration_derivative(
+        self, path: DiscretePath, forces: list[PointTerms] | None = None
+    ) -> float:
+        """d S / d T of a stationary action S, the nodes' q and v and the steps' proportions fixed.
+
+        T dS/dT = S - sum h w (dL/dv . v + 2 dL/da . a) + sum (D2 L_d . v0 + D4 L_d . v1), for L
+        that does not depend on time; it is minus Pontryagin's Hamiltonian.
+        """
+        total = self.action(path)
+        gradients = self.point_gradients(path, forces)
+        for jet, g, w in zip(self.jets(path), gradients, self.point_weights, strict=True):
+            total -= float(w @ (np.vecdot(g[:, 1], jet[1]) + 2 * np.vecdot(g[:, 2], jet[2])))
+        d = self.derivatives(path, forces)
+        total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
+        return total / self.grid.duration
+
+    def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
+        """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""
+        space = self.lagrangian.space
+        return batch.jet(path) if space is None else _jet_on(space, batch, path)
+
+    def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
+        if self.chart is None:
+            return None
+        return [_charts_on(self.chart, batch, path) for batch in self._batches]
+
+    @cached_property
+    def _batches(self) -> list[IntervalBatch]:
+        return list(interval_batches(self.grid))
+
+    def _evaluate(
+        self, batch: IntervalBatch, jet: Jet, multiplier: Array | None, terms: PointTerms | None
+    ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
+        """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
+        if isinstance(self.lagrangian, EffortLagrangian):
+            value, gradient, hessian, tau, J = self.lagrangian.expand(
+                *jet, t=batch.t, multiplier=multiplier, terms=terms
+            )
+            torque = [(tau, J)]
+        else:
+            value, gradient, hessian = self.lagrangian.evaluate(*jet, t=batch.t)
+            torque = []
+        return batch.sums(value), gradient, hessian, torque
+
+
+def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
+    """As `IntervalBatch.jet`, in the charts q = q0 (+) x."""
+    return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
+
+
+def _charts_on(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
+    """The charts of a batch's intervals."""
+    h = batch.h[:, None, None]
+    v0, z = path.v[:-1][batch.index], path.z[batch.index]
+    ends = h * v0[:, None] + h**2 * z
+    return IntervalCharts(chart, batch.scheme, batch.h, batch.local(path), ends)

@@ -1,0 +1,309 @@
+"""First guesses of a motion: curves between the boundary data, put on a grid."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_paths import misfit
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import ChartError, InputError, nearest
+from hovi.robot.robot import Robot
+from hovi.schemes.polynomials import interval_rows
+
+Array = npt.NDArray[np.float64]
+Boundary = tuple[Array, Array, Array, Array]
+"""(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
+
+MISFIT = 1e-6
+"""Largest gap, relative to q, between the z of a path that is handed in and that of its q and v."""
+QUADRATURE = 8
+"""Points by which the turns of continuous joints within an interval are told."""
+WIDEST = 0.9 * np.pi
+"""Turn of an orientation within an interval that a guess may make, in [rad]."""
+BUMP_MODES = 8
+BUMP_AMPLITUDES = (0.2, 1.5)
+"""Range of a random bump's amplitude, in [rad] or [m]."""
+
+
+class Curve(Protocol):
+    """q, v and a at times t of shape (M,), as arrays of shape (M, n)."""
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """The curve at t."""
+
+
+def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The cubic through both ends, x(t) of q0 (+) x: the least motion in the sense of 1/2 |x''|^2.
+
+    boundary: (q0, v0, q1, v1). duration: T, in [s].
+    """
+    q0, v0, q1, v1 = boundary
+    T = duration
+    x1 = robot.difference(q0, q1)
+    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
+    local = np.stack([T * v0, x1 - T * v0, T * (dx1 - v0)])  # h v0, Z0, Z1
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
+        return _in_chart(robot, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
+
+    return curve
+
+
+def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The quintic through both ends whose x'' vanish there; arguments as for `cubic`."""
+    q0, v0, q1, v1 = boundary
+    T = duration
+    x1 = robot.difference(q0, q1)
+    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
+    power = np.arange(6)[:, None]
+    conditions = np.zeros((6, 6))
+    for row, (s, derivative) in enumerate([(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]):
+        for j in range(derivative, 6):
+            conditions[row, j] = np.prod(range(j - derivative + 1, j + 1)) * float(s) ** (
+                j - derivative
+            )
+    zero = np.zeros(robot.nv)
+    ends = np.stack([zero, T * v0, zero, x1, T * dx1, zero])
+    c = np.linalg.solve(conditions, ends)  # (6, n)
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        s = (t / T)[None]
+        x = (s**power).T @ c
+        dx = (power[1:] * s ** power[:-1]).T @ c[1:]
+        ddx = (power[2:] * power[1:-1] * s ** power[:-2]).T @ c[2:]
+        return _in_chart(robot, q0, x, dx / T, ddx / T**2)
+
+    return curve
+
+
+def _in_chart(
+    robot: Robot, q0: Array, x: Array, dx: Array, ddx: Array
+) -> tuple[Array, Array, Array]:
+    """The jet of q0 (+) x(t)."""
+    return robot.chart.jet(np.broadcast_to(q0, (len(x), robot.nq)), x, dx, ddx)
+
+
+def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
+    """A curve with a smooth random bump, zero with its rate at both ends.
+
+    x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed, falling
+    like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
+
+    base: the curve. duration: T, in [s]. seed: of the coefficients.
+    """
+    random = np.random.default_rng(seed)
+    j = np.arange(1, BUMP_MODES + 1)
+    amplitude = random.uniform(*BUMP_AMPLITUDES)
+    c = amplitude * random.standard_normal((BUMP_MODES, robot.nv)) / np.sqrt(j)[:, None]
+    w = np.pi / duration
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        q, v, a = base(t)
+        # sin(s) sin(j s) = (cos((j-1) s) - cos((j+1) s)) / 2
+        low, high = np.outer(t, j - 1) * w, np.outer(t, j + 1) * w
+        x = (np.cos(low) - np.cos(high)) / 2
+        dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
+        ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
+        return robot.chart.carried((q, v, a), x @ c, dx @ c, ddx @ c)
+
+    return curve
+
+
+def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curve:
+    """A curve with full turns more, spread over the whole time by a cubic at rest at both ends.
+
+    turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `full_turns`.
+    duration: T, in [s].
+    """
+    angle = 2 * np.pi * turns
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        s = np.asarray(t)[:, None] / duration
+        x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
+        return robot.chart.carried(base(t), _wound(robot, x * angle), dx * angle, ddx * angle)
+
+    return curve
+
+
+def _wound(robot: Robot, x: Array) -> Array:
+    """Rotation vectors (M, nv) less those full turns, two at a time, after which exp repeats.
+
+    A chart's rates are exact up to 2 pi, and a quaternion returns to itself after 4 pi only. About
+    an axis that stays J(x) x' = x', so that the rates of x are those of what is left of it.
+    """
+    left = x.copy()
+    for factor in robot.space.curved:
+        axes = [factor.v.start + i for i in factor.group.angular]
+        size = np.linalg.norm(x[:, axes], axis=1, keepdims=True)
+        full = 4 * np.pi * np.round(size / (4 * np.pi))
+        left[:, axes] *= 1 - full / np.where(size > 0, size, 1.0)
+    return left
+
+
+NAMED: dict[str, Callable[[Robot, Boundary, float], Curve]] = {
+    "cubic": cubic,
+    "minimum-jerk": minimum_jerk,
+}
+"""Guesses that a file or the command line can name."""
+
+
+def named_curve(name: str, robot: Robot, boundary: Boundary, duration: float) -> Curve:
+    """The guess called `name`. Raises InputError for an unknown name."""
+    if name not in NAMED:
+        raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
+    return NAMED[name](robot, boundary, duration)
+
+
+def stretched(trajectory: Trajectory, duration: float) -> Curve:
+    """A motion as a curve over another duration."""
+    stretch = trajectory.duration / duration
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        q, v, a = trajectory.jet(np.clip(t * stretch, 0.0, trajectory.duration))
+        return q, v * stretch, a * stretch**2
+
+    return curve
+
+
+def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+    """The curve on a grid: its nodes, and its acceleration projected on the inner modes.
+
+    The ends are the boundary data to the last bit.
+    """
+    q, v, _ = (x.copy() for x in curve(grid.t))
+    q[0], v[0], q[-1], v[-1] = boundary
+    turned = None if robot.vector_joints else _turned(curve, grid, robot)
+    inner = _inner_modes(curve, grid, robot, q)
+    return DiscretePath(q, v, regularized(robot, grid, q, v, turned), inner)
+
+
+def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
+    """Raise InputError for a path that does not fit a grid and a robot, or not itself."""
+    N, r, n = grid.intervals, grid.inner_modes, robot.nv
+    shapes = {"q": (N + 1, robot.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
+    fits = [array.shape for array in path.arrays] == list(shapes.values())
+    if fits and robot.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT:
+        return
+    for name, shape in shapes.items():
+        array = getattr(path, name)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise InputError(
+                f"the guess's {name} must be finite and of shape {shape}, got {array.shape}; hand "
+                "in a Trajectory to change grids."
+            )
+    h = grid.steps[:, None]
+    turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
+    gap = (regularized(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
+    if np.abs(gap).max() > MISFIT * max(1.0, np.abs(path.q).max()):
+        raise InputError(
+            "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
+            "where configurations are vectors."
+        )
+
+
+def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+    """A path plus the cubic that carries its ends to other boundary data."""
+    q0, v0, q1, v1 = boundary
+    old = path.q[0], path.v[0], path.q[-1], path.v[-1]
+    if [x.tolist() for x in old] == [x.tolist() for x in boundary]:
+        return path
+    dq0, dq1 = robot.difference(old[0], q0), robot.difference(old[2], q1)
+    ends = np.stack([dq0, v0 - old[1], dq1, v1 - old[3]])  # (4, n)
+    T, s = grid.duration, grid.t / grid.duration
+    local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
+    dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each
+    h = (grid.steps / T)[:, None]
+    # of a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
+    jerk = np.diff(TTda, axis=0) / h
+    z = np.stack([TTda[:-1] / 2 + h * jerk / 6, TTda[:-1] + h * jerk / 2], axis=1) / T**2
+    q = robot.integrate(path.q, ends[0] + dq)
+    q[0], q[-1] = q0, q1
+    v = path.v + Tdv / T
+    v[0], v[-1] = v0, v1
+    return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, robot)
+
+
+def regularized(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | None = None) -> Array:
+    """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
+
+    x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 where tangent vectors add.
+    turned: about how far joints turn in each interval, shape (N, nv); less than half a turn when
+        None.
+    """
+    h = grid.steps[:, None]
+    dx1 = v[1:]
+    if turned is None:
+        x1 = robot.difference(q[:-1], q[1:])
+    else:
+        x1 = robot.space.difference_near(q[:-1], q[1:], turned)
+    if not robot.space.flat:
+        dx1 = robot.chart.rates(x1, dx1)[0]
+    return np.stack([(x1 - h * v[:-1]) / h**2, (dx1 - v[:-1]) / h], axis=1)
+
+
+def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> DiscretePath:
+    """A path whose z follows its nodes where tangent vectors do not add, and is kept elsewhere."""
+    if robot.space.flat:
+        return path
+    h = grid.steps[:, None]
+    turned = h * path.v[:-1] + h**2 * path.z[:, 0]
+    z, known = path.z.copy(), regularized(robot, grid, path.q, path.v, turned)
+    for factor in robot.space.curved:
+        z[:, :, factor.v] = known[:, :, factor.v]
+    return DiscretePath(path.q, path.v, z, path.inner)
+
+
+def _turned(curve: Curve, grid: Grid, robot: Robot) -> Array:
+    """The integral of v over every interval, by Gauss quadrature, shape (N, nv).
+
+    Raises ChartError where an orientation turns by half a turn or nearly so in an interval.
+    """
+    x, w = np.polynomial.legendre.leggauss(QUADRATURE)
+    t = grid.t[:-1, None] + grid.steps[:, None] * (x + 1) / 2
+    v = curve(t.ravel())[1].reshape(grid.intervals, QUADRATURE, -1)
+    for factor in robot.space.curved:
+        speed = np.linalg.norm(v[:, :, [factor.v.start + i for i in factor.group.angular]], axis=2)
+        turn = grid.steps * (speed @ (w / 2))  # (N,)
+        if turn.max() > WIDEST:
+            raise ChartError(
+                f"the guess turns joint {robot.joint_at(factor.v.start)!r} by {turn.max():.3g} rad "
+                f"within an interval, and a chart holds up to {WIDEST:.3g}: take more intervals, "
+                f"{int(np.ceil(grid.intervals * turn.max() / WIDEST))} or more."
+            )
+    return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
+
+
+def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
+    """c_j = integral of b_j x'' over the interval, by Gauss quadrature, shape (N, r, n).
+
+    nodes: configurations, shape (N + 1, nq).
+    """
+    n = robot.nv
+    inner = np.zeros((grid.intervals, grid.inner_modes, n))
+    for scheme, index in grid.groups:
+        r = scheme.inner_modes
+        if r == 0:
+            continue
+        s, projection = _projection(r)
+        t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
+        q, v, a = curve(t.ravel())
+        if not robot.space.flat:
+            local = robot.difference(np.repeat(nodes[:-1][index], len(s), axis=0), q)
+            a = robot.chart.rates(local, v, a)[1]
+        inner[index, :r] = np.matmul(projection, a.reshape(len(index), len(s), n))
+    return inner
+
+
+@functools.cache
+def _projection(inner_modes: int) -> tuple[Array, Array]:
+    """Gauss points of [0, 1], (Q,), and what projects values there on the inner modes, (r, Q)."""
+    x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
+    s = (x + 1) / 2
+    return s, np.ascontiguousarray((interval_rows(s, inner_modes)[:, 2, 3:] * (w / 2)[:, None]).T)

@@ -1,0 +1,105 @@
+"""Intervals of one scheme, evaluated together: what their quadrature points see of a path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_paths import interpolate
+from hovi.schemes import Scheme
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Jet = tuple[Array, Array, Array]
+"""(q, v, a) at points, each of shape (P, n)."""
+Coordinates = Literal["nodal", "regular"]
+COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
+
+CHUNK = 4096
+"""Intervals that are evaluated at a time, so that memory stays bounded."""
+
+
+@dataclass(frozen=True, eq=False)
+class IntervalBatch:
+    """Intervals of one scheme, evaluated together.
+
+    numbers: of the intervals, shape (B,). index: the same, as a slice where they follow each other.
+    h: their lengths, shape (B,), in [s]. t: times of the points, shape (B Q,), in [s].
+    """
+
+    scheme: Scheme
+    numbers: Index
+    index: Index | slice
+    h: Array
+    t: Array
+
+    @cached_property
+    def tables(self) -> dict[Coordinates, Array]:
+        """The scheme's table for both kinds of columns, (Q, 3, m)."""
+        return {"nodal": self.scheme.nodal_table, "regular": self.scheme.regular_table}
+
+    @cached_property
+    def row_weights(self) -> Array:
+        """h w_j / (1, h, h^2) per point and derivative, (B, Q, 3)."""
+        powers = self.h[:, None] ** -np.arange(3)  # (B, 3)
+        return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
+
+    @cached_property
+    def weights(self) -> Array:
+        """h w_j per point, (B, Q)."""
+        return self.h[:, None] * self.scheme.weights
+
+    def sums(self, values: Array) -> Array:
+        """h sum_j w_j L_j of every interval from L at the points, (B,)."""
+        return np.asarray(np.vecdot(values.reshape(self.weights.shape), self.weights))
+
+    @cached_property
+    def step_tables(self) -> dict[Coordinates, Array]:
+        """(q, v, a) at the points over the columns of both coordinates, (B or 1, 3 Q, m)."""
+        h = self.h[:1] if np.ptp(self.h) == 0 else self.h
+        powers = h[:, None, None, None] ** -np.arange(3.0)[:, None]
+        rows = 3 * len(self.scheme.weights)
+        return {
+            name: (table * powers).reshape(len(powers), rows, -1)
+            for name, table in self.tables.items()
+        }
+
+    def jet(self, path: DiscretePath) -> Jet:
+        """(q, v, a) at the quadrature points, each of shape (B * Q, n).
+
+        The chart of an interval is the identity: q = q0 + x.
+        """
+        q, v, a = interpolate(self.scheme.table, self.h, self.numbers, path.arrays)
+        return q, v, a
+
+    def local(self, path: DiscretePath) -> Array:
+        """(x, x', x'') of q = q0 (+) x at the quadrature points, shape (3, B Q, n)."""
+        still = np.zeros_like(path.v)
+        local = still, path.v, path.z, path.inner
+        return interpolate(self.scheme.table, self.h, self.numbers, local)
+
+    def contracted(self, gradient: Array, coordinates: Coordinates) -> Array:
+        """Gradient of L_d in the columns of the coordinates from that of L, shape (B, m, n)."""
+        Q, _, m = self.tables[coordinates].shape
+        weighted = gradient.reshape(len(self.h), Q, 3, -1) * self.row_weights[..., None]
+        table = self.tables[coordinates].reshape(Q * 3, m)
+        return np.asarray(np.matmul(table.T, weighted.reshape(len(self.h), Q * 3, -1)))
+
+
+def interval_batches(grid: Grid) -> Iterator[IntervalBatch]:
+    """Batches of at most CHUNK intervals, each of one scheme."""
+    t0 = grid.t
+    for scheme, index in grid.groups:
+        for first in range(0, len(index), CHUNK):
+            numbers = index[first : first + CHUNK]
+            alone = len(grid.groups) == 1
+            chosen = slice(first, first + len(numbers)) if alone else numbers
+            h = grid.steps[chosen]
+            t = t0[:-1][chosen][:, None] + h[:, None] * scheme.points
+            yield IntervalBatch(scheme, numbers, chosen, h, t.ravel())

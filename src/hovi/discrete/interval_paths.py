@@ -1,0 +1,52 @@
+"""Paths of intervals: what their quadrature points see, and where steps in their columns lead.
+
+Arrays alone, of any origin; compiled beside what contracts derivatives over the same columns.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _packed
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+PathArrays = tuple[Array, Array, Array, Array]
+"""q (N + 1, n), v (N + 1, n), z (N, 2, n) and inner modes (N, r, n): see DiscretePath."""
+
+
+def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) -> Array:
+    """(q, v, a) at the points of some intervals, where tangent vectors add, shape (3, B Q, n).
+
+    (q - q0, h v, h^2 a) = table (h v0, h^2 z0, h^2 z1, h^2 inner) at every point.
+
+    table: shape (Q, 3, 3 + r), of no more modes than the path. steps: h of the intervals, (B,).
+    intervals: their numbers, shape (B,).
+    """
+    q, v, z, inner = path
+    out = np.empty((3, len(steps) * len(table), v.shape[1]))
+    _packed.interpolate(table, steps, intervals, q, v, z, inner, out)
+    return out
+
+
+def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays:
+    """Change of q in a step, and where it leads v, z and the inner modes.
+
+    step: in the intervals' columns (q0, h v0, q1, h v1, c) when nodal, else (q0, h v0, Z0, Z1, c),
+        which leave the last node where it is; shape (N, 4 + r, n).
+    steps: h, shape (N,).
+    """
+    _, v, z, inner = path
+    after = np.empty_like(v), np.empty_like(v), np.empty_like(z), np.empty_like(inner)
+    _packed.move(step, steps, nodal, v, z, inner, *after)
+    return after
+
+
+def misfit(path: PathArrays, steps: Array) -> float:
+    """By how much z fails to be that of q and v, where tangent vectors add.
+
+    The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q|
+    or to one; not a number where the path has one that is not finite. steps: h, shape (N,).
+    """
+    return _packed.misfit(steps, *path)

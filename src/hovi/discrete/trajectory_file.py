@@ -1,0 +1,194 @@
+"""The container of a trajectory: arrays of doubles and one JSON header in an npz file.
+
+The file is a plain npz that `numpy.load(path, allow_pickle=False)` opens too. It is written
+without compression and with fixed time stamps, so that the same motion gives the same bytes on
+every machine. Reading trusts nothing: sizes are checked before memory is asked for, and no
+pickle is ever decoded.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import TrajectoryFileError
+from hovi.system.bounded_file import require_file
+from hovi.system.files import reason, whole_file
+
+Array = npt.NDArray[np.float64]
+
+FORMAT = "hovi-trajectory"
+VERSION = 1
+MAX_BYTES = 2**30
+MAX_HEADER_BYTES = 2**26
+MAX_HEADER_PARTS = 2_000_000
+"""Lists, tables and their entries: as Python objects they take thirty times their size."""
+MAX_EXPANSION = 50
+"""How much larger an unpacked file may be; doubles that mean something shrink by less."""
+_MARGIN = 2**16  # what zip and npy put around the data
+_HEADER = "header"
+_DOUBLES = np.dtype("<f8")
+_BYTES = np.dtype("u1")
+
+
+def write_arrays(
+    path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, Array]
+) -> None:
+    """Write a header and named arrays to one npz, whole or not at all, the same bytes every time.
+
+    path: the file; an existing one is replaced.
+    header: what JSON can hold.
+    arrays: finite doubles of any shape, by name.
+    Raises TrajectoryFileError.
+    """
+    entries = {_HEADER: _encode_header(header)}
+    if entries[_HEADER].nbytes > MAX_HEADER_BYTES:
+        raise TrajectoryFileError(
+            f"the scene and metadata take {entries[_HEADER].nbytes} bytes, and a trajectory file "
+            f"holds at most {MAX_HEADER_BYTES} of them."
+        )
+    entries |= {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
+    size = sum(entry.nbytes for entry in entries.values())
+    if size > MAX_BYTES:
+        raise TrajectoryFileError(
+            f"this trajectory takes {size} bytes, and a trajectory file holds at most {MAX_BYTES}."
+        )
+    try:
+        with whole_file(path) as stream, zipfile.ZipFile(stream, "w") as archive:
+            for name, entry in entries.items():
+                info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+                info.external_attr = 0o644 << 16
+                info.create_system = 3  # the default differs between Windows and the rest
+                with archive.open(info, "w") as member:
+                    np.lib.format.write_array(member, entry, version=(1, 0), allow_pickle=False)
+    except OSError as error:
+        raise TrajectoryFileError(f"cannot write {str(path)!r}: {reason(error)}.") from error
+
+
+def read_arrays(
+    path: str | os.PathLike[str], names: Iterable[str], optional: Iterable[str] = ()
+) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Read the header and the named arrays of a trajectory file.
+
+    names: the arrays that must be there; optional: those that may be missing.
+    Returns the header and the arrays, doubles and finite, of whatever shape the file says.
+    Raises TrajectoryFileError in one sentence that says what is wrong with the file.
+    """
+    label = f"trajectory file {Path(path).name!r}"
+    try:
+        require_file(path, MAX_BYTES + _MARGIN)
+        with zipfile.ZipFile(path) as archive:
+            members = {info.filename: info for info in archive.infolist()}
+            if len(members) < len(archive.infolist()):
+                raise ValueError("an entry is there twice")
+            wanted = [_HEADER, *names]
+            wanted += [name for name in optional if f"{name}.npy" in members]
+            _check_members(members, wanted, label)
+            _check_expansion(members, wanted, Path(path).stat().st_size, label)
+            raw = {name: archive.read(members[f"{name}.npy"]) for name in wanted}
+    except TrajectoryFileError:
+        raise
+    except FileNotFoundError as error:
+        raise TrajectoryFileError(f"there is no {label}.") from error
+    except OSError as error:
+        raise TrajectoryFileError(f"cannot read {label}: {reason(error)}.") from error
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+        raise TrajectoryFileError(f"{label} is not a whole npz file: {error}.") from error
+    except Exception as error:  # zlib.error and the like: each compression has its own
+        raise TrajectoryFileError(f"{label} is damaged: {error}.") from error
+    header = _decode_header(_decode_array(raw.pop(_HEADER), _BYTES, f"{label}, header"), label)
+    return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
+
+
+def _check_members(members: Mapping[str, zipfile.ZipInfo], names: list[str], label: str) -> None:
+    missing = [name for name in names if f"{name}.npy" not in members]
+    if missing:
+        raise TrajectoryFileError(f"{label} lacks the entry {missing[0]!r}.")
+    header = members[f"{_HEADER}.npy"].file_size
+    size = sum(members[f"{name}.npy"].file_size for name in names)
+    if size > MAX_BYTES + _MARGIN:
+        raise TrajectoryFileError(f"{label} holds {size} bytes, more than the {MAX_BYTES} allowed.")
+    if header > MAX_HEADER_BYTES + _MARGIN:
+        raise TrajectoryFileError(
+            f"{label} has a header of {header} bytes, more than the {MAX_HEADER_BYTES} allowed."
+        )
+
+
+def _check_expansion(
+    members: Mapping[str, zipfile.ZipInfo], names: list[str], packed: int, label: str
+) -> None:
+    size = sum(members[f"{name}.npy"].file_size for name in names)
+    if size > MAX_EXPANSION * packed + 10_000_000:
+        raise TrajectoryFileError(
+            f"{label} has {packed} bytes and would unpack to {size}: no motion shrinks like that."
+        )
+
+
+def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
+    marked = {"format": FORMAT, "version": VERSION, **header}
+    try:
+        text = json.dumps(marked, sort_keys=True, allow_nan=False, separators=(",", ":"))
+    except (TypeError, ValueError) as error:
+        raise TrajectoryFileError(f"the metadata cannot be written as JSON: {error}.") from error
+    return np.frombuffer(text.encode(), np.uint8)
+
+
+def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
+    text = data.tobytes()
+    if sum(map(text.count, (b"[", b"{", b","))) > MAX_HEADER_PARTS:
+        raise TrajectoryFileError(
+            f"{label} has a header of more than {MAX_HEADER_PARTS:,} parts, the most accepted."
+        )
+    try:
+        header = json.loads(text, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
+        raise TrajectoryFileError(f"{label} has a header that is not JSON: {error}.") from error
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise TrajectoryFileError(f"{label} is not a hovi trajectory.")
+    if header.get("version") != VERSION:
+        raise TrajectoryFileError(
+            f"{label} has format version {header.get('version')!r}, and this hovi reads "
+            f"version {VERSION}."
+        )
+    return header
+
+
+def _finite(text: str) -> float:
+    """A number of JSON; Python's reader would take NaN, and 1e999 for infinity."""
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is not a finite number")
+    return number
+
+
+def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[Any]:
+    """One npy entry. numpy.load would allocate what the entry's header claims before looking."""
+    stream = io.BytesIO(raw)
+    try:
+        if np.lib.format.read_magic(stream) != (1, 0):
+            raise ValueError("it is not in npy format 1.0")
+        shape, fortran, found = np.lib.format.read_array_header_1_0(stream)
+    except Exception as error:  # the header is a Python literal: anything can be wrong with it
+        raise TrajectoryFileError(f"{label}: not a readable array: {error}.") from error
+    if found != dtype or fortran:
+        raise TrajectoryFileError(f"{label}: expected {dtype} in C order, the file has {found}.")
+    data = memoryview(raw)[stream.tell() :]
+    if min(shape, default=0) < 0 or len(data) != math.prod(shape) * dtype.itemsize:
+        raise TrajectoryFileError(f"{label}: shape {shape} does not fit its {len(data)} bytes.")
+    return np.frombuffer(data, dtype).reshape(shape)
+
+
+def _decode_doubles(raw: bytes, label: str) -> Array:
+    array = np.array(_decode_array(raw, _DOUBLES, label), dtype=np.float64)
+    if not np.isfinite(array).all():
+        raise TrajectoryFileError(f"{label}: holds numbers that are not finite.")
+    return array

@@ -1,0 +1,1 @@
+"""Joint torques tau(q, v, a, t) of a robot and their exact derivatives."""

@@ -1,0 +1,48 @@
+"""The door to the compiled part: loads it, and hands it models it can read.
+
+`casadi` and `pinocchio` are imported before it, because its shared libraries are theirs and are
+found by name once they are in the process.
+"""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+import casadi  # noqa: F401  (loads libcasadi)
+import pinocchio as pin
+
+from hovi.errors import HoviError
+
+
+class BuildMismatchError(HoviError):
+    """The compiled extension does not fit the libraries that are installed."""
+
+
+try:
+    from hovi._native import _core
+except ImportError as error:
+    raise BuildMismatchError(
+        f"hovi's compiled extension does not load beside pin {pin.__version__} and casadi "
+        f"{version('casadi')} ({error}): reinstall hovi so that it is compiled again."
+    ) from error
+
+__all__ = ["BuildMismatchError", "archive"]
+
+
+def archive(model: pin.Model) -> str:
+    """Pinocchio's text archive of a model, which only the same version of Pinocchio can read.
+
+    Raises BuildMismatchError when the extension was compiled against another version.
+    """
+    check_version(pin.__version__, _core.pinocchio_version)
+    text: str = model.saveToString()
+    return text
+
+
+def check_version(installed: str, compiled: str) -> None:
+    """Raises BuildMismatchError unless both versions of Pinocchio are the same."""
+    if installed != compiled:
+        raise BuildMismatchError(
+            f"hovi was compiled against pin {compiled}, but pin {installed} is installed: run "
+            f"`pip install pin=={compiled}`, or reinstall hovi so that it is compiled again."
+        )

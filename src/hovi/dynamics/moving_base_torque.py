@@ -1,0 +1,112 @@
+"""Joint torques of a robot on a base that moves as prescribed, with Pinocchio's derivatives.
+
+The robot is put on six more joints (three that slide, three that turn), RNEA is evaluated along
+their given motion, and the rows of the robot's own joints are kept.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.dynamics.mimic_kernel import rnea_kernel
+from hovi.dynamics.point_function import PointFunction, default_threads
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.dynamics.torque_model import times
+
+Array = npt.NDArray[np.float64]
+
+_JOINTS = (
+    ("x", pin.JointModelPX),
+    ("y", pin.JointModelPY),
+    ("z", pin.JointModelPZ),
+    ("yaw", pin.JointModelRZ),
+    ("pitch", pin.JointModelRY),
+    ("roll", pin.JointModelRX),
+)
+FREEDOM = len(_JOINTS)
+
+
+def on_base_joints(model: pin.Model) -> pin.Model:
+    """The model on joints x, y, z, yaw, pitch and roll, which come first and have no inertia."""
+    base = pin.Model()
+    parent = 0
+    for name, joint in _JOINTS:
+        parent = base.addJoint(parent, joint(), pin.SE3.Identity(), f"moving base {name}")
+    frame = base.addFrame(
+        pin.Frame("moving base", parent, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
+    )
+    moved = pin.appendModel(base, model, frame, pin.SE3.Identity())
+    moved.gravity.linear = model.gravity.linear
+    moved.armature = np.concatenate([np.zeros(FREEDOM), model.armature])
+    return moved
+
+
+def base_jet(base: ca.SX, t: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Positions, velocities and accelerations of the base's joints at t, each of shape (6,)."""
+    velocity = ca.jtimes(base, t, ca.SX(1))
+    return base, velocity, ca.jtimes(velocity, t, ca.SX(1))
+
+
+def inverse_dynamics(
+    model: pin.Model, base: ca.SX | None, q: ca.SX, v: ca.SX, a: ca.SX, t: ca.SX
+) -> ca.SX:
+    """RNEA of a model on a base that moves, or rests where that is None, shape (nv,)."""
+    if base is None:
+        return casadi_functions(model).inverse_dynamics(q, v, a)
+    jet = zip(base_jet(base, t), (q, v, a), strict=True)
+    moved = casadi_functions(on_base_joints(model)).inverse_dynamics
+    return moved(*(ca.vertcat(*pair) for pair in jet))[FREEDOM:]
+
+
+class MovingBaseTorque:
+    """A TorqueModel: the joints' rows of the kernel on a moving base.
+
+    model: without the base's joints. base: its (x, y, z, yaw, pitch, roll) as expressions of t.
+    compile: whether the base's motion becomes machine code: see PointFunction.
+    """
+
+    def __init__(self, model: pin.Model, base: ca.SX, t: ca.SX, compile: bool = False) -> None:
+        self.kernel = rnea_kernel(on_base_joints(model))
+        self._jet = PointFunction(ca.Function("base", [t], list(base_jet(base, t))), compile)
+        columns = np.arange(3 * (FREEDOM + model.nv)).reshape(3, -1)[:, FREEDOM:]
+        self._columns = columns.ravel()
+        self._threads = default_threads()
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
+        """tau, shape (P, nv)."""
+        return self.kernel.torque(*self._on_base(q, v, a, t))[:, FREEDOM:]
+
+    def linearize(
+        self, q: Array, v: Array, a: Array, t: Array | None = None
+    ) -> tuple[Array, Array]:
+        """tau and its Jacobian."""
+        tau, J = self.kernel.linearize(*self._on_base(q, v, a, t))
+        return tau[:, FREEDOM:], J[:, FREEDOM:, self._columns]
+
+    def expand(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        t: Array | None,
+        R: Array,
+        curvature: Array | None,
+    ) -> tuple[Array, Array, Array]:
+        """tau, J and the Hessian of TorqueModel.expand: the base's rows weigh nothing."""
+        jet = self._on_base(q, v, a, t)
+        if curvature is None:
+            curvature = R * self.kernel.torque(*jet)[:, FREEDOM:]
+        nothing = np.zeros((len(q), FREEDOM))
+        weight = np.concatenate([nothing, np.broadcast_to(R, v.shape)], axis=1)
+        curvature = np.concatenate([nothing, curvature], axis=1)
+        tau, J, H = self.kernel.expand(*jet, weight, curvature, self._threads)
+        kept = self._columns
+        return tau[:, FREEDOM:], J[:, FREEDOM:, kept], H[:, kept[:, None], kept]
+
+    def _on_base(self, q: Array, v: Array, a: Array, t: Array | None) -> tuple[Array, Array, Array]:
+        jets = zip(self._jet(times(t, len(q))), (q, v, a), strict=True)
+        on_base = [np.concatenate(pair, axis=1) for pair in jets]
+        return on_base[0], on_base[1], on_base[2]

@@ -1,0 +1,1 @@
+"""The CasADi expressions and joint-wise numbers that effects are written with."""

@@ -1,0 +1,1 @@
+"""Initial value problems: Legendre transforms, discrete flows, simulation, replay of torques."""

@@ -1,0 +1,168 @@
+"""Do the planned torques move the robot as planned? Asked of SciPy and of Pinocchio's ABA.
+
+Where joints mimic others, which ABA does not know, it is asked of the mass matrix instead: that of
+Pinocchio for the robot with every joint on its own, pulled back by the same G as the planner's
+torques. An error in G would then be in both.
+
+The forward dynamics are integrated under the planned torques by an independent method, from every
+node to the next. That certifies dynamics and torques. It says nothing of optimality: the inverse
+dynamics of any curve reproduce that curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.discrete.motion_error import sliding_coordinates
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import InputError
+from hovi.robot.mass_matrix import MassMatrix
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+RELATIVE, ABSOLUTE = 1e-11, 1e-13
+"""Tolerances of the integration."""
+SAME = 1e-9
+"""Relative difference of torques below which they count as the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicsReplay:
+    """By how much the driven robot misses each node when it starts at the node before.
+
+    q, v: of every joint coordinate, shape (N, nv), in [rad] and [rad/s]; metres for sliding joints.
+    tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
+    sliding: which joint coordinates slide, shape (nv,).
+    """
+
+    q: Array = field(repr=False)
+    v: Array = field(repr=False)
+    tip: Array = field(repr=False)
+    frame: str
+    sliding: npt.NDArray[np.bool_] = field(repr=False)
+
+    @property
+    def angle(self) -> float:
+        """The largest miss of a turning joint, in [rad]."""
+        return float(np.max(self.q[:, ~self.sliding], initial=0.0))
+
+    @property
+    def slide(self) -> float:
+        """The largest miss of a sliding joint, in [m]."""
+        return float(np.max(self.q[:, self.sliding], initial=0.0))
+
+    @property
+    def largest_tip(self) -> float:
+        """The largest miss of the frame, in [m]."""
+        return float(np.max(self.tip))
+
+
+def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> DynamicsReplay:
+    """Drive the robot with the planned torques, all intervals at once, by SciPy's DOP853.
+
+    qdd = ABA(q, v, tau - what effects add to RNEA), with tau of the interpolant at the same times
+    and zero at passive joints; each interval starts at its node, in the chart of that node.
+    frame: whose miss is told, by default the robot's tip_frame.
+    Raises InputError where this cannot be done, with the reason.
+    """
+    from scipy.integrate import solve_ivp  # a quarter of a second, for replays alone
+
+    scene, robot = _scene_of(trajectory)
+    name = robot.tip_frame if frame is None else frame
+    N, n = trajectory.v[:-1].shape
+    h, start = trajectory.grid.steps[:, None], trajectory.q[:-1]
+    forward = _ForwardDynamics(scene, trajectory)
+    k = np.arange(N)
+
+    def rates(s: float, y: Array) -> Array:
+        x, hv = y.reshape(2, N, n)
+        tau = trajectory.sample_intervals(k, np.full(N, s)).tau
+        t = trajectory.t[:-1] + s * trajectory.grid.steps
+        a = forward(robot.integrate(start, x), hv / h, tau, t)
+        return np.concatenate([chart_rates(robot, start, x, hv), h * h * a]).ravel()
+
+    first = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
+    done = solve_ivp(rates, (0.0, 1.0), first, "DOP853", t_eval=[1.0], rtol=RELATIVE, atol=ABSOLUTE)
+    if not done.success or not np.isfinite(done.y).all():
+        raise InputError(f"SciPy's DOP853 did not come to the end of an interval: {done.message}")
+    x, hv = done.y[:, -1].reshape(2, N, n)
+    arrived = robot.integrate(start, x)
+    tips = [robot.frame_position(name, q) for q in (arrived, trajectory.q[1:])]
+    return DynamicsReplay(
+        np.abs(robot.difference(trajectory.q[1:], arrived)),
+        np.abs(hv / h - trajectory.v[1:]),
+        np.linalg.norm(tips[0] - tips[1], axis=1),
+        name,
+        sliding_coordinates(robot),
+    )
+
+
+def chart_rates(robot: Robot, origin: Array, x: Array, v: Array) -> Array:
+    """x' of q = origin (+) x that moves with velocity v: v itself for ordinary joints, (M, nv).
+
+    Elsewhere v = D x' with the derivative D of (+) by x, in the tangent space at q.
+    """
+    if all(joint.nq == joint.nv or joint.nv == 1 for joint in list(robot.model.joints)[1:]):
+        return v
+    rates = np.empty_like(v)
+    for i, (q, dq) in enumerate(zip(origin, x, strict=True)):
+        D = pin.dIntegrate(robot.model, q, dq, pin.ArgumentPosition.ARG1)
+        rates[i] = np.linalg.solve(D, v[i])
+    return rates
+
+
+class _ForwardDynamics:
+    """a(q, v, tau, t) of a scene by Pinocchio's ABA.
+
+    What effects add to RNEA is taken from the torques first; it must not depend on a.
+    """
+
+    def __init__(self, scene: Scene, trajectory: Trajectory) -> None:
+        self.scene = scene
+        self.data = scene.model.createData()
+        self.passive = scene.passive_coordinates
+        self._mass = MassMatrix(scene.model) if scene.robot.couplings else None
+        motion = trajectory.sample_intervals(
+            np.arange(trajectory.grid.intervals), np.full(trajectory.grid.intervals, 0.5)
+        )
+        t = trajectory.t[:-1] + 0.5 * trajectory.grid.steps
+        moving = self._added(motion.q, motion.v, motion.a, t)
+        still = self._added(motion.q, motion.v, np.zeros_like(motion.a), t)
+        size = max(float(np.max(np.abs(motion.tau))), 1e-12)
+        if np.max(np.abs(moving - still)) > SAME * size:
+            raise InputError(
+                "an effect adds torques that depend on the acceleration, which ABA does not know"
+            )
+        self.plain = bool(np.max(np.abs(still)) <= SAME * size)
+
+    def __call__(self, q: Array, v: Array, tau: Array, t: Array) -> Array:
+        """Accelerations, shape (M, nv)."""
+        tau = tau.copy()
+        tau[:, self.passive] = 0.0
+        if not self.plain:
+            tau = tau - self._added(q, v, np.zeros_like(v), t)
+        model, data = self.scene.model, self.data
+        if self._mass is None:
+            rows = zip(q, v, tau, strict=True)
+            return np.array([pin.aba(model, data, *row) for row in rows])
+        bias = [pin.nonLinearEffects(model, data, *row).copy() for row in zip(q, v, strict=True)]
+        force = (tau - np.array(bias))[..., None]
+        return np.asarray(np.linalg.solve(self._mass(q), force)[..., 0])
+
+    def _added(self, q: Array, v: Array, a: Array, t: Array) -> Array:
+        model, data = self.scene.model, self.data
+        rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
+        return np.asarray(self.scene.inverse_dynamics(q, v, a, t) - rigid)
+
+
+def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:
+    scene = trajectory.scene
+    if scene is None:
+        raise InputError("the motion was saved without its scene")
+    return scene, scene.robot

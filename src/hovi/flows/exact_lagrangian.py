@@ -1,0 +1,135 @@
+"""The exact discrete Lagrangian: the action of the exact solution between two points.
+
+[ColomboFerraroMartin2016, section 3]: L_d^e(x0, x1) = integral of L along the solution of the
+Euler-Lagrange equations with these ends. The curve's degree is raised until nothing changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from hovi.errors import InputError
+from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian, check_segment
+from hovi.flows.segment import Segment, flat
+from hovi.scene.lagrangian import Lagrangian
+from hovi.schemes import Scheme, galerkin
+
+Array = npt.NDArray[np.float64]
+
+LADDER = (4, 7, 10, 14, 19, 25, 32, 40)
+"""Inner modes that are tried in turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class ExactDiscreteLagrangian(SegmentLagrangian):
+    """L_d^e to a tolerance, with all its derivatives.
+
+    lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularized momenta (for
+        k = 2 h p and p~ - h p), relative to the largest.
+    The solution that is followed is the one that exists for small h; where h has passed a
+    conjugate point of it, InputError says so, as it does where the tolerance is not met.
+    """
+
+    lagrangian: Lagrangian
+    h: float
+    tolerance: float = 1e-12
+
+    def __post_init__(self) -> None:
+        check_segment(self.lagrangian, self.h)
+
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
+        """The exact solution with given ends."""
+        return self._raised(lambda ld, _: ld.between(x0, w, t0))
+
+    def from_start(
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
+    ) -> Segment:
+        """The exact solution that starts at (x0, p0): F_H, by theorem 3."""
+        return self._raised(lambda ld, guess: ld.from_start(x0, p0, t0, guess))
+
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+        """The exact solution that ends at (x1, p1)."""
+        return self._raised(lambda ld, _: ld.from_end(x1, p1, t0))
+
+    def _raised(self, solve: Callable[[SchemeLagrangian, Segment | None], Segment]) -> Segment:
+        """Raise the degree until the ends and their momenta stop changing."""
+        before: Segment | None = None
+        for inner_modes in LADDER:
+            ld = SchemeLagrangian(self.lagrangian, _table(inner_modes, self.k), self.h)
+            segment = solve(ld, None)
+            if before is not None and _change(before, segment) <= self.tolerance:
+                _refuse_conjugate_points(segment)
+                return segment
+            before = segment
+        raise InputError(
+            f"the exact discrete Lagrangian is not known to {self.tolerance:g} at h = {self.h:g} s "
+            f"with {LADDER[-1]} inner modes; take a shorter step or a larger tolerance."
+        )
+
+
+def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float) -> float:
+    """The first conjugate point along a solution: how long h of L_d^e may be there, in [s].
+
+    By Morse's index theorem the action between fixed ends is a minimum up to it: the least
+    eigenvalue of the inner modes' Hessian passes through zero.
+    x0, p0: start, shape (k, n). longest: where to stop looking. Returns inf if there is none.
+    """
+    scheme = _table(LADDER[-1], lagrangian.order)
+
+    def least(h: float) -> float:
+        segment = SchemeLagrangian(lagrangian, scheme, h).from_start(x0[None], p0[None])
+        return float(_inner_eigenvalues(segment)[0, 0])
+
+    h = longest / 16
+    while least(h) > 0:
+        if h >= longest:
+            return float("inf")
+        h = min(1.25 * h, longest)
+    return float(brentq(least, h / 1.25 if h > longest / 16 else longest * 1e-3, h, xtol=1e-12))
+
+
+def _change(before: Segment, after: Segment) -> float:
+    """What a higher degree changed: derivatives of phi in (h x0, w), and the end not given.
+
+    Momenta are these derivatives with powers of 1/h, which would only magnify rounding here; w
+    itself would magnify it by the condition of d2L/dq^(k)2.
+    """
+    k = after.k
+    scale = np.concatenate([np.full(k, after.h), np.ones(k)])[:, None]
+    old, new = (scale * s.gradient[:, : 2 * k] for s in (before, after))
+    size = np.abs(new).max(axis=(1, 2), keepdims=True)
+    changes = [np.max(np.abs(new - old) / np.where(size > 0, size, 1.0))]
+    for old, new in ((before.x0, after.x0), (before.x1, after.x1)):
+        changes.append(np.max(np.abs(new - old)) / max(1.0, np.max(np.abs(new))))
+    return float(max(changes))
+
+
+def _refuse_conjugate_points(segment: Segment) -> None:
+    negative = _inner_eigenvalues(segment) < 0
+    r = segment.inner.shape[1]
+    last = segment.hessian[:, -1, -1]
+    indefinite = np.sum(np.linalg.eigvalsh((last + last.transpose(0, 2, 1)) / 2) < 0, axis=1)
+    passed = int(np.max(np.sum(negative, axis=1) - r * indefinite))
+    if passed > 0:
+        raise InputError(
+            f"h = {segment.h:g} s is too long for the exact discrete Lagrangian: {passed} "
+            "conjugate point(s) lie before its end, so that the solution between the two ends is "
+            "not the one of least action; take a shorter step."
+        )
+
+
+def _inner_eigenvalues(segment: Segment) -> Array:
+    m = 2 * segment.k * segment.x0.shape[2]
+    inner = flat(segment.hessian)[:, m:, m:]
+    return np.asarray(np.linalg.eigvalsh((inner + inner.transpose(0, 2, 1)) / 2))
+
+
+@lru_cache(maxsize=64)
+def _table(inner_modes: int, k: int) -> Scheme:
+    return galerkin(inner_modes, k)

@@ -1,0 +1,137 @@
+"""Legendre transforms: the continuous FL, and F+ and F- of a discrete Lagrangian.
+
+[ColomboFerraroMartin2016, sections 3 and 4; F+ and F- as its theorems use them, the other way
+round than its first display prints them]
+
+Points of T^(k-1)Q and momenta have shape (B, k, n), B of them at a time; (k, n) does as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError
+from hovi.flows.scheme_lagrangian import SegmentLagrangian
+from hovi.optimize.batched_newton import newton
+from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+
+Array = npt.NDArray[np.float64]
+
+
+def legendre_minus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
+    """F^- L_d: (x0, x1) -> (x0, p0) with p0 = (-D_1 L_d, ..., -D_k L_d)."""
+    segment = ld.joining(batch(x0), batch(x1))
+    return x0, segment.p0.reshape(np.shape(x0))
+
+
+def legendre_plus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
+    """F^+ L_d: (x0, x1) -> (x1, p1) with p1 = (D_{k+1} L_d, ..., D_2k L_d)."""
+    segment = ld.joining(batch(x0), batch(x1))
+    return x1, segment.p1.reshape(np.shape(x0))
+
+
+def inverse_legendre_minus(ld: SegmentLagrangian, x0: Array, p0: Array) -> tuple[Array, Array]:
+    """(F^- L_d)^-1: (x0, p0) -> (x0, x1), near the diagonal."""
+    return x0, ld.from_start(batch(x0), batch(p0)).x1.reshape(np.shape(x0))
+
+
+def inverse_legendre_plus(ld: SegmentLagrangian, x1: Array, p1: Array) -> tuple[Array, Array]:
+    """(F^+ L_d)^-1: (x1, p1) -> (x0, x1), near the diagonal."""
+    return ld.from_end(batch(x1), batch(p1)).x0.reshape(np.shape(x1)), x1
+
+
+def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]:
+    """FL: T^(2k-1)Q -> T*T^(k-1)Q, (q, q', ..., q^(2k-1)) -> (x, p), both (B, k, n) or (k, n).
+
+    p_{k-1} = dL/dq^(k) and p_{j-1} = dL/dq^(j) - d/dt p_j; for k = 2 it is
+    (q, v, dL/dv - d/dt dL/da, dL/da). [ColomboFerraroMartin2016, section 4; deLeonRodrigues1985]
+
+    lagrangian: not dependent on time; of order 3 or more only as a CasadiLagrangian.
+    jet: 2 k arrays of shape (B, n) or (n,). On groups x is one row, (B, 1, nq + (k - 1) nv).
+    """
+    arrays = [np.asarray(x, dtype=np.float64) for x in jet]
+    k = lagrangian.order
+    if len(arrays) != 2 * k:
+        raise InputError(
+            f"FL of a Lagrangian of order {k} needs {2 * k} arrays (q, q', ...), got {len(arrays)}."
+        )
+    one = arrays[0].ndim == 1
+    points = [np.atleast_2d(x) for x in arrays]
+    p = _momenta(lagrangian, points) if k <= 2 else _symbolic_momenta(lagrangian, points)
+    if lagrangian.space is None:
+        x = np.stack(points[:k], axis=1)
+    else:
+        x = np.concatenate(points[:k], axis=1)[:, None]
+    return (x[0], p[0]) if one else (x, p)
+
+
+def highest_derivative(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
+    """q^(k) of p_{k-1} = dL/dq^(k)(x, q^(k)), shape (B, n) for x and p of shape (B, k, n).
+
+    x: or (q, q', ..., q^(k-1)), k arrays of B rows, as on groups.
+    """
+    jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
+
+    def system(u: Array) -> tuple[Array, Array]:
+        _, gradient, hessian = lagrangian.evaluate(*jet, u)
+        return gradient[:, -1] - p[:, -1], hessian[:, -1, :, -1]
+
+    u, found = newton(system, np.zeros_like(p[:, -1]))
+    if not found.all():
+        raise InputError("the Lagrangian is not regular there: dL/dq^(k) = p has no solution.")
+    return u
+
+
+def hamiltonian(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
+    """H = sum_j p_j . q^(j+1) - L on T*T^(k-1)Q, shape (B,); x and p of shape (B, k, n).
+
+    H = E_L o FL^-1: mechanical energy for k = 1, Pontryagin's p.v + p~.a - L for k = 2.
+    x: as for `highest_derivative`.
+    """
+    jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
+    jet.append(highest_derivative(lagrangian, jet, p))
+    rates = np.stack(jet[1:], axis=1)
+    return np.asarray(np.sum(p * rates, axis=(1, 2)) - lagrangian.value(*jet))
+
+
+def batch(x: npt.ArrayLike) -> Array:
+    """(k, n) or (B, k, n) as (B, k, n)."""
+    array = np.asarray(x, dtype=np.float64)
+    if array.ndim not in (2, 3):
+        raise InputError(f"points and momenta have shape (k, n) or (B, k, n), got {array.shape}.")
+    return array if array.ndim == 3 else array[None]
+
+
+def _momenta(lagrangian: Lagrangian, jet: list[Array]) -> Array:
+    """p of FL for k = 1 and 2, from first and second derivatives of L."""
+    k = lagrangian.order
+    _, gradient, hessian = lagrangian.evaluate(*jet[: k + 1])
+    if k == 1:
+        return gradient[:, 1:]
+    rates = np.stack(jet[1:], axis=1)  # (B, 3, n): v, a, jerk
+    along = np.einsum("bisj,bsj->bi", hessian[:, 2], rates)
+    return np.stack([gradient[:, 1] - along, gradient[:, 2]], axis=1)
+
+
+def _symbolic_momenta(lagrangian: Lagrangian, jet: list[Array]) -> Array:
+    """p of FL for any k, differentiated along the curve by CasADi."""
+    if not isinstance(lagrangian, CasadiLagrangian):
+        raise InputError("FL of order 3 or more needs a CasadiLagrangian.")
+    k, n = lagrangian.order, lagrangian.nv
+    symbols = [*lagrangian.jet, *(ca.SX.sym(f"q{k + 1 + j}", n) for j in range(k - 1))]
+    momenta = [ca.gradient(lagrangian.expression, symbols[k])]
+    for j in range(k - 1, 0, -1):
+        slope = ca.gradient(lagrangian.expression, symbols[j])
+        momenta.insert(0, slope - total_derivative(momenta[0], symbols))
+    columns = [x.T for x in jet]
+    values = ca.Function("FL", symbols, momenta).map(columns[0].shape[1])(*columns)
+    return np.stack([np.array(value).T for value in values], axis=1)
+
+
+def total_derivative(expression: ca.SX, jet: list[ca.SX]) -> ca.SX:
+    """d/dt of an expression along the curve whose jet (q, q', ...) the symbols are."""
+    return ca.jtimes(expression, ca.vertcat(*jet[:-1]), ca.vertcat(*jet[1:]))

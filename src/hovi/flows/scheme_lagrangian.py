@@ -1,0 +1,256 @@
+"""The discrete Lagrangian L_d on T^(k-1)Q x T^(k-1)Q for any k, one interval at a time.
+
+`DiscreteLagrangian` sums the action of a whole motion for the optimiser; here L_d is the function
+of two end points that the paper's theorems speak of.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.errors import InputError, SchemeError
+from hovi.flows.regularized import Regularized, regularized
+from hovi.flows.segment import Segment, flat
+from hovi.optimize.batched_newton import newton
+from hovi.scene.lagrangian import Lagrangian
+from hovi.schemes import Scheme
+
+Array = npt.NDArray[np.float64]
+
+
+class SegmentLagrangian(ABC):
+    """L_d(x0, x1) for an interval of length h, x = (q, q', ..., q^(k-1)) in T^(k-1)Q.
+
+    lagrangian: L on T^(k)Q. h: length of the interval, in [s].
+    """
+
+    lagrangian: Lagrangian
+    h: float
+
+    @property
+    def k(self) -> int:
+        """Order of the Lagrangian."""
+        return self.lagrangian.order
+
+    @property
+    def n(self) -> int:
+        """Degrees of freedom."""
+        return self.lagrangian.nv
+
+    @property
+    def regularized(self) -> Regularized:
+        """The change between (x0, w) and (x0, x1)."""
+        return regularized(self.k, self.h)
+
+    @abstractmethod
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
+        """The segment with given ends, in regularized coordinates: x0, w of shape (B, k, n).
+
+        t0: time at its start, in [s]. Raises InputError when the inner modes are not found.
+        """
+
+    @abstractmethod
+    def from_start(
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
+    ) -> Segment:
+        """(F^-)^-1: the segment that starts at x0 with momenta p0, both (B, k, n)."""
+
+    @abstractmethod
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+        """(F^+)^-1: the segment that ends at x1 with momenta p1, both (B, k, n)."""
+
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> Segment:
+        """The segment between two points of T^(k-1)Q, both (B, k, n)."""
+        return self.between(x0, self.regularized.w(x0, x1), t0)
+
+    def value(self, x0: Array, x1: Array) -> Array:
+        """L_d(x0, x1), shape (B,)."""
+        return self.joining(x0, x1).values
+
+
+@dataclass(frozen=True, eq=False)
+class SchemeLagrangian(SegmentLagrangian):
+    """L_d = h sum_j w_j L(q_j, q'_j, ..., q^(k)_j), extremal in the inner modes.
+
+    lagrangian: L on T^(k)Q. scheme: a table for the same k. h: in [s].
+    Raises SchemeError when the orders differ, InputError for a step that is not positive or for
+    joints whose configurations are not vectors.
+    """
+
+    lagrangian: Lagrangian
+    scheme: Scheme
+    h: float
+
+    def __post_init__(self) -> None:
+        check_segment(self.lagrangian, self.h)
+        if self.scheme.derivatives != self.lagrangian.order:
+            raise SchemeError(
+                f"scheme {self.scheme.name!r} is for Lagrangians of order "
+                f"{self.scheme.derivatives}, this one is of order {self.lagrangian.order}; use "
+                f"galerkin(inner_modes, derivatives={self.lagrangian.order})."
+            )
+
+    @classmethod
+    def of(cls, ld: DiscreteLagrangian) -> SchemeLagrangian:
+        """The L_d of every interval of a grid whose intervals are all alike."""
+        return cls(ld.lagrangian, *uniform_grid(ld))
+
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
+        """Newton on the inner modes alone."""
+        B, k, r, n = len(x0), self.k, self.scheme.inner_modes, self.n
+        if r == 0:
+            return self._segment(x0, w, np.zeros((B, 0, n)), t0)
+
+        def system(u: Array) -> tuple[Array, Array]:
+            gradient, H = self._system(x0, w, u.reshape(B, r, n), t0)
+            m = 2 * k * n
+            return gradient.reshape(B, -1)[:, m:], H[:, m:, m:]
+
+        u = self._solve(system, np.zeros((B, r * n)))
+        return self._segment(x0, w, u.reshape(B, r, n), t0)
+
+    def from_start(
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
+    ) -> Segment:
+        """Newton on (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
+        B, m = len(x0), self.k * self.n
+        back, given = self._back, (self.regularized.back / self.h @ p0).reshape(B, m)
+
+        def system(u: Array) -> tuple[Array, Array]:
+            gradient, H = self._system(x0, *self._split(u, B), t0)
+            g = gradient.reshape(B, -1)
+            F, J = g[:, m:].copy(), H[:, m:, m:].copy()
+            F[:, :m] -= given + g[:, :m] @ back.T
+            J[:, :m] -= back @ H[:, :m, m:]
+            return F, J
+
+        w, inner = self._split(self._solve(system, self._guess(B, guess)), B)
+        return self._segment(x0, w, inner, t0)
+
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+        """Newton on (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, where x0 follows from w."""
+        B, m, R = len(x1), self.k * self.n, self.regularized
+        given = (R.gamma.T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
+        moved = np.kron(R.inverse_taylor @ R.moments, np.eye(self.n))
+
+        def system(u: Array) -> tuple[Array, Array]:
+            w, inner = self._split(u, B)
+            gradient, H = self._system(R.start(x1, w), w, inner, t0)
+            F, J = gradient.reshape(B, -1)[:, m:].copy(), H[:, m:, m:].copy()
+            F[:, :m] -= given
+            J[:, :, :m] -= H[:, m:, :m] @ moved
+            return F, J
+
+        w, inner = self._split(self._solve(system, self._guess(B, None)), B)
+        return self._segment(R.start(x1, w), w, inner, t0)
+
+    def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
+        """The segment with given inner modes, taken as extremal."""
+        return self._segment(x0, w, inner, t0)
+
+    def jet(self, x0: Array, w: Array, inner: Array) -> list[Array]:
+        """(q, q', ..., q^(k)) at the quadrature points, k + 1 arrays of shape (B * Q, n)."""
+        data = np.concatenate([x0, w, inner], axis=1)  # (B, 2k + r, n)
+        points = np.matmul(self._rows, data).reshape(len(x0), -1, self.k + 1, self.n)
+        return [points[:, :, j].reshape(-1, self.n) for j in range(self.k + 1)]
+
+    @cached_property
+    def table(self) -> Array:
+        """(q, q', ..., q^(k)) at the points over (x0, w, c), shape (Q, k + 1, 2 k + r)."""
+        k, table = self.k, np.array(self.scheme.regular_table)
+        table[:, :, k : 2 * k] = table[:, :, k : 2 * k] @ self.regularized.gamma
+        columns = np.concatenate([np.arange(k), np.full(k + self.scheme.inner_modes, k)])
+        powers = columns - np.arange(k + 1)[:, None]
+        return np.where(table == 0, 0.0, table * self.h ** np.where(table == 0, 0, powers))
+
+    def _system(self, x0: Array, w: Array, inner: Array, t0: float) -> tuple[Array, Array]:
+        """Gradient (B, m, n) and Hessian (B, m n, m n) of phi in (x0, w, c)."""
+        _, gradient, hessian = self._evaluate(self.jet(x0, w, inner), t0)
+        return self._contract(gradient), flat(self._contract_twice(hessian))
+
+    def _segment(self, x0: Array, w: Array, inner: Array, t0: float) -> Segment:
+        jet = self.jet(x0, w, inner)
+        value, gradient, hessian = self._evaluate(jet, t0)
+        values = value.reshape(len(x0), -1) @ self.scheme.weights
+        slopes = [j * np.sum(x * gradient[:, j], axis=1) for j, x in enumerate(jet)]
+        scaled = (value - np.sum(slopes, axis=0)).reshape(len(x0), -1) @ self.scheme.weights
+        G, H = self._contract(gradient), self._contract_twice(hessian)
+        return Segment(self.scheme, self.h, x0, w, inner, self.h * values, G, H, scaled)
+
+    def _evaluate(self, jet: list[Array], t0: float) -> tuple[Array, Array, Array]:
+        Q = len(self.scheme.weights)
+        t = np.tile(t0 + self.h * self.scheme.points, len(jet[0]) // Q)
+        return self.lagrangian.evaluate(*jet, t=t)
+
+    def _contract(self, gradient: Array) -> Array:
+        points = gradient.reshape(-1, len(self._rows), self.n)
+        return np.asarray(np.matmul(self._weighted_rows, points))
+
+    def _contract_twice(self, hessian: Array) -> Array:
+        k, n, (Q, _, m) = self.k, self.n, self.table.shape
+        blocks = hessian.reshape(-1, Q, k + 1, n, k + 1, n).transpose(0, 1, 2, 4, 3, 5)
+        points = blocks.reshape(len(blocks), Q * (k + 1) ** 2, n * n)
+        return np.asarray(np.matmul(self._pairs, points).reshape(-1, m, m, n, n))
+
+    @cached_property
+    def _rows(self) -> Array:
+        return self.table.reshape(-1, self.table.shape[2])
+
+    @cached_property
+    def _weighted_rows(self) -> Array:
+        table = self.scheme.weights[:, None, None] * self.table
+        return np.ascontiguousarray(table.reshape(self._rows.shape).T)
+
+    @cached_property
+    def _pairs(self) -> Array:
+        pairs = np.einsum("qri,qsj,q->ijqrs", self.table, self.table, self.scheme.weights)
+        return np.asarray(pairs.reshape(self.table.shape[2] ** 2, -1))
+
+    @cached_property
+    def _back(self) -> Array:
+        """`Regularized.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularized.back, np.eye(self.n)))
+
+    def _split(self, u: Array, B: int) -> tuple[Array, Array]:
+        modes = u.reshape(B, -1, self.n)
+        return modes[:, : self.k], modes[:, self.k :]
+
+    def _guess(self, B: int, guess: Segment | None) -> Array:
+        if guess is None:
+            return np.zeros((B, (self.k + self.scheme.inner_modes) * self.n))
+        return np.concatenate([guess.w, guess.inner], axis=1).reshape(B, -1)
+
+    def _solve(self, system: Callable[[Array], tuple[Array, Array]], u: Array) -> Array:
+        root, found = newton(system, u)
+        if not found.all():
+            raise InputError(
+                f"the discrete equations of a segment of h = {self.h:g} s have no solution near "
+                "the one sought: take a shorter step, or smaller momenta."
+            )
+        return root
+
+
+def uniform_grid(ld: DiscreteLagrangian) -> tuple[Scheme, float]:
+    """The scheme and the step of every interval. Raises InputError where they differ."""
+    steps, schemes = ld.grid.steps, ld.grid.groups
+    if len(schemes) > 1 or np.ptp(steps) > 1e-12 * steps[0]:
+        raise InputError("a discrete flow needs a grid of equal steps with one scheme.")
+    return schemes[0][0], float(steps[0])
+
+
+def check_segment(lagrangian: Lagrangian, h: float) -> None:
+    """Raise InputError where no discrete Lagrangian can be built on one interval."""
+    if not (np.isfinite(h) and h > 0):
+        raise InputError(f"a step must be positive and finite, got {h} s.")
+    if lagrangian.nq != lagrangian.nv:
+        raise InputError(
+            "L_d between two points needs joints whose configurations are vectors (nq = nv): lock "
+            "the others with load_robot(..., locked=[...]), or step with hovi.flow."
+        )

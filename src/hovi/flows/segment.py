@@ -1,0 +1,151 @@
+"""A segment: one interval of a discrete motion, with all derivatives of L_d there.
+
+L_d(x0, x1) = h phi(x0, w), and phi and its derivatives stay of order one as h tends to zero. From
+them follow the momenta, D1 .. D2k and D11 .. of L_d, and the tangent of the discrete flow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.flows.regularized import Regularized, regularized
+from hovi.schemes import Scheme
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """B intervals of length h, the inner modes extremal.
+
+    scheme: what the action was discretised with. h: in [s].
+    x0: jets (q, q', ..., q^(k-1)) at the start, shape (B, k, n).
+    w: regularized coordinates, shape (B, k, n). inner: inner modes, shape (B, r, n); both in the
+        units of q^(k).
+    values: L_d, shape (B,).
+    gradient: of phi = L_d / h in (x0, w, c), shape (B, 2 k + r, n).
+    hessian: of phi, shape (B, 2 k + r, 2 k + r, n, n).
+    step_rate: derivative of L_d in h at fixed h^j q^(j) and inner modes, shape (B,).
+    """
+
+    scheme: Scheme
+    h: float
+    x0: Array
+    w: Array
+    inner: Array
+    values: Array
+    gradient: Array
+    hessian: Array
+    step_rate: Array
+
+    @property
+    def k(self) -> int:
+        """Order of the Lagrangian."""
+        return int(self.x0.shape[1])
+
+    @property
+    def regularized(self) -> Regularized:
+        """The change between (x0, w) and (x0, x1)."""
+        return regularized(self.k, self.h)
+
+    @cached_property
+    def x1(self) -> Array:
+        """Jets at the end, shape (B, k, n)."""
+        return self.regularized.end(self.x0, self.w)
+
+    @cached_property
+    def z(self) -> Array:
+        """z_j = (q1^(j) - sum_i h^i / i! q0^(j+i)) / h^(k-j), shape (B, k, n)."""
+        return self.regularized.z(self.w)
+
+    @cached_property
+    def p1(self) -> Array:
+        """Momenta at the end, D_{k+1} .. D_2k of L_d, shape (B, k, n)."""
+        dz = self.regularized.inverse_gamma.T @ self.gradient[:, self.k : 2 * self.k]
+        return np.asarray(self.h * dz / self.regularized.scale[:, None])
+
+    @cached_property
+    def p0(self) -> Array:
+        """Momenta at the start, -D_1 .. -D_k of L_d, shape (B, k, n)."""
+        return np.asarray(self.regularized.taylor.T @ self.p1 - self.h * self.gradient[:, : self.k])
+
+    @property
+    def derivatives(self) -> Array:
+        """D_1 .. D_2k of L_d with respect to (x0, x1), shape (B, 2 k, n)."""
+        return np.concatenate([-self.p0, self.p1], axis=1)
+
+    @property
+    def step_derivative(self) -> Array:
+        """D_h of L_d with both ends held, shape (B,); minus the energy where L_d is exact."""
+        powers = np.arange(self.k)[:, None] / self.h
+        moved = np.sum(powers * (self.p1 * self.x1 - self.p0 * self.x0), axis=(1, 2))
+        return np.asarray(self.step_rate + moved)
+
+    @cached_property
+    def condensed(self) -> Array:
+        """Hessian of phi in (x0, w) with the inner modes extremal, (B, 2 k n, 2 k n)."""
+        H, m = flat(self.hessian), 2 * self.k * self.x0.shape[2]
+        if self.inner.shape[1] == 0:
+            return np.asarray(H)
+        inner = np.linalg.solve(H[:, m:, m:], H[:, m:, :m])
+        return np.asarray(H[:, :m, :m] - H[:, :m, m:] @ inner)
+
+    @property
+    def second_derivatives(self) -> Array:
+        """D_ij of L_d with respect to (x0, x1), shape (B, 2 k, 2 k, n, n)."""
+        k, n = self.k, self.x0.shape[2]
+        A = np.concatenate([np.eye(k, 2 * k), self.regularized.from_ends])
+        A = np.kron(A, np.eye(n))
+        H = self.h * (A.T @ self.condensed @ A)
+        return np.asarray(H.reshape(-1, 2 * k, n, 2 * k, n).transpose(0, 1, 3, 2, 4))
+
+    @property
+    def regularity_matrix(self) -> Array:
+        """W_d = [D_{i, k+j} L_d], i, j = 1 .. k, shape (B, k n, k n).
+
+        [ColomboFerraroMartin2016, section 4]
+        """
+        k = self.k
+        return flat(self.second_derivatives[:, :k, k:])
+
+    @property
+    def newton_matrix(self) -> Array:
+        """Matrix of a step from momenta in the unknowns w, shape (B, k n, k n).
+
+        d/dw of phi_w - gamma^T (S/h) T^-T (p0 + h phi_x): for k = 2 the equations are scaled as
+        h p and p~ - h p. It tends to d2L/dq^(k)2 (x) I as h tends to zero.
+        """
+        K, m = self.condensed, self.k * self.x0.shape[2]
+        return np.asarray(K[:, m:, m:] - self._back @ K[:, :m, m:])
+
+    @property
+    def tangent(self) -> Array:
+        """The tangent map d(x1, p1) / d(x0, p0) of the discrete Hamiltonian flow, (B, 2kn, 2kn)."""
+        k, n, R = self.k, self.x0.shape[2], self.regularized
+        K, m = self.condensed, k * n
+        back = self._back / self.h  # gamma^T (S/h) T^-T
+        rhs = np.concatenate([self._back @ K[:, :m, :m] - K[:, m:, :m], 0 * K[:, :m, :m]], axis=2)
+        rhs[:, :, m:] = back
+        dw = np.linalg.solve(self.newton_matrix, rhs)
+        dx1 = np.kron(R.moments, np.eye(n)) @ dw
+        dx1[:, :, :m] += np.kron(R.taylor, np.eye(n))
+        dp = self.h * K[:, :m, m:] @ dw
+        dp[:, :, :m] += self.h * K[:, :m, :m]
+        dp[:, :, m:] += np.eye(m)
+        dp1 = np.kron(R.inverse_taylor.T, np.eye(n)) @ dp
+        return np.concatenate([dx1, dp1], axis=1)
+
+    @property
+    def _back(self) -> Array:
+        """`Regularized.back` (x) I, shape (k n, k n)."""
+        return np.asarray(np.kron(self.regularized.back, np.eye(self.x0.shape[2])))
+
+
+def flat(blocks: Array) -> Array:
+    """(B, m, l, n, n) -> (B, m n, l n)."""
+    B, m, count, n, _ = blocks.shape
+    return blocks.transpose(0, 1, 3, 2, 4).reshape(B, m * n, count * n)

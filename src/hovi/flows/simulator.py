@@ -1,0 +1,162 @@
+"""simulate: forced mechanics of a scene by the discrete Lagrange-d'Alembert equations.
+
+The first-order sibling (k = 1) of the planner: L = K - V, with the torques that are put on the
+joints and what the effects resist with as forces. [MarsdenWest2001, section 3.2]
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import regularized
+from hovi.discrete.state import State, as_state
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import InputError
+from hovi.flows.group_lagrangian import ChartedLagrangian
+from hovi.flows.legendre_transforms import hamiltonian, highest_derivative, legendre
+from hovi.flows.scheme_lagrangian import SchemeLagrangian
+from hovi.flows.stepper import Flow, flow
+from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.scene import Scene
+from hovi.scene.standard_lagrangians import (
+    Drive,
+    ForcedLagrangian,
+    Prescribed,
+    Torque,
+    mechanics,
+    scene_force,
+)
+from hovi.schemes import galerkin
+from hovi.system.blas_threads import one_blas_thread
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A motion of a scene under given torques.
+
+    scene: what was simulated. lagrangian: K - V. flow: the discrete motion.
+    """
+
+    scene: Scene
+    lagrangian: CasadiLagrangian
+    flow: Flow
+
+    def __repr__(self) -> str:
+        """A robot, a time and a grid, for a terminal."""
+        name, N = self.scene.robot.name, len(self.t) - 1
+        return f"<Simulation of {name!r}: {self.t[-1]:g} s in {N} intervals, order {self.order}>"
+
+    @property
+    def t(self) -> Array:
+        """Times of the nodes, shape (N + 1,), in [s]."""
+        return self.flow.t
+
+    @property
+    def order(self) -> int:
+        """Order of the integrator, 2 (r + 1)."""
+        assert isinstance(self.flow.ld, SchemeLagrangian | ChartedLagrangian)
+        return 2 * (self.flow.ld.scheme.inner_modes + 1)
+
+    @property
+    def q(self) -> Array:
+        """Configurations, shape (N + 1, nq)."""
+        return self.flow.q
+
+    @property
+    def momenta(self) -> Array:
+        """p = M(q) v at the nodes, shape (N + 1, nv)."""
+        return self.flow.p[:, 0]
+
+    @property
+    def v(self) -> Array:
+        """Velocities M(q)^-1 p, shape (N + 1, nv)."""
+        return highest_derivative(self.lagrangian, self.flow.x, self.flow.p)
+
+    @property
+    def energy(self) -> Array:
+        """K + V at the nodes, shape (N + 1,), in [J]."""
+        return hamiltonian(self.lagrangian, self.flow.x, self.flow.p)
+
+    @property
+    def work(self) -> tuple[Array, Array]:
+        """Work of the torques, and of the effects, since the start, (N + 1,) each, in [J].
+
+        At the quadrature points of the discrete motion: `energy` changes by their sum, to the
+        order of the integrator.
+        """
+        ld = self.flow.ld
+        assert isinstance(ld, SchemeLagrangian | ChartedLagrangian)
+        assert isinstance(ld.lagrangian, ForcedLagrangian)
+        w = self.flow.z  # for k = 1 both regularized coordinates are the same
+        q, v = ld.jet(self.flow.x[:-1], w, self.flow.inner[:, : ld.scheme.inner_modes])
+        t = (self.t[:-1, None] + ld.h * ld.scheme.points).ravel()
+        done = []
+        for force, sign in ((ld.lagrangian.force.driven, 1), (ld.lagrangian.force.resisted, -1)):
+            power = np.sum(sign * force(q, v, t)[0] * v, axis=1)
+            gained = ld.h * power.reshape(len(w), -1) @ ld.scheme.weights
+            done.append(np.concatenate([[0.0], np.cumsum(gained)]))
+        return done[0], done[1]
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion to be replayed, plotted and saved: the cubic through (q, v) at the nodes."""
+        q, v, h = self.q, self.v, self.flow.ld.h
+        N, n = len(q) - 1, v.shape[1]
+        grid = Grid(np.full(N, h), (galerkin(0),) * N)
+        turned = None if self.scene.robot.vector_joints else h * self.flow.z[:, 0]
+        z = regularized(self.scene.robot, grid, q, v, turned)
+        path = DiscretePath(q.copy(), v, z, np.zeros((N, 0, n)))
+        momenta = np.stack([self.momenta, np.zeros_like(v)], axis=1)
+        return Trajectory(grid, path, momenta, self.scene, {"status": "simulated"})
+
+
+@one_blas_thread
+def simulate(
+    scene: Scene,
+    start: State | npt.ArrayLike,
+    duration: float,
+    torque: Torque | Trajectory | Drive | None = None,
+    *,
+    intervals: int = 1000,
+    inner_modes: int = 1,
+) -> Simulation:
+    """The motion of a scene's robot from a state, by a symplectic integrator of order 2 (r + 1).
+
+    scene: what is simulated; potentials that effects add to a cost are no forces.
+    start: a State, or a configuration of shape (nq,) at rest.
+    duration: in [s].
+    torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; a
+        Controller for a feedback; none when not given.
+    intervals: N. inner_modes: r, from 0 (the midpoint rule).
+    Raises InputError or SceneError for what does not fit, or for steps too long to be solved.
+    """
+    if not (np.isfinite(duration) and duration > 0):
+        raise InputError(f"the duration must be positive and finite, got {duration} s.")
+    if intervals < 1:
+        raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
+    free = mechanics(scene)
+    forced = ForcedLagrangian(free, scene_force(scene, _drive(torque)))
+    table, h = galerkin(inner_modes, 1), duration / intervals
+    ld: SchemeLagrangian | ChartedLagrangian
+    if free.space is None:
+        ld = SchemeLagrangian(forced, table, h)
+    else:
+        ld = ChartedLagrangian(forced, free.space, table, h)
+    q, v = as_state(start, scene.robot).on(scene.robot, "start")
+    x, p = legendre(free, q, v)
+    return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
+
+
+def _drive(torque: Torque | Trajectory | Drive | None) -> Drive | None:
+    if torque is None or hasattr(torque, "evaluate"):
+        return torque
+    if not isinstance(torque, Trajectory):
+        return Prescribed(torque)
+    plan = torque
+    return Prescribed(lambda t: plan.sample(np.clip(t, 0.0, plan.duration)).tau)

@@ -1,0 +1,172 @@
+"""Symmetries and their momentum maps: what a motion conserves.
+
+A one-parameter group acts on Q with generator xi(q). Its lift to T^(k-1)Q has the generator
+(xi, d/dt xi, ...), and J = sum_j p_j . d^j/dt^j xi is constant along motions of an invariant L, and
+along every discrete motion of an invariant L_d: the discrete Noether theorem.
+[MarsdenWest2001, section 1.3.3; for k = 2: J = p.xi + p~.(d xi/dq v)]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.dynamics.point_function import PointFunction
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.errors import InputError, SceneError
+from hovi.flows.legendre_transforms import total_derivative
+from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+MOST_DERIVATIVES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Symmetry:
+    """A one-parameter group of motions of Q = R^n, by its generator.
+
+    generator: q (CasADi column of n) -> xi(q), a column of n.
+    n: degrees of freedom.
+    """
+
+    generator: Callable[[ca.SX], ca.SX]
+    n: int
+
+    def momentum(self, x: Array, p: Array) -> Array:
+        """J at N points, shape (N,); x and p of shape (N, k, n).
+
+        The group itself need not be a symmetry of anything for this.
+        """
+        lifted = self.lift(x)
+        return np.asarray(np.sum(p * lifted, axis=(1, 2)))
+
+    def defect(self, lagrangian: Lagrangian, *jet: Array) -> Array:
+        """sum_j dL/dq^(j) . d^j/dt^j xi, shape (P,): zero everywhere where L is invariant.
+
+        jet: (q, q', ..., q^(k)), k + 1 arrays of shape (P, n).
+        """
+        lifted = self.lift(np.stack(jet, axis=1))
+        return np.asarray(np.sum(lagrangian.gradient(*jet) * lifted, axis=(1, 2)))
+
+    def lift(self, x: Array) -> Array:
+        """(xi, d/dt xi, ...) at N points of T^(k-1)Q, shape (N, k, n)."""
+        k = x.shape[1]
+        if k > MOST_DERIVATIVES:
+            raise InputError(f"symmetries are lifted to k <= {MOST_DERIVATIVES}, got {k}.")
+        derivatives = self._lifts[k - 1](*np.moveaxis(np.asarray(x, dtype=np.float64), 1, 0))
+        return np.stack([d.reshape(len(x), self.n) for d in derivatives], axis=1)
+
+    @cached_property
+    def _lifts(self) -> list[PointFunction]:
+        jet = [ca.SX.sym(f"q{j}", self.n) for j in range(MOST_DERIVATIVES)]
+        xi = [ca.densify(self.generator(jet[0]))]
+        for _ in range(1, MOST_DERIVATIVES):
+            xi.append(ca.densify(total_derivative(xi[-1], jet)))
+        return [
+            PointFunction(ca.Function("lift", jet[: k + 1], xi[: k + 1]))
+            for k in range(MOST_DERIVATIVES)
+        ]
+
+
+def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 0, 0)) -> Symmetry:
+    """The rotation of a whole robot about an axis of the world that gravity leaves free.
+
+    axis: shape (3,). point: a point on it, shape (3,), in [m].
+    An effect on the first joints, such as a range kept by a potential, may break the symmetry all
+    the same: `Symmetry.defect` tells.
+    Raises SceneError when gravity does not leave it free, or the robot's first joints cannot
+    carry it out.
+    """
+    w = _unit(axis)
+    g = np.array(scene.model.gravity.linear)
+    if np.abs(np.cross(w, g)).max() > 1e-12 * max(1.0, float(np.abs(g).max())):
+        raise SceneError(
+            f"gravity {g.tolist()} changes under a rotation about {w.tolist()}; take an axis along "
+            "gravity."
+        )
+    return _base_motion(scene, np.concatenate([np.cross(np.asarray(point, float), w), w]))
+
+
+def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
+    """The translation of a whole robot along a direction of the world that gravity leaves free.
+
+    direction: shape (3,). Raises SceneError as `base_rotation` does.
+    """
+    d = _unit(direction)
+    g = np.array(scene.model.gravity.linear)
+    if abs(d @ g) > 1e-12 * max(1.0, float(np.abs(g).max())):
+        raise SceneError(
+            f"gravity {g.tolist()} does work under a translation along {d.tolist()}; take a "
+            "direction across gravity."
+        )
+    return _base_motion(scene, np.concatenate([d, np.zeros(3)]))
+
+
+def _unit(vector: npt.ArrayLike) -> Array:
+    array = np.asarray(vector, dtype=np.float64)
+    if array.shape != (3,) or not np.linalg.norm(array) > 0:
+        raise InputError(f"a direction of the world is three numbers, not all zero; got {array}.")
+    return array / np.linalg.norm(array)
+
+
+def _base_motion(scene: Scene, twist: Array) -> Symmetry:
+    """The generator that moves every body with one twist (velocity at the origin, rotation).
+
+    The first joint has to do it, or the first few where the bodies between them have no mass.
+    """
+    n, trunk = scene.robot.nv, _trunk(scene)
+    q = ca.SX.sym("q", n)
+    axes = [_joint_axis(scene, joint, q) for joint in trunk]
+    samples = np.random.default_rng(0).uniform(-1.0, 1.0, size=(8, n))
+    for count in range(1, len(trunk) + 1):
+        S = ca.densify(ca.horzcat(*axes[:count]))
+        normal = ca.mtimes(S.T, S)
+        xi = ca.solve(normal, ca.mtimes(S.T, ca.DM(twist)))
+        residual = ca.Function("r", [q], [ca.mtimes(S, xi) - ca.DM(twist), ca.trace(normal)])
+        misses = [float(ca.norm_inf(residual(sample)[0])) for sample in samples]
+        if np.isfinite(misses).all() and max(misses) < 1e-9:
+            column = ca.vertcat(xi, ca.SX.zeros(n - count))
+            return Symmetry(ca.Function("xi", [q], [column]), n)
+    raise SceneError(
+        f"the first joints of robot {scene.robot.name!r} cannot move the whole robot so: the "
+        "motion of its base is not a symmetry of the configurations it has."
+    )
+
+
+def _trunk(scene: Scene) -> list[int]:
+    """Joints, of one coordinate each, up to the first body with mass or the first branch."""
+    model, trunk = scene.model, []
+    leading = set(scene.model.mimicked_joints)  # moves other joints, too
+    for joint in range(1, model.njoints):
+        alone = list(model.parents)[1:].count(model.parents[joint]) == 1
+        simple = model.joints[joint].nq == model.joints[joint].nv == 1 and joint not in leading
+        if not (alone and simple and model.parents[joint] == joint - 1):
+            break
+        trunk.append(joint)
+        if model.inertias[joint].mass > 0:
+            break
+    return trunk
+
+
+def _joint_axis(scene: Scene, joint: int, q: ca.SX) -> ca.SX:
+    """The twist of the world per unit speed of a joint, (velocity at the origin, rotation)."""
+    model = scene.model
+    frame = next(
+        f.name for f in model.frames if f.parentJoint == joint and f.placement.isIdentity(1e-15)
+    )
+    R, p = casadi_functions(model).frame_placement(frame)(q)
+    data = model.createData()
+    v = np.zeros(model.nv)
+    v[model.joints[joint].idx_v] = 1.0
+    pin.forwardKinematics(model, data, pin.neutral(model), v)
+    motion = data.v[joint].vector  # in the joint's own frame, and constant there
+    linear, angular = ca.mtimes(R, ca.DM(motion[:3])), ca.mtimes(R, ca.DM(motion[3:]))
+    return ca.vertcat(linear + ca.cross(p, angular), angular)

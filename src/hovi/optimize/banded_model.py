@@ -1,0 +1,217 @@
+"""The block-tridiagonal model as a band matrix, inner modes included in the band.
+
+Unknowns are ordered node, inner modes, node, ...: H + shift D is then one band matrix whose
+Cholesky factorisation gives the step and decides definiteness at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _packed
+from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+PANEL: int = _packed.panel_columns
+"""Columns of the band that are factored together."""
+_FIXED = np.zeros(1)
+"""How columns change that are fixed: what index -1 finds behind a step."""
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Neighbouring entries of the intervals' Hessians that are neighbours in the band as well.
+
+    starts, positions: where each run begins in the Hessians and in the band, both laid out flat.
+    lengths: numbers in it. scales: what they are multiplied with; one when None.
+    """
+
+    starts: Index
+    positions: Index
+    lengths: Index
+    scales: Array | None
+
+    @classmethod
+    def of(cls, entries: Index, positions: Index, scales: Array | None) -> Runs:
+        """The runs of single entries, of which no two with one start have different scales."""
+        cut = (np.diff(entries) != 1) | (np.diff(positions) != 1)
+        if scales is not None:
+            cut |= np.diff(scales) != 0
+        first = np.flatnonzero(np.concatenate([[True], cut]))[: len(entries)]
+        lengths = np.diff(np.append(first, len(entries)))
+        return cls(
+            entries[first], positions[first], lengths, None if scales is None else scales[first]
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BandLayout:
+    """Where the columns of the intervals stand among the unknowns, and the band's entries.
+
+    unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
+        column is fixed.
+    size: number of unknowns.
+    rows: of every panel of the band, from its first column's diagonal to the last row that it or
+        an earlier panel reaches, shape (panels,).
+    runs: which entries of the intervals' Hessians the band takes, and where they go.
+    scales: column = scale * unknown, shape (N, m), so that neighbours of different length share
+        an unknown; None where every scale is one.
+    """
+
+    unknowns: Index
+    size: int
+    rows: Index
+    runs: Runs
+    scales: Array | None
+
+    @classmethod
+    def of(cls, unknowns: Index, scales: Array | None = None) -> BandLayout:
+        """The layout of given unknowns."""
+        N, m, n = unknowns.shape
+        flat = unknowns.reshape(N, m * n)
+        size = int(flat.max()) + 1
+        j, i = flat[:, :, None], flat[:, None, :]
+        lower = (i >= j) & (j >= 0)
+        rows = _rows(flat, size)
+        stride = max(rows, default=0)
+        positions = (j * stride + i - (j - j % PANEL))[lower]
+        # where (m, n, m, n), a column and its rows, is stored as (m, m, n, n)
+        stored = np.arange((m * n) ** 2).reshape(m, m, n, n).transpose(0, 2, 1, 3)
+        offset = np.arange(N)[:, None, None] * (m * n) ** 2
+        entries = (offset + stored.reshape(m * n, m * n))[lower]
+        products = None
+        if scales is not None:
+            columns = np.repeat(scales, n, axis=1)
+            products = (columns[:, :, None] * columns[:, None, :])[lower]
+        runs = Runs.of(entries, positions, products)
+        return cls(unknowns, size, rows, runs, scales)
+
+    @cached_property
+    def slots(self) -> Index:
+        """1 + the unknown of every column of an interval, flat; 0 where it is fixed."""
+        return self.unknowns.ravel() + 1
+
+    def assemble(self, hessian: Array) -> Array:
+        """The band of a sum over intervals, a column of the lower triangle in every row.
+
+        Entry (i, j) stands at [j, i - i0], i0 = j - j % 4 the first column of its panel; columns
+        fill up the last panel. Shape (4 panels, most rows of a panel).
+        hessian: symmetric, shape (N, m, m, n, n).
+        """
+        band = np.empty((PANEL * len(self.rows), max(self.rows, default=0)))
+        runs = self.runs
+        _packed.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
+        return band
+
+
+def _rows(unknowns: Index, size: int) -> Index:
+    """Rows of every panel, multiples of its width: where panels end does not fall.
+
+    unknowns: of every interval, shape (N, m n), -1 where fixed.
+    """
+    first = np.arange(0, size, PANEL)
+    last = np.zeros(len(first), dtype=np.intp)
+    lowest = np.broadcast_to(unknowns.max(axis=1, keepdims=True), unknowns.shape)
+    free = unknowns >= 0
+    np.maximum.at(last, unknowns[free] // PANEL, lowest[free])
+    return PANEL * (np.maximum.accumulate(last) // PANEL + 1) - first
+
+
+@dataclass(frozen=True, eq=False)
+class BandFactor:
+    """A banded Cholesky factor, with the reciprocal of its diagonal in the diagonal's place."""
+
+    factor: Array
+    rows: Index
+
+    def solve(self, rhs: Array) -> Array:
+        """(H + shift D)^-1 rhs."""
+        solution = np.empty_like(rhs)
+        _packed.solve(self.factor, self.rows, rhs, solution)
+        return solution
+
+
+class BandModel(QuadraticModel):
+    """A quadratic model whose unknowns are the nodes and the inner modes."""
+
+    def __init__(self, intervals: IntervalSum, layout: BandLayout, metric_band: Array) -> None:
+        self.layout = layout
+        self._band: Array | None = None
+        self._metric_band = metric_band
+        super().__init__(intervals)
+
+    def scatter(self, local: Array) -> Array:
+        """Sum of the intervals' covectors per unknown, shape (size,)."""
+        if self.layout.scales is not None:
+            local = local * self.layout.scales[..., None]
+        sums = np.bincount(self.layout.slots, local.ravel(), minlength=self.layout.size + 1)
+        return np.asarray(sums[1:], dtype=np.float64)
+
+    def gather(self, s: Array) -> Array:
+        """Columns of every interval, zero where they are fixed."""
+        local = np.concatenate([s, _FIXED])[self.layout.unknowns]
+        scales = self.layout.scales
+        return local if scales is None else np.asarray(local * scales[..., None])
+
+    def metric_product(self, s: Array) -> Array:
+        """D s."""
+        product = np.empty_like(s)
+        _packed.product(self._metric_band, self.layout.rows, s, product)
+        return product
+
+    def descend(self, factor: Factor) -> tuple[Array, float, float]:
+        """The step of a factor of this model: see QuadraticModel.descend."""
+        if not isinstance(factor, BandFactor):
+            return super().descend(factor)
+        s = np.empty_like(self.gradient)
+        slope, length = _packed.descend(
+            factor.factor, factor.rows, self.gradient, self._metric_band, s
+        )
+        return s, slope, length
+
+    def factor(self, shift: float) -> Factor | None:
+        """Banded Cholesky of H + shift D; None where it fails."""
+        if self._band is None:
+            self._band = self.layout.assemble(self.intervals.hessian)
+        factor = np.empty_like(self._band)
+        rows = self.layout.rows
+        definite = _packed.factor(
+            self._band, self._metric_band, shift, rows, self.layout.size, factor
+        )
+        return BandFactor(factor, rows) if definite else None
+
+    def negative_eigenvalues(self) -> int:
+        """Number of negative eigenvalues of H, by elimination of blocks as large as the band.
+
+        Each pivot block adds its own count, as Sylvester's law of inertia says (Haynsworth's
+        additivity for Schur complements).
+        """
+        bands = self.layout.assemble(self.intervals.hessian)
+        size, block = self.layout.size, max(bands.shape[1], 1)
+        count = 0
+        schur = np.zeros((0, 0))
+        coupling = np.zeros((0, 0))
+        for first in range(0, size, block):
+            last = min(first + block, size)
+            pivot = _dense(bands, range(first, last), range(first, last))
+            pivot += np.tril(pivot, -1).T
+            if first:
+                coupling = _dense(bands, range(first, last), range(first - block, first))
+                pivot -= coupling @ np.linalg.solve(schur, coupling.T)
+            schur = (pivot + pivot.T) / 2
+            count += int(np.sum(np.linalg.eigvalsh(schur) < 0))
+        return count
+
+
+def _dense(bands: Array, rows: range, columns: range) -> Array:
+    """The lower triangle's entries of a block, shape (len(rows), len(columns))."""
+    i, j = np.array(rows)[:, None], np.array(columns)[None]
+    offset = i - (j - j % PANEL)
+    inside = (i >= j) & (offset < bands.shape[1])
+    return np.asarray(np.where(inside, bands[j, np.where(inside, offset, 0)], 0.0))

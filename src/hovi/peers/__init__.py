@@ -1,1 +1,0 @@
-"""Other people's methods, for the same picture as hovi's: see hovi.accuracy."""

@@ -1,0 +1,1 @@
+"""Boundary value problems: stated, solved, refined, searched, read from a file."""

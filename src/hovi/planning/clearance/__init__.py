@@ -1,0 +1,1 @@
+"""Obstacles and distances, and how closely a motion passes them."""

@@ -1,0 +1,81 @@
+"""A robot's collision shapes as convex ones: primitives as they are, meshes as their hulls."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import coal
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import ModelError
+from hovi.robot.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+_CONVEX = (
+    coal.Box,
+    coal.Sphere,
+    coal.Capsule,
+    coal.Cylinder,
+    coal.Cone,
+    coal.Ellipsoid,
+    coal.ConvexBase,
+    coal.TriangleP,
+)
+
+
+@lru_cache(maxsize=16)
+def convex_geometry(robot: Robot) -> pin.GeometryModel:
+    """The collision geometry with every mesh replaced by its convex hull; treat as read-only.
+
+    Raises ModelError for a robot without collision shapes, or some of whose shapes are missing:
+    what is not seen would not be kept clear.
+    """
+    if robot.collision_problem:
+        raise ModelError(
+            f"distances to obstacles need every collision shape: {robot.collision_problem}"
+        )
+    given = robot.collision
+    if given is None or given.ngeoms == 0:
+        raise ModelError(
+            f"robot {robot.name!r} has no collision shapes, so no distances to obstacles: add "
+            "<collision> elements to its URDF."
+        )
+    convex = given.copy()
+    convex.removeAllCollisionPairs()
+    for item in convex.geometryObjects:
+        item.geometry = _convex(item, robot)
+    return convex
+
+
+def _convex(item: pin.GeometryObject, robot: Robot) -> coal.CollisionGeometry:
+    shape = item.geometry
+    if isinstance(shape, _CONVEX):
+        return shape
+    if isinstance(shape, coal.BVHModelBase):
+        hull = _hull(np.array(shape.vertices()))
+        if hull is not None:
+            return hull
+    raise ModelError(
+        f"collision shape {item.name!r} of robot {robot.name!r} has no convex hull "
+        f"({type(shape).__name__}); give it volume, or a primitive."
+    )
+
+
+def _hull(vertices: Array) -> coal.ConvexBase | None:
+    """The convex hull of vertices (M, 3); None where they span no volume.
+
+    SciPy finds the corners first, since Coal's own call crashes on flat shapes. It is imported
+    here, since that takes a quarter of a second, and few scenes ask for it.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        corners = vertices[ConvexHull(vertices).vertices]
+    except (QhullError, ValueError):
+        return None
+    points = coal.StdVec_Vec3s()
+    points.extend(list(corners))
+    return coal.Convex.convexHull(points, True, "Qt")

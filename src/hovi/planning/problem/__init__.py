@@ -1,0 +1,1 @@
+"""States, goals, limits and tolerances, put together as a `TrajectoryProblem`."""

@@ -1,0 +1,126 @@
+"""What a robot whose free base carries no torque keeps, whatever its joints do.
+
+Under gravity g alone, with total mass m, the center of mass moves on c(t) = c0 + P0 t/m + g t^2/2,
+the linear momentum is P(t) = P0 + m g t, and the angular momentum about the center of mass is
+constant. A goal that fixes more than that leaves is redundant or cannot be met.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+CLOSE = 1e-6
+"""Relative difference up to which a goal agrees with what is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Center of mass in [m], linear momentum in [kg m/s], angular momentum about it in [Nms]."""
+
+    center: Array
+    linear: Array
+    angular: Array
+
+
+def falls_freely(scene: Scene) -> bool:
+    """Whether the first joint is a free base without torque on which nothing acts but gravity."""
+    model, terms = scene.robot.model, scene.terms
+    floats = model.joints[1].shortname() == "JointModelFreeFlyer"
+    alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
+    if not (floats and alone and scene.robot.joint_names[0] in scene.passive):
+        return False
+    untouched = terms.torque is None or ca.SX(terms.torque)[:6].is_zero()
+    return untouched and terms.symbols.base is None and not scene.model.armature[:6].any()
+
+
+def kept(scene: Scene, q: Array, v: Array) -> Kept:
+    """Center of mass and momenta of a state in the world."""
+    data = scene.model.createData()
+    momentum = pin.computeCentroidalMomentum(scene.model, data, q, v)
+    center = pin.centerOfMass(scene.model, data, q)
+    return Kept(center.copy(), momentum.linear.copy(), momentum.angular.copy())
+
+
+def after(scene: Scene, start: Kept, duration: float) -> Kept:
+    """What becomes of it in free fall."""
+    mass, g, T = pin.computeTotalMass(scene.model), scene.model.gravity.linear, duration
+    center = start.center + start.linear / mass * T + g * T**2 / 2
+    return Kept(center, start.linear + mass * g * T, start.angular)
+
+
+def free_fall_contradiction(
+    scene: Scene, boundary: tuple[Array, Array, Array, Array], free: Mask, duration: float
+) -> str:
+    """Why no joint torque brings a free-falling robot from one state to another, or "".
+
+    boundary: (q0, v0, q1, v1). free: which of (q, v) are free at both ends, shape (2, 2, nv).
+    """
+    if not falls_freely(scene) or free[0].any():
+        return ""
+    q0, v0, q1, v1 = boundary
+    expected = after(scene, kept(scene, q0, v0), duration)
+    base = scene.robot.joint_names[0]
+    if not free[1, 0].any():
+        gap = float(np.linalg.norm(kept(scene, q1, v1).center - expected.center))
+        if gap > CLOSE * (1.0 + float(np.linalg.norm(expected.center))):
+            return (
+                f"the base {base!r} carries no torque, so that joint torques cannot move the "
+                f"center of mass: it would have to end {gap:.4g} m from where free fall takes it; "
+                f"leave the goal's base position free"
+            )
+    if not free[1, 0, 3:].any() or _rests(v1, free):
+        return _momentum(scene, q1, v1, free[1, 1], expected, base)
+    return ""
+
+
+def without_redundancy(scene: Scene, v1: Array, free: Mask) -> Mask:
+    """Which components of both ends are free, with those freed that follow from what is kept.
+
+    v1: velocity at the goal, shape (nv,). free: as above, shape (2, 2, nv).
+    The base's place follows where all else of the goal's configuration is fixed, and its velocity
+    where all joint rates are. Equations that repeat others would have no unique multipliers.
+    """
+    if not falls_freely(scene) or free[0].any():
+        return free
+    freed = free.copy()
+    if not free[1, 0].any():
+        freed[1, 0, :3] = True
+    known = not free[1, 0, 3:].any() or _rests(v1, free)
+    if known and not free[1, 1, 6:].any():
+        freed[1, 1, :6] = True
+    return freed
+
+
+def _rests(v1: Array, free: Mask) -> bool:
+    """Whether the goal has no momentum, however the robot stands there."""
+    return not v1.any() and not free[1, 1].any()
+
+
+def _momentum(scene: Scene, q: Array, v: Array, free: Mask, expected: Kept, base: str) -> str:
+    """Why no choice of the free velocities has the momenta that are kept."""
+    data = scene.model.createData()
+    A = pin.computeCentroidalMap(scene.model, data, q)  # momenta = A v
+    wanted = np.concatenate([expected.linear, expected.angular])
+    gap = wanted - A @ np.where(free, 0.0, v)
+    if free.any():
+        gap = gap - A[:, free] @ np.linalg.lstsq(A[:, free], gap, rcond=None)[0]
+    if np.linalg.norm(gap) <= CLOSE * (1.0 + np.linalg.norm(wanted)):
+        return ""
+    kind, size, unit = "linear", np.linalg.norm(gap[:3]), "kg m/s"
+    if size < np.linalg.norm(gap[3:]):
+        kind, size, unit = "angular", np.linalg.norm(gap[3:]), "N m s"
+    return (
+        f"the base {base!r} carries no torque, so that joint torques cannot change the momentum: "
+        f"the goal's {kind} momentum is off by {size:.4g} {unit}; leave the goal's base velocity "
+        "free"
+    )

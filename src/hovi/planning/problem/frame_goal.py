@@ -1,0 +1,224 @@
+"""Goals of a frame: where a hand is to be and how it is turned, the joints being free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.errors import InputError, nearest
+from hovi.planning.problem.node_conditions import Condition
+from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.tangent import Symbols, hessian, jacobian
+
+Array = npt.NDArray[np.float64]
+
+HALF_TURN = 1e-6
+"""Angle in [rad] by which a frame may miss a goal whose equations hold: else it is turned over."""
+UNIT = 1e-6
+"""How far a rotation matrix or a direction may be from orthonormal."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameGoal:
+    """A pose, a position, an orientation or the direction of an axis, at a frame of the robot.
+
+    frame: name of the frame.
+    pose: a homogeneous matrix (4, 4) or a pinocchio.SE3; stands for position and rotation.
+    position: of the frame's origin in the world, shape (3,), in [m].
+    rotation: of the frame's axes in the world, shape (3, 3).
+    axis: (direction in the frame, direction in the world), two vectors of shape (3,).
+    free_velocity: joints whose velocity at the goal is free, by name or ALL; the others rest.
+    guess: configuration (nq,) from which the first one that meets the goal is looked for.
+    Raises InputError for what is no rotation, no direction or no goal at all.
+    """
+
+    frame: str
+    pose: Any = None
+    position: npt.ArrayLike | None = None
+    rotation: npt.ArrayLike | None = None
+    axis: tuple[npt.ArrayLike, npt.ArrayLike] | None = None
+    free_velocity: Sequence[str] = field(default=(), kw_only=True)
+    guess: npt.ArrayLike | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if self.pose is not None:
+            if self.position is not None or self.rotation is not None or self.axis is not None:
+                raise InputError("a frame goal takes a pose, or its parts, not both.")
+            matrix = _numbers("pose", getattr(self.pose, "homogeneous", self.pose))
+            if matrix.shape != (4, 4):
+                raise InputError(f"a pose is a matrix of shape (4, 4), not {matrix.shape}.")
+            if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+                raise InputError(f"the last row of a pose is 0, 0, 0, 1, not {matrix[3]}.")
+            object.__setattr__(self, "position", matrix[:3, 3])
+            object.__setattr__(self, "rotation", matrix[:3, :3])
+            object.__setattr__(self, "pose", None)
+        if self.position is None and self.rotation is None and self.axis is None:
+            raise InputError("a frame goal needs a pose, a position, a rotation or an axis.")
+        if self.rotation is not None and self.axis is not None:
+            raise InputError("a frame goal takes a rotation or an axis, not both.")
+        if self.position is not None:
+            object.__setattr__(self, "position", _vector("position", self.position))
+        if self.rotation is not None:
+            object.__setattr__(self, "rotation", _rotation(self.rotation))
+        if self.axis is not None:
+            if len(self.axis) != 2:
+                raise InputError("an axis is a pair: a direction in the frame, one in the world.")
+            object.__setattr__(self, "axis", tuple(_direction(each) for each in self.axis))
+        if isinstance(self.free_velocity, str):
+            object.__setattr__(self, "free_velocity", (self.free_velocity,))
+
+    def check(self, robot: Robot) -> None:
+        """Raise InputError for a frame that the robot does not have."""
+        if self.frame not in robot.frame_names:
+            hint = nearest(self.frame, robot.frame_names)
+            raise InputError(f"robot {robot.name!r} has no frame {self.frame!r}: {hint}")
+
+    def condition(self, robot: Robot) -> FrameCondition:
+        """The goal as equations."""
+        self.check(robot)
+        return FrameCondition(self, robot)
+
+
+@dataclass(frozen=True, eq=False)
+class FrameCondition(Condition):
+    """The equations of a frame goal: position - target, then the sine of the turn that is missing.
+
+    A turn by theta about a unit axis u is missing by sin(theta) u = sum_i R_i x R*_i / 2 over the
+    columns; an axis by the two components across its target. Both vanish at half a turn as well,
+    which `missed` tells.
+    """
+
+    goal: FrameGoal
+    robot: Robot
+
+    @property
+    def size(self) -> int:
+        """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
+        goal = self.goal
+        turn = 3 if goal.rotation is not None else 2 if goal.axis is not None else 0
+        return (3 if goal.position is not None else 0) + turn
+
+    def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """c and its Jacobian."""
+        c, J = self._linear(q)
+        jacobian = np.zeros((self.size, 2, self.robot.nv))
+        jacobian[:, 0] = np.asarray(J)
+        return np.asarray(c).ravel(), jacobian
+
+    def curvature(self, q: Array, v: Array, weights: Array) -> Array:
+        """sum_i weights_i d2 c_i."""
+        n = self.robot.nv
+        curvature = np.zeros((2, n, 2, n))
+        curvature[0, :, 0] = np.asarray(self._curvature(q, weights))
+        return curvature
+
+    def missed(self, q: Array) -> tuple[float, float]:
+        """Distance in [m] and angle in [rad] from the goal; 0 for what it does not ask."""
+        R, p = (np.asarray(each, dtype=float) for each in self._placement(q))
+        distance = 0.0 if self.goal.position is None else _norm(p.ravel() - self.goal.position)
+        angle = 0.0
+        if self.goal.rotation is not None:
+            angle = _norm(pin.log3(np.asarray(self.goal.rotation).T @ R))
+        if self.goal.axis is not None:
+            inner, world = (np.asarray(each) for each in self.goal.axis)
+            angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
+        return distance, angle
+
+    def elsewhere(self, q: Array, v: Array) -> bool:
+        """Whether the frame is half a turn away from its goal."""
+        return self.missed(q)[1] > HALF_TURN
+
+    def describe(self, q: Array, v: Array) -> str:
+        """By how much the frame misses its goal."""
+        distance, angle = self.missed(q)
+        parts = [f"{distance:.3g} m"] * (self.goal.position is not None)
+        parts += [f"{angle:.3g} rad"] * (self.goal.rotation is not None or bool(self.goal.axis))
+        return f"frame {self.goal.frame!r} misses it by {' and '.join(parts)}"
+
+    @cached_property
+    def _placement(self) -> ca.Function:
+        return casadi_functions(self.robot.model).frame_placement(self.goal.frame)
+
+    @cached_property
+    def _symbols(self) -> tuple[Symbols, ca.SX]:
+        """(q, v, a, t) and c."""
+        sizes = {"q": self.robot.nq, "v": self.robot.nv, "a": self.robot.nv, "t": 1}
+        q, v, a, t = (ca.SX.sym(name, size) for name, size in sizes.items())
+        return (q, v, a, t), self._equations(q)
+
+    @property
+    def _space(self) -> ConfigurationSpace | None:
+        return None if self.robot.vector_joints else self.robot.space
+
+    def _equations(self, q: ca.SX) -> ca.SX:
+        R, p = self._placement(q)
+        rows = []
+        if self.goal.position is not None:
+            rows.append(p - ca.DM(np.asarray(self.goal.position)))
+        if self.goal.rotation is not None:
+            target = ca.DM(np.asarray(self.goal.rotation))
+            turns = [ca.cross(target[:, i], R[:, i]) for i in range(3)]
+            rows.append((turns[0] + turns[1] + turns[2]) / 2)
+        if self.goal.axis is not None:
+            inner, world = (np.asarray(each) for each in self.goal.axis)
+            across = np.linalg.svd(world[None])[2][1:]  # two directions across the target
+            rows.append(ca.DM(across) @ (R @ ca.DM(inner)))
+        return ca.vertcat(*rows)
+
+    @cached_property
+    def _linear(self) -> ca.Function:
+        symbols, c = self._symbols
+        J = jacobian(c, symbols, self._space)[:, : self.robot.nv]
+        return ca.Function("c", [symbols[0]], [c, J])
+
+    @cached_property
+    def _curvature(self) -> ca.Function:
+        symbols, c = self._symbols
+        n, weights = self.robot.nv, ca.SX.sym("weights", c.shape[0])
+        H = hessian(ca.dot(weights, c), symbols, self._space)[0][:n, :n]
+        return ca.Function("ddc", [symbols[0], weights], [H])
+
+
+def _numbers(name: str, value: Any) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"the {name} of a frame goal is numbers, not {value!r}.") from None
+
+
+def _vector(name: str, value: npt.ArrayLike) -> Array:
+    vector = _numbers(name, value)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"the {name} of a frame goal is three finite numbers, not {value!r}.")
+    return vector
+
+
+def _direction(value: npt.ArrayLike) -> Array:
+    vector = _vector("axis", value)
+    length = np.linalg.norm(vector)
+    if length < UNIT:
+        raise InputError("the axis of a frame goal has no length; give a direction.")
+    return np.asarray(vector / length)
+
+
+def _rotation(value: npt.ArrayLike) -> Array:
+    matrix = _numbers("rotation", value)
+    fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+    if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > UNIT:
+        raise InputError(f"the rotation of a frame goal is an orthonormal (3, 3), not {value!r}.")
+    if np.linalg.det(matrix) < 0:
+        raise InputError("the rotation of a frame goal is a reflection; turn one axis around.")
+    return matrix
+
+
+def _norm(x: npt.ArrayLike) -> float:
+    return float(np.linalg.norm(np.asarray(x)))

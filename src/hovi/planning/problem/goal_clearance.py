@@ -1,0 +1,74 @@
+"""Whether a frame's goal puts the link that carries the frame into an obstacle.
+
+Without a rotation the link may still turn about the frame's origin. Then a bound speaks: distances
+to a set change by no more than the way one goes, so that
+
+    d(link, obstacle) <= d(origin, obstacle) + d(origin, link),
+
+all of them negative by the depth of what is inside.
+"""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from hovi.planning.clearance.distances import Distances, Pair
+from hovi.planning.clearance.violation import in_words
+from hovi.planning.problem.frame_goal import FrameGoal
+
+POINT = coal.Sphere(0.0)
+
+
+def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
+    """The largest distances that a goal leaves the shapes of its link, in [m], by pair.
+
+    Exact for a pose, a bound for a position; none for what leaves the position free.
+    """
+    if goal.position is None:
+        return {}
+    frame = distances.robot.model.frames[distances.robot.model.getFrameId(goal.frame)]
+    at = np.asarray(goal.position, dtype=float)
+    objects, found = distances.geometry.geometryObjects, dict[Pair, float]()
+    for pair, ends in zip(distances.pairs, distances.geometry.collisionPairs, strict=True):
+        shape, obstacle = objects[ends.first], objects[ends.second]
+        if not pair.obstacle or shape.parentJoint != frame.parentJoint:
+            continue
+        if goal.rotation is not None:
+            placed = pin.SE3(np.asarray(goal.rotation), at) * frame.placement.inverse()
+            d = _distance(shape.geometry, placed * shape.placement, obstacle)
+        else:
+            origin = pin.SE3(np.eye(3), frame.placement.translation)
+            here = pin.SE3(np.eye(3), at)
+            d = _distance(POINT, here, obstacle) + _distance(POINT, origin, shape)
+        found[pair] = min(d, found.get(pair, np.inf))
+    return found
+
+
+def goal_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: float) -> str:
+    """Which obstacle the goal's link has to come too near to, in a sentence without its end, or "".
+
+    name: what the goal is called. margin: that is kept, in [m].
+    """
+    found = goal_distances(goal, distances)
+    if not found or min(found.values()) >= margin:
+        return ""
+    pair = min(found, key=lambda each: found[each])
+    needed = "" if found[pair] < 0 else f", less than the margin of {margin:g} m"
+    least = "" if goal.rotation is not None else ", or are even nearer"
+    return (
+        f"with frame {goal.frame!r} at the {name}, {pair} {in_words(found[pair])}{least}{needed}; "
+        f"move the {name} or what is in its way"
+    )
+
+
+def _distance(
+    shape: coal.CollisionGeometry, placement: pin.SE3, other: pin.GeometryObject
+) -> float:
+    """Signed distance of a shape and another where that is placed, in [m]."""
+    first = coal.Transform3s(placement.rotation, placement.translation)
+    second = coal.Transform3s(other.placement.rotation, other.placement.translation)
+    result = coal.DistanceResult()
+    coal.distance(shape, first, other.geometry, second, coal.DistanceRequest(), result)
+    return float(result.min_distance)

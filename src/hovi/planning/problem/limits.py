@@ -1,0 +1,227 @@
+"""Limits on a motion: bounds on q, v, a and tau of every joint coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError, nearest
+from hovi.robot.robot import Robot
+
+Array = npt.NDArray[np.float64]
+Range = tuple[Array, Array]
+
+KINDS = ("q", "v", "a", "tau")
+"""What can be limited, in the order in which outputs are stacked."""
+NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
+_SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
+_TRANSLATIONS = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2, "JointModelTranslation": 3}
+UNLIMITED = 1e15
+"""Bounds beyond this mean that there is none."""
+LEAST_ROOM = 1e-12
+"""Least range of a limit, relative to its bounds where they are larger than one."""
+TOLERANCE = 1e-6
+"""Share of its range by which a limit may be exceeded between the quadrature points."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """lower <= (q, v, a, tau) <= upper along a motion; infinite where there is no limit.
+
+    lower, upper: shape (4, nv), one row per kind, in [rad], [rad/s], [rad/s^2] and [N m] (metres
+        and newtons for sliding joints).
+    tolerance: by which share of its range a limit may be exceeded anywhere.
+    Raises InputError for a range that is empty, to rounding, or not a number.
+    """
+
+    lower: Array
+    upper: Array
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        if np.isnan(self.lower).any() or np.isnan(self.upper).any():
+            raise InputError("a limit is not a number; leave out what is not limited.")
+        for k, i in np.argwhere(self._without_room):
+            raise InputError(
+                f"the {NAMES[KINDS[k]]} limits of joint coordinate {i} leave no room: "
+                f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; widen them."
+            )
+        if not (np.isfinite(self.tolerance) and self.tolerance > 0):
+            raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
+
+    @property
+    def _without_room(self) -> npt.NDArray[np.bool_]:
+        """Where rounding leaves nothing between the bounds, or only numbers beyond all limits."""
+        size = np.maximum(1.0, np.minimum(np.abs(self.lower), np.abs(self.upper)))
+        size[np.isinf(size)] = 1.0
+        beyond = (self.lower > UNLIMITED) | (self.upper < -UNLIMITED)
+        return np.asarray((self.lower + LEAST_ROOM * size >= self.upper) | beyond)
+
+    @property
+    def bounded(self) -> npt.NDArray[np.bool_]:
+        """Which outputs have a bound on at least one side, shape (4, nv)."""
+        return np.isfinite(self.lower) | np.isfinite(self.upper)
+
+    @property
+    def ranges(self) -> Array:
+        """Size by which each output is measured: its range, or its only bound, (4, nv)."""
+        both = self.upper - self.lower
+        one = np.where(np.isfinite(self.lower), self.lower, self.upper)
+        single = np.maximum(1.0, np.abs(np.where(np.isfinite(one), one, 1.0)))
+        return np.where(np.isfinite(both), both, single)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The limits as JSON-able data, None where there is none."""
+        rows = {
+            name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
+            for name, bound in (("lower", self.lower), ("upper", self.upper))
+        }
+        return {**rows, "tolerance": self.tolerance}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Limits:
+        """The limits that to_dict wrote."""
+        bounds = [
+            np.array([[free if x is None else x for x in row] for row in data[name]], dtype=float)
+            for name, free in (("lower", -np.inf), ("upper", np.inf))
+        ]
+        return cls(bounds[0], bounds[1], float(data["tolerance"]))
+
+    def excess(self, outputs: Array) -> Array:
+        """By which share of its range each output is outside; negative inside.
+
+        outputs: (q, v, a, tau) stacked, shape (..., 4, nv).
+        """
+        outside = np.maximum(self.lower - outputs, outputs - self.upper)
+        return np.asarray(outside / self.ranges)
+
+    def with_margin(self, margin: float) -> Limits:
+        """Limits narrower by a share of their ranges on every side."""
+        if not (np.isfinite(margin) and 0 <= margin < 0.5):
+            raise InputError(f"a margin is a share of the range in [0, 0.5), got {margin}.")
+        room = margin * self.ranges
+        return Limits(self.lower + room, self.upper - room, self.tolerance)
+
+
+def no_limits(robot: Robot) -> Limits:
+    """Limits that are nowhere."""
+    shape = (4, robot.nv)
+    return Limits(np.full(shape, -np.inf), np.full(shape, np.inf))
+
+
+def urdf_limits(robot: Robot) -> Limits:
+    """Position, velocity and effort limits of the URDF; 0 or nothing there means no limit."""
+    lower, upper = np.full((4, robot.nv), -np.inf), np.full((4, robot.nv), np.inf)
+    if not robot.unplanned_joints:
+        iq, iv = robot.space.plain
+        lower[0, iv], upper[0, iv] = robot.lower[iq], robot.upper[iq]
+    for row, size in ((1, robot.velocity_limit), (3, robot.effort_limit)):
+        bound = np.where(size > 0, size, np.inf)
+        lower[row], upper[row] = -bound, bound
+    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
+    return Limits(lower, upper)
+
+
+def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
+    """Limits from a word or a mapping, as `plan` and scene files take them.
+
+    limits: "urdf", "none", a Limits, or a mapping with any of `base` ("urdf", the default, or
+        "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or a list for
+        bounds on both sides alike, a list of pairs (lower, upper), or a mapping from joint names
+        to either.
+    Raises InputError for what does not fit the robot.
+    """
+    if isinstance(limits, Limits):
+        return limits
+    if not isinstance(limits, Mapping):
+        return _by_word(robot, limits)
+    keys = ("base", *KINDS, "margin", "tolerance")
+    for key in limits:
+        if key not in keys:
+            raise InputError(f"there is no limit {key!r}: {nearest(key, keys)}")
+    base = _by_word(robot, limits.get("base", "urdf"))
+    lower, upper = base.lower.copy(), base.upper.copy()
+    for row, kind in enumerate(KINDS):
+        for i, (low, high) in _entries(robot, kind, limits.get(kind, {})).items():
+            lower[row, i], upper[row, i] = low, high
+    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
+    chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
+    return chosen.with_margin(_number(limits, "margin", 0.0))
+
+
+def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
+    value = limits.get(key, default)
+    if isinstance(value, bool) or not isinstance(value, float | int | np.number):
+        raise InputError(f"limits.{key} is a number, got {value!r}.")
+    return float(value)
+
+
+def _by_word(robot: Robot, word: Any) -> Limits:
+    words = {"urdf": urdf_limits, "none": no_limits}
+    if not isinstance(word, str) or word not in words:
+        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {word!r}.")
+    return words[word](robot)
+
+
+def _entries(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
+    """Bounds by place in v, from any of the ways to give them."""
+    found = _pairs(robot, kind, given)
+    if kind == "q" and not robot.vector_joints:
+        for i in found:
+            if i not in robot.space.plain[1] and isinstance(given, Mapping):
+                raise InputError(
+                    f"limits.q: {robot.coordinate_names[i]!r} turns or moves freely and has no "
+                    "position limits; leave it out."
+                )
+        found = {i: pair for i, pair in found.items() if i in robot.space.plain[1]}
+    return found
+
+
+def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
+    names = robot.coordinate_names
+    if isinstance(given, Mapping):
+        for name in given:
+            if name not in names:
+                raise InputError(
+                    f"limits.{kind}: robot {robot.name!r} has no joint {name!r}: "
+                    f"{robot.hint(str(name), names)}"
+                )
+        return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
+    if isinstance(given, float | int | np.number):
+        given = [given] * robot.nv
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != robot.nv:
+        raise InputError(
+            f"limits.{kind} needs one entry for each of {', '.join(names)}, got {given!r}."
+        )
+    return {i: _pair(kind, names[i], value) for i, value in enumerate(given)}
+
+
+def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
+    try:
+        numbers = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.full(3, np.nan)
+    if numbers.ndim == 0 and numbers > 0:
+        return -float(numbers), float(numbers)
+    if numbers.shape == (2,) and numbers[0] < numbers[1]:
+        return float(numbers[0]), float(numbers[1])
+    raise InputError(
+        f"limits.{kind} of {name!r} is a positive number or a rising pair, got {value!r}."
+    )
+
+
+def unit_of(robot: Robot, kind: str, i: int) -> str:
+    """Unit of q, v, a or tau at a joint coordinate: radians and N m, or metres and N.
+
+    kind: one of KINDS. i: place in v.
+    """
+    joint = next(j for j in list(robot.model.joints)[1:] if j.idx_v <= i < j.idx_v + j.nv)
+    sliding = joint.shortname().startswith(_SLIDING) or i - joint.idx_v < _TRANSLATIONS.get(
+        joint.shortname(), 0
+    )
+    angle, effort = ("m", "N") if sliding else ("rad", "N m")
+    return {"q": angle, "v": f"{angle}/s", "a": f"{angle}/s^2", "tau": effort}[kind]

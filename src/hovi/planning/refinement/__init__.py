@@ -1,0 +1,1 @@
+"""How accurate a solution is, which grid is next, and the certificate."""

@@ -1,0 +1,96 @@
+"""The next grid of a search, and the motion to begin with on it."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.finer_grid import MORE_MODES, finer_grid
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import stretched
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Quantity
+from hovi.planning.refinement.candidate import Candidate, contributions
+from hovi.planning.refinement.error_estimate import estimate_against
+from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.refinement.hp_refinement import Demand, decay, refined
+
+Array = npt.NDArray[np.float64]
+
+AIM = 0.3
+"""Share of the tolerance that a refined grid aims at."""
+HOPED = 2.5
+"""Ratio of what is foreseen of the finer solution and that aim with which it is tried: it is known
+already, and looking at its error costs little."""
+
+
+def next_grid(candidate: Candidate) -> Grid:
+    """A grid that is foreseen to be just fine enough; the finer solution's where that is."""
+    problem, finer = candidate.solution.problem, candidate.finer
+    assert problem is not None
+    if finer is None:
+        return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
+    demands, rho = _demands(candidate, finer), _decay(candidate, finer)
+    same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
+    # halved everywhere, as under limits, its own error would take twice as many intervals again
+    if same_steps and all(demand.left(rho**MORE_MODES) <= HOPED for demand in demands):
+        return finer.problem.grid
+    grid = refined(problem.grid, rho, demands, problem.robot.nv)
+    return finer_grid(grid) if _same(grid, problem.grid) else grid
+
+
+def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
+    """The finer solution's curve on another grid of the same problem."""
+    grid, path = problem.grid, finer.path
+    if np.array_equal(grid.steps, finer.problem.grid.steps):
+        inner = np.zeros((grid.intervals, grid.inner_modes, path.v.shape[1]))
+        for scheme, index in grid.groups:
+            r = min(scheme.inner_modes, path.inner.shape[1])
+            inner[index, :r] = path.inner[index, :r]
+        return DiscretePath(path.q, path.v, path.z, inner)
+    curve = stretched(finer.trajectory, grid.duration)
+    return problem.path(curve)
+
+
+def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
+    """What each interval has to contribute."""
+    known = contributions(finer)
+    N, aim = len(known), AIM * candidate.tolerance.size
+    if candidate.tolerance.quantity is Quantity.COST:
+        short = max(1.0, candidate.error / max(known.sum(), 1e-300))
+        return [Demand(aim / (N * np.maximum(short * known, 1e-300)), 2)]
+    return _demands_on_curve(candidate, finer, known)
+
+
+def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) -> list[Demand]:
+    """Of the curve where it is off between good nodes, of everything where the nodes are."""
+    tolerance = candidate.tolerance
+    estimate = estimate_against(candidate.solution, finer, tolerance.frame)
+    if tolerance.quantity is Quantity.FRAME:
+        along, ends = estimate.tip, estimate.tip_at_nodes
+    else:
+        along, ends = estimate.q.max(axis=1), estimate.q_at_nodes.max(axis=1)
+    aim = AIM * tolerance.size
+    nearby = np.maximum(ends[:-1], ends[1:])
+    own = np.where(along > 3 * nearby, along, 0.0)
+    nodes = aim / max(float(ends.max()), 1e-300)
+    share = known * len(known) / max(known.sum(), 1e-300)
+    return [
+        Demand(aim / np.maximum(own, 1e-300), 1),
+        Demand(nodes / np.maximum(share, 1e-300), 2),
+    ]
+
+
+def _decay(candidate: Candidate, finer: FinerSolution) -> Array:
+    """Of the finer solution, where it has the same intervals; else of the solution itself."""
+    grid = candidate.solution.trajectory.grid
+    if np.array_equal(grid.steps, finer.problem.grid.steps):
+        return decay(finer.problem.grid, finer.path)
+    return decay(grid, candidate.solution.trajectory.path)
+
+
+def _same(one: Grid, other: Grid) -> bool:
+    same_steps = np.array_equal(one.steps, other.steps)
+    return same_steps and all(
+        a.name == b.name for a, b in zip(one.schemes, other.schemes, strict=True)
+    )

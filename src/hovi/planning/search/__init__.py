@@ -1,0 +1,1 @@
+"""Many starts, continuation, free duration: everything behind `plan`."""

@@ -1,0 +1,251 @@
+"""Many starts on a coarse grid, in parallel processes: which minima are there?
+
+The least-torque landscape has dozens of minima, so more than one start is part of the answer.
+Each round perturbs the best minima found so far (basin hopping); the first ones the guess.
+[WalesDoye1997]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from multiprocessing.resource_tracker import ensure_running
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import Curve, stretched, with_bump, with_turns
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import ChartError
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from hovi.system.interruption import remember
+
+Array = npt.NDArray[np.float64]
+
+ROUND = 16
+"""Starts of one round; the result does not depend on the number of processes."""
+ELITE = 4
+"""Minima that a round perturbs."""
+SAME_COST = 1e-6
+"""Relative difference in cost below which two minima count as one."""
+
+Progress = Callable[[str, float], None]
+"""What is told how far a search is: a line of text and the fraction done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What a worker process needs to solve a problem: it builds its own functions.
+
+    weight: R of the effort, one number per joint. max_iterations: of one solve.
+    """
+
+    scene: Scene
+    weight: tuple[float, ...]
+    grid: Grid
+    start: State
+    goal: State | FrameGoal
+    max_iterations: int
+    limits: Limits
+    via: tuple[Via, ...] = ()
+    clearance: Clearance | None = None
+
+    def problem(self) -> TrajectoryProblem:
+        """The trajectory problem, built once."""
+        return self._problem
+
+    @cached_property
+    def _problem(self) -> TrajectoryProblem:
+        lagrangian = self.scene.effort_lagrangian(self.weight)
+        ld = DiscreteLagrangian(lagrangian, self.grid)
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, self.clearance)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the problem, so that worker processes build their own."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
+
+@dataclass(eq=False)
+class Pool:
+    """Solves a job from many guesses, here or in worker processes.
+
+    deadline: by the monotonic clock, in [s]; none when None.
+    """
+
+    job: Job
+    processes: int
+    deadline: float | None = None
+
+    def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
+        """Solutions in the order of the guesses."""
+        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        count = min(self.processes, len(guesses))
+        if count <= 1:
+            return _solve_chunk(self.job, guesses, left)
+        import joblib  # here, since it takes 60 ms and one process does without
+
+        solve_chunk = joblib.delayed(_solve_chunk)
+        chunks = [guesses[i::count] for i in range(count)]
+        with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+            _start_workers(count)
+            parts = joblib.Parallel(n_jobs=count)(solve_chunk(self.job, c, left) for c in chunks)
+        solutions: list[Solution | None] = [None] * len(guesses)
+        for i, part in enumerate(parts):
+            solutions[i : i + count * len(part) : count] = part
+        return [solution for solution in solutions if solution is not None]
+
+
+def _start_workers(count: int) -> None:
+    """Processes that do not hear Ctrl-C, which this one answers: it ends them.
+
+    A terminal sends it to all of them, and one that still imports would complain.
+    """
+    import joblib
+
+    ensure_running()  # which Python would do later, and unblock Ctrl-C
+    heard = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        joblib.Parallel(n_jobs=count)(joblib.delayed(abs)(i) for i in range(count))
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+
+
+def _solve_chunk(
+    job: Job, guesses: Sequence[DiscretePath], time_limit: float | None
+) -> list[Solution]:
+    problem = job.problem()
+    ends = None if time_limit is None else time.monotonic() + time_limit
+    solutions = []
+    for guess in guesses:
+        left = None if ends is None else max(ends - time.monotonic(), 0.0)
+        solution = solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
+        solutions.append(dataclasses.replace(solution, problem=None))
+        if solution.status is Status.INTERRUPTED:
+            break
+    return solutions
+
+
+@dataclass(frozen=True, eq=False)
+class Exploration:
+    """What a search from many starts found.
+
+    minima: distinct minima by ascending cost; the best of the rest where there are none.
+    done: how many of the starts were solved. interrupted: whether a person ended the search.
+    """
+
+    minima: list[Solution]
+    done: int
+    interrupted: bool
+
+
+def explore(
+    pool: Pool, first: DiscretePath, starts: int, seed: int, progress: Progress
+) -> Exploration:
+    """Solve from many starts, of which the first guess is the first.
+
+    starts: number of solves. seed: of the random bumps.
+    KeyboardInterrupt and the pool's deadline end the search with what was found.
+    """
+    interrupted = False
+    solutions: list[Solution] = []
+    try:
+        solutions += pool.solve_all([first])
+        while len(solutions) < starts and not _ended(pool, solutions):
+            guesses = _round(pool.job, distinct(solutions), first, len(solutions), starts, seed)
+            solutions += pool.solve_all(guesses)
+            best = min(solution.cost for solution in solutions)
+            progress(
+                f"{len(solutions)} of {starts} starts, least cost {best:.6g}",
+                len(solutions) / starts,
+            )
+    except KeyboardInterrupt:
+        if not solutions:
+            raise
+        remember()
+        interrupted = True
+    interrupted = interrupted or any(s.status is Status.INTERRUPTED for s in solutions)
+    return Exploration(distinct(solutions), len(solutions), interrupted)
+
+
+def _ended(pool: Pool, solutions: Sequence[Solution]) -> bool:
+    """Whether time is up, or a person asked for an end."""
+    if any(solution.status is Status.INTERRUPTED for solution in solutions):
+        return True
+    return pool.deadline is not None and time.monotonic() > pool.deadline
+
+
+def _round(
+    job: Job,
+    found: Sequence[Solution],
+    first: DiscretePath,
+    done: int,
+    starts: int,
+    seed: int,
+) -> list[DiscretePath]:
+    """Guesses of the next round: bumps on the best minima, in the first round on the guess."""
+    problem = job.problem()
+    T, robot = job.grid.duration, problem.robot
+    origin = Trajectory(job.grid, first, problem.ld.momenta(first), job.scene)
+    bases = [origin]
+    if done > ROUND:
+        bases = [solution.trajectory for solution in found[:ELITE]] + [origin]
+    guesses = []
+    for i in range(done, min(done + ROUND, starts)):
+        base = stretched(bases[i % len(bases)], T)
+        curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
+        if robot.space.angles:
+            curve = with_turns(curve, robot, T, _random_turns(robot, seed * 100_003 + i))
+        guesses.append(_on_charts(problem, curve, base))
+    return guesses
+
+
+def _on_charts(problem: TrajectoryProblem, curve: Curve, base: Curve) -> DiscretePath:
+    """A curve on the grid, or what it was made from where it turns too far for a chart."""
+    try:
+        return problem.path(curve)
+    except ChartError:
+        return problem.path(base)
+
+
+def _random_turns(robot: Robot, seed: int) -> Array:
+    """For every continuous joint a turn more or less, or mostly none, shape (nv,)."""
+    random = np.random.default_rng([seed, 1])
+    turns = np.zeros(robot.nv)
+    for factor in robot.space.angles:
+        turns[factor.v] = random.choice([-1.0, 0.0, 1.0], p=[0.15, 0.7, 0.15])
+    return turns
+
+
+def distinct(solutions: Sequence[Solution]) -> list[Solution]:
+    """Minima with different costs, ascending; where there are none, the best of the rest."""
+    minima = sorted((s for s in solutions if s.success), key=lambda s: s.cost)
+    if not minima:
+        usable = [s for s in solutions if s.status is not Status.DIVERGED] or list(solutions)
+        return [min(usable, key=lambda s: s.cost)]
+    kept = [minima[0]]
+    for solution in minima[1:]:
+        if solution.cost - kept[-1].cost > SAME_COST * abs(kept[-1].cost):
+            kept.append(solution)
+    return kept
+
+
+def default_processes() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,1 @@
+"""One problem on one grid: from a guess to a `Solution`."""

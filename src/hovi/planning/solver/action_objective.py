@@ -1,0 +1,237 @@
+"""The discrete action of a trajectory problem as an objective of the trust region.
+
+Where a motion has to meet equations, it is their augmented Lagrangian, see
+hovi.planning.solver.multipliers.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.guess import with_ends_of_nodes
+from hovi.discrete.interval_batch import Coordinates, Jet
+from hovi.discrete.interval_paths import move
+from hovi.errors import InputError
+from hovi.optimize.banded_model import BandModel
+from hovi.optimize.merge_tree import MergeTreeModel
+from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
+from hovi.optimize.trust_region import Objective
+from hovi.planning.problem.hessian_structure import ActionStructure
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
+from hovi.scene.lagrangian import EffortLagrangian, PointTerms
+
+Array = npt.NDArray[np.float64]
+LinearAlgebra = Literal["band", "tree"]
+
+CHART_END = 1.4 * np.pi
+"""Turn of an orientation within an interval, in [rad], at which no motion is looked for."""
+LEAST_TORQUE = 1e-4
+"""Torque beside which others are small, as a share of M / T^2, where a motion takes none."""
+BAND_INTERVALS = 1000
+"""Up to this many intervals the nodal band matrix, whose condition grows like N^4, is factored."""
+
+
+class ActionObjective(Objective[DiscretePath]):
+    """The discrete action between fixed ends, in nodal or in regularized coordinates.
+
+    problem: what to minimise.
+    structure: what depends on the grid alone, from an earlier objective on the same grid.
+    algebra: "band" (a banded Cholesky in nodal coordinates, the faster one) or "tree"
+        (merging intervals in regularized coordinates, right at every step length; for fixed ends
+        without conditions).
+    multipliers: of the equations, where there are some.
+    """
+
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        algebra: LinearAlgebra | None = None,
+        structure: ActionStructure | None = None,
+        multipliers: Multipliers | None = None,
+    ) -> None:
+        self.problem = problem
+        self.multipliers = multipliers
+        self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
+        self.structure = structure or problem.structure
+        small = problem.grid.intervals <= BAND_INTERVALS
+        tree = problem.plain and problem.ld.chart is None and not small
+        if algebra == "tree" and not problem.plain:
+            raise InputError("the tree is for fixed ends without conditions; use the band.")
+        self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
+        self._expansion: Expansion | None = None
+        self._last: tuple[DiscretePath, list[Jet]] | None = None
+        self._torques: tuple[DiscretePath, list[Array]] | None = None
+
+    @property
+    def expansion(self) -> Expansion:
+        """The expansion behind the last model."""
+        if self._expansion is None:
+            raise RuntimeError("no model has been asked for yet")
+        return self._expansion
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Columns in which the intervals are expanded."""
+        return "nodal" if self.algebra == "band" else "regular"
+
+    def value(self, x: DiscretePath) -> float:
+        """The discrete action, with what equations add."""
+        return self.value_of(x, self.torques(x))
+
+    def torques(self, x: DiscretePath) -> list[Array]:
+        """tau at the quadrature points, (P, nv) per batch, remembered for the last path."""
+        if self._torques is None or self._torques[0] is not x:
+            torque = self.lagrangian.torques.torque
+            pairs = zip(self.jets(x), self.ld.point_times, strict=True)
+            self._torques = x, [torque(*jet, t) for jet, t in pairs]
+        return self._torques[1]
+
+    def _overturned(self, x: DiscretePath) -> bool:
+        """Whether an orientation leaves the chart of an interval, which is singular at a turn."""
+        return self.ld.chart is not None and bool(self.ld.turns(x).max() > CHART_END)
+
+    def value_of(self, x: DiscretePath, torques: list[Array]) -> float:
+        """The value where the torques at the quadrature points are known."""
+        if self._overturned(x):
+            return float("inf")
+        value = 0.0
+        for i, (jet, t, weights) in enumerate(
+            zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)
+        ):
+            value += self.lagrangian.integral(torques[i], jet, t, weights)
+            if self.multipliers is not None:
+                value += float(weights @ np.vecdot(self.multipliers.torque[i], torques[i]))
+        if self.multipliers is not None:
+            rho = self.multipliers.node_penalty
+            residuals = node_residuals(self.problem, x)
+            for mu, c in zip(self.multipliers.nodes, residuals, strict=True):
+                value += float(mu @ c + 0.5 * rho * c @ c)
+        return value
+
+    def effort(self, torque: Array, batch: int) -> Array:
+        """d value / d tau at the points of a batch: R tau, and the multipliers."""
+        effort = self.lagrangian.weight * torque
+        return effort if self.multipliers is None else effort + self.multipliers.torque[batch]
+
+    def residuals(self, x: DiscretePath) -> Residuals:
+        """By how much the equations fail."""
+        torques = self.torques(x)
+        largest = max(float(np.max(np.abs(tau))) for tau in torques)
+        largest = max(largest, LEAST_TORQUE * self.problem.inertial_torque)
+        passive = [tau[:, self.problem.passive] for tau in torques]
+        return Residuals(passive, node_residuals(self.problem, x), largest)
+
+    @property
+    def lagrangian(self) -> EffortLagrangian:
+        """The effort that is minimised."""
+        assert isinstance(self.ld.lagrangian, EffortLagrangian)
+        return self.ld.lagrangian
+
+    def jets(self, x: DiscretePath) -> list[Jet]:
+        """(q, v, a) at the quadrature points, remembered for the last path."""
+        if self._last is None or self._last[0] is not x:
+            self._last = x, self.ld.jets(x)
+        return self._last[1]
+
+    def model(
+        self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
+    ) -> QuadraticModel:
+        """The quadratic model at x, its curvature weighted by the predicted torque."""
+        curvatures = None
+        if previous is not None and step is not None and self._expansion is not None:
+            local = previous.gather(step)
+            curvatures = self.ld.predict(self._expansion, local, self.coordinates)
+        if curvatures is None:
+            curvatures = [self.effort(tau, i) for i, tau in enumerate(self.torques(x))]
+        elif self.multipliers is not None:
+            pairs = zip(curvatures, self.multipliers.torque, strict=True)
+            curvatures = [effort + more for effort, more in pairs]
+        return self.model_with(x, curvatures, None)
+
+    def model_with(
+        self,
+        x: DiscretePath,
+        curvatures: list[Array] | None,
+        terms: list[PointTerms] | None,
+    ) -> QuadraticModel:
+        """The model at x with given curvature weights and with what limits add at the points.
+
+        curvatures: weights of the curvature of tau, multipliers of equations included.
+        """
+        if self.multipliers is not None:
+            terms = self.multipliers.added_to(terms)
+        self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
+        if self.multipliers is not None:
+            self._add_conditions(x, self._expansion, self.multipliers)
+        intervals = IntervalSum(
+            self._expansion.gradient,
+            self._expansion.hessian,
+            self.structure.metric[self.coordinates],
+        )
+        if self.algebra == "band":
+            return BandModel(intervals, self.structure.layout, self.structure.metric_band)
+        return MergeTreeModel(intervals, self.structure.tree)
+
+    def negative_eigenvalues(self, x: DiscretePath) -> int:
+        """n_neg of the exact Hessian at x."""
+        if not self.problem.plain or self.ld.chart is not None:
+            model = self.model(x, None, None)
+            assert isinstance(model, BandModel)
+            return model.negative_eigenvalues()
+        return self.merge_model(x).negative_eigenvalues()
+
+    def merge_model(self, x: DiscretePath) -> MergeTreeModel:
+        """The exact model at x in regularized coordinates, between fixed ends."""
+        expansion = self.ld.expand(x, "regular")
+        metric = self.structure.metric["regular"]
+        intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
+        return MergeTreeModel(intervals, self.structure.tree)
+
+    def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
+        """What conditions at nodes add to the intervals that have these nodes."""
+        N, rho = self.problem.grid.intervals, known.node_penalty
+        for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
+            k = min(each.node, N - 1)
+            columns = slice(0, 2) if each.node < N else slice(2, 4)
+            q, v = x.q[each.node], x.v[each.node]
+            c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
+            force = mu + rho * c
+            curvature = rho * np.einsum("sin,sjm->injm", J, J)
+            curvature += each.condition.curvature(q, v, force)
+            scale = np.array([1.0, 1.0 / self.problem.grid.steps[k]])  # of (q, h v)
+            expansion.gradient[k, columns] += np.tensordot(force, J, 1) * scale[:, None]
+            curvature *= scale[:, None, None, None] * scale[:, None]
+            expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
+
+    def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
+        """The path moved by a step: nodes by `integrate`, everything else added."""
+        nodal = self.coordinates == "nodal"
+        dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
+        path = DiscretePath(self.problem.robot.integrate(x.q, dq), *moved)
+        if self.ld.chart is None:
+            return path
+        return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
+
+    def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
+        """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""
+        changes = self.structure.sizes[self.coordinates] * model.gather(step)
+        T = self.problem.grid.duration
+        size = max(1.0, np.abs(x.q).max(), T * np.abs(x.v).max())
+        return float(np.abs(changes).max() / size)
+
+
+def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
+    """The discrete Lagrangian whose weight of the passive joints' torques is their penalty."""
+    lagrangian = problem.ld.lagrangian
+    if not isinstance(lagrangian, EffortLagrangian) or len(problem.passive) == 0:
+        return problem.ld
+    weight = lagrangian.weight.copy()
+    weight[problem.passive] = multipliers.torque_penalty
+    return DiscreteLagrangian(dataclasses.replace(lagrangian, weight=weight), problem.grid)

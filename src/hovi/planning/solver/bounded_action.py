@@ -1,0 +1,211 @@
+"""The discrete action under limits, as an objective of the interior point."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.barrier import Bounds
+from hovi.optimize.interior_point import BoundedObjective, Outputs
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.point_outputs import PointOutputs
+from hovi.scene.lagrangian import PointTerms
+
+Array = npt.NDArray[np.float64]
+
+
+class LimitedAction(BoundedObjective[DiscretePath]):
+    """The discrete action, with (q, v, a, tau) bounded at the quadrature points.
+
+    Outputs of q that have to be 0 or more, distances to obstacles for instance, follow those in
+    their columns.
+
+    problem: what to minimise.
+    limits: the bounds.
+    margins: by which share of its range each bound is drawn in, below and above, in each
+        interval, shape (2, N, 4 nv + more); none when None.
+    algebra, multipliers: as for ActionObjective.
+    more: outputs besides.
+    """
+
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        limits: Limits,
+        margins: Array | None = None,
+        algebra: LinearAlgebra | None = None,
+        multipliers: Multipliers | None = None,
+        more: PointOutputs | None = None,
+    ) -> None:
+        self.problem = problem
+        self.limits = limits
+        self.action = ActionObjective(problem, algebra, problem.structure, multipliers)
+        self.ld = self.action.ld
+        self.lagrangian = self.action.lagrangian
+        self.columns = np.flatnonzero(limits.bounded.ravel())
+        self.more = more
+        self.bounds = self._bounds(margins)
+        self._predicted: list[Array] | None = None
+        self._linear: list[Array] = []
+        self._rho = np.zeros(0)
+        self._jacobian = np.zeros((0, 0, 0))
+
+    def outputs(self, x: DiscretePath) -> Outputs:
+        """The discrete action, and the bounded outputs in units of their ranges."""
+        torques = self.action.torques(x)
+        pairs = zip(self.action.jets(x), torques, strict=True)
+        space = self.lagrangian.space
+        rows = [
+            np.concatenate([q if space is None else space.coordinates(q), v, a, tau], axis=1)
+            for (q, v, a), tau in pairs
+        ]
+        y = self._scaled(np.concatenate(rows))
+        if self.more is not None:
+            y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
+        return Outputs(self.action.value_of(x, torques), y)
+
+    def model(
+        self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
+    ) -> QuadraticModel:
+        """The action's model with the bounds' terms: see BoundedObjective.model."""
+        self._rho = rho
+        gradient = self._unscaled(rho, 1)
+        weight = self._unscaled(sigma, 2)
+        force = self._unscaled(multipliers, 1)
+        terms, curvatures = [], []
+        k = 3 * self.lagrangian.nv  # (q, v, a) first, then tau
+        for i, part in enumerate(self._parts):
+            slope, curve = gradient[part], weight[part]
+            terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
+            curvatures.append(self._effort(x, i) + force[part, k:])
+        if self.more is not None:
+            terms = self._with_more(x, terms, sigma, rho, multipliers)
+        return self.action.model_with(x, curvatures, terms)
+
+    def forces(self, x: DiscretePath, multipliers: Array) -> list[PointTerms]:
+        """What the bounds, and equations besides, exert on (q, v, a, tau) at the points.
+
+        multipliers: of the outputs, shape (P, K).
+        """
+        force = self._unscaled(multipliers, 1)
+        k = 3 * self.lagrangian.nv
+        zero = np.zeros_like(force)
+        terms = [
+            PointTerms(force[p, :k], zero[p, :k], force[p, k:], zero[p, k:]) for p in self._parts
+        ]
+        if self.more is not None:
+            terms = self._with_more(x, terms, np.zeros_like(multipliers), multipliers, multipliers)
+        known = self.action.multipliers
+        return terms if known is None else known.added_to(terms)
+
+    def _with_more(
+        self,
+        x: DiscretePath,
+        terms: list[PointTerms],
+        sigma: Array,
+        rho: Array,
+        multipliers: Array,
+    ) -> list[PointTerms]:
+        """The terms with those of the other outputs."""
+        assert self.more is not None
+        first, nv = len(self.columns), self.lagrangian.nv
+        J, curve = self.more.expand(self._configurations(x), multipliers[:, first:])
+        self._jacobian = J
+        slope = np.matmul(rho[:, None, first:], J)[:, 0]  # (P, nv)
+        curve = curve + np.matmul(J.transpose(0, 2, 1), sigma[:, first:, None] * J)
+        for term, part in zip(terms, self._parts, strict=True):
+            term.jet_gradient[:, :nv] += slope[part]
+        return [
+            dataclasses.replace(term, configuration_weight=curve[part])
+            for term, part in zip(terms, self._parts, strict=True)
+        ]
+
+    def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
+        """Change of the action and of the bounded outputs, to first order."""
+        expansion = self.action.expansion
+        changes = self.ld.point_steps(model.gather(step), self.action.coordinates, expansion)
+        rows = []
+        self._linear = []
+        for dx, (_tau, J) in zip(changes, expansion.torque, strict=True):
+            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
+            self._linear.append(dtau)
+            rows.append(np.concatenate([dx, dtau], axis=1))
+        changed = np.concatenate(rows)
+        dy = changed[:, self.columns] / self._ranges
+        if self.more is not None:
+            dq = changed[:, : self.lagrangian.nv, None]
+            dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
+        slope = float(np.vdot(model.gradient, step))
+        return slope - float(np.sum(self.bounds.weights * self._rho * dy)), dy
+
+    def follow(self, fraction: float) -> None:
+        """The torques that the step taken foresees weight the next curvature."""
+        pairs = zip(self.action.expansion.torque, self._linear, strict=True)
+        self._predicted = [
+            self.action.effort(tau + fraction * dtau, i) for i, ((tau, _), dtau) in enumerate(pairs)
+        ]
+
+    def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
+        """The path moved by a step."""
+        return self.action.retract(x, step, model)
+
+    def _configurations(self, x: DiscretePath) -> Array:
+        """q at all quadrature points, (P, nq)."""
+        return np.concatenate([jet[0] for jet in self.action.jets(x)])
+
+    def _effort(self, x: DiscretePath, batch: int) -> Array:
+        """R tau as foreseen, or as it is at x."""
+        if self._predicted is not None:
+            return self._predicted[batch]
+        jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
+        return self.action.effort(self.lagrangian.torques.torque(*jet, t), batch)
+
+    @cached_property
+    def _ranges(self) -> Array:
+        return np.asarray(self.limits.ranges.ravel()[self.columns])
+
+    @cached_property
+    def _parts(self) -> list[slice]:
+        """Rows of every batch among all points."""
+        ends = np.cumsum([0, *(len(weights) for weights in self.ld.point_weights)])
+        return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+    @cached_property
+    def _origin(self) -> Array:
+        """Where the scale of every output starts: its lower bound, or its only one."""
+        lower, upper = self.limits.lower.ravel(), self.limits.upper.ravel()
+        return np.where(np.isfinite(lower), lower, upper)[self.columns]
+
+    def _scaled(self, rows: Array) -> Array:
+        return (rows[:, self.columns] - self._origin) / self._ranges
+
+    def _unscaled(self, y: Array, power: int) -> Array:
+        """Derivatives by scaled outputs as derivatives by (q, v, a, tau), (P, 4 nv)."""
+        full = np.zeros((len(y), self.limits.lower.size))
+        full[:, self.columns] = y[:, : len(self.columns)] / self._ranges**power
+        return full
+
+    def _bounds(self, margins: Array | None) -> Bounds:
+        lower = (self.limits.lower.ravel()[self.columns] - self._origin) / self._ranges
+        upper = (self.limits.upper.ravel()[self.columns] - self._origin) / self._ranges
+        size = 0 if self.more is None else self.more.size
+        lower, upper = np.append(lower, np.zeros(size)), np.append(upper, np.full(size, np.inf))
+        intervals = np.concatenate(self.ld.point_intervals)
+        weights = np.concatenate(self.ld.point_weights)[:, None]
+        shape = (len(intervals), len(lower))
+        if margins is None:
+            return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
+        drawn = margins.reshape(2, len(margins[0]), -1)
+        first = self.limits.lower.size
+        chosen = np.append(self.columns, np.arange(first, first + size))
+        drawn = drawn[:, :, chosen][:, intervals]
+        return Bounds(lower + drawn[0], upper - drawn[1], weights)

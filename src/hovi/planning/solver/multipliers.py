@@ -1,0 +1,112 @@
+"""Multipliers of the equations along a motion, in an augmented Lagrangian.
+
+With c = 0 the torques of passive joints at the quadrature points and conditions at nodes, the
+action is replaced by  action + sum w (lambda tau + rho tau^2/2) + sum (mu c + rho c^2/2):  the
+block structure stays, minima under the equations are minima of it once rho is large enough, and
+its negative eigenvalues then count those directions alone in which the equations hold.
+[NocedalWright2006, section 17.3]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.lagrangian import PointTerms
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """By how much the equations fail.
+
+    torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
+    nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, and at
+        least a little of what moving takes at all, in [N m].
+    """
+
+    torque: list[Array]
+    nodes: list[Array]
+    largest_torque: float
+
+    @property
+    def torque_share(self) -> float:
+        """The largest torque of a passive joint, as a share of the largest of all."""
+        passive = max((float(np.max(np.abs(t), initial=0.0)) for t in self.torque), default=0.0)
+        return passive / max(self.largest_torque, 1e-300)
+
+    @property
+    def node_miss(self) -> float:
+        """The largest component of a condition, in [m] or [rad]."""
+        return max((float(np.max(np.abs(c), initial=0.0)) for c in self.nodes), default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """lambda and mu with their penalties.
+
+    torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
+        is not passive. nodes: mu of every condition.
+    torque_penalty, node_penalty: rho.
+    """
+
+    torque: list[Array]
+    nodes: list[Array]
+    torque_penalty: float
+    node_penalty: float
+
+    @classmethod
+    def zero(
+        cls, problem: TrajectoryProblem, torque_penalty: float, node_penalty: float
+    ) -> Multipliers:
+        """No multipliers yet."""
+        n = problem.robot.nv
+        torque = [np.zeros((len(t), n)) for t in problem.ld.point_times]
+        nodes = [np.zeros(each.condition.size) for each in problem.conditions]
+        return cls(torque, nodes, torque_penalty, node_penalty)
+
+    def updated(self, residuals: Residuals, passive: npt.NDArray[np.intp]) -> Multipliers:
+        """lambda + rho c, the first-order estimate of the multipliers."""
+        torque = []
+        for old, tau in zip(self.torque, residuals.torque, strict=True):
+            new = old.copy()
+            new[:, passive] += self.torque_penalty * tau
+            torque.append(new)
+        pairs = zip(self.nodes, residuals.nodes, strict=True)
+        nodes = [mu + self.node_penalty * c for mu, c in pairs]
+        return dataclasses.replace(self, torque=torque, nodes=nodes)
+
+    @property
+    def forces(self) -> list[PointTerms]:
+        """What they exert on the torques at the quadrature points."""
+        return self.added_to(None)
+
+    def added_to(self, terms: list[PointTerms] | None) -> list[PointTerms]:
+        """What limits add at the points, and the forces on the torques."""
+        if terms is None:
+            return [PointTerms.of_effort(force) for force in self.torque]
+        return [
+            dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
+            for term, force in zip(terms, self.torque, strict=True)
+        ]
+
+    def stiffer(self, torque: float, node: float) -> Multipliers:
+        """The same multipliers with larger penalties, by the given factors."""
+        return dataclasses.replace(
+            self,
+            torque_penalty=self.torque_penalty * torque,
+            node_penalty=self.node_penalty * node,
+        )
+
+
+def node_residuals(problem: TrajectoryProblem, x: DiscretePath) -> list[Array]:
+    """c of every condition at a path."""
+    return [
+        each.condition.evaluate(x.q[each.node], x.v[each.node])[0] for each in problem.conditions
+    ]

@@ -1,0 +1,74 @@
+"""Which number of a motion is not finite, by joint, term and time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.lagrangian import EffortLagrangian
+
+Array = npt.NDArray[np.float64]
+
+
+def non_finite_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """The first number that is infinite or not a number, as part of a sentence; "" if none is.
+
+    Looked for among the nodes, then at the quadrature points among accelerations, torques and
+    costs, and then among the derivatives of the cost.
+    """
+    with np.errstate(all="ignore"):
+        return _at_nodes(problem, path) or _at_points(problem, path) or _derivative(problem, path)
+
+
+def _at_nodes(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    for term, values in (("position", path.q), ("velocity", path.v)):
+        place = _first(values)
+        if place is not None:
+            k, i = place
+            where = f"at node {k} of {path.intervals} (t = {problem.grid.t[k]:.4g} s)"
+            return f"the {term} of {_joint(problem, i)} is {values[k, i]} {where}"
+    return ""
+
+
+def _at_points(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    jets = problem.ld.jets(path)
+    points = zip(jets, problem.ld.point_times, problem.ld.point_intervals, strict=True)
+    for jet, t, numbers in points:
+        found: list[tuple[str, Array]] = [("acceleration", jet[2])]
+        if isinstance(problem.ld.lagrangian, EffortLagrangian):
+            found.append(("torque", problem.ld.lagrangian.torque(*jet, t)[0]))
+        found.append(("cost", problem.ld.lagrangian.value(*jet, t=t)[:, None]))
+        for term, values in found:
+            place = _first(values)
+            if place is not None:
+                j, i = place
+                of = "" if term == "cost" else f" of {_joint(problem, i)}"
+                return (
+                    f"the {term}{of} is {values[j, i]} at t = {t[j]:.4g} s (interval {numbers[j]})"
+                )
+    return ""
+
+
+def _derivative(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    expansion = problem.ld.expand(path, "regular")
+    for term, values in (("first", expansion.gradient), ("second", expansion.hessian)):
+        place = _first(values)
+        if place is not None:
+            k = place[0]
+            where = f"in interval {k} (from t = {problem.grid.t[k]:.4g} s)"
+            return f"the {term} derivatives of the cost are too large {where}"
+    return ""
+
+
+def _first(values: npt.NDArray[Any]) -> tuple[int, ...] | None:
+    places = np.argwhere(~np.isfinite(values))
+    return None if len(places) == 0 else tuple(int(i) for i in places[0])
+
+
+def _joint(problem: TrajectoryProblem, i: int) -> str:
+    names = problem.robot.coordinate_names
+    return f"joint {names[min(i, len(names) - 1)]!r}"

@@ -1,0 +1,103 @@
+"""How a solve ended: its status, and the sentence that says what happened."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Outcome, Stop
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.limited_outcome import LimitedOutcome
+from hovi.planning.solver.non_finite import non_finite_sentence
+
+
+class Status(StrEnum):
+    """What a solve ended in."""
+
+    MINIMUM = "minimum"
+    SADDLE = "saddle"
+    INFEASIBLE = "infeasible"
+    ITERATION_LIMIT = "iteration_limit"
+    TIME_LIMIT = "time_limit"
+    INTERRUPTED = "interrupted"
+    DIVERGED = "diverged"
+
+
+def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """What to say where an orientation turns by more than half a turn in an interval, or ""."""
+    if problem.ld.chart is None:
+        return ""
+    turns = problem.ld.turns(path)
+    k = int(np.argmax(turns))
+    if turns[k] <= np.pi:
+        return ""
+    return (
+        f" An orientation turns by {turns[k]:.3g} rad in the interval at t = "
+        f"{problem.grid.t[k]:.3g} s, more than half a turn: take more intervals."
+    )
+
+
+_UNFINISHED = {
+    Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
+    Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
+    Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
+    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
+}
+
+
+def limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
+    """Status and sentence of an outcome under limits."""
+    if outcome.reason:
+        return Status.INFEASIBLE, f"no motion within the limits was found: {outcome.reason}."
+    if outcome.stop is not Stop.STATIONARY:
+        status, reason = _UNFINISHED[outcome.stop]
+        return status, (
+            f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
+            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}."
+        )
+    share = f" to {outcome.excess:.1e} of their ranges" if outcome.excess > 0 else ""
+    held = f"limits hold everywhere{share}, on {outcome.problem.grid.intervals} intervals"
+    if outcome.n_neg == 0:
+        return (
+            Status.MINIMUM,
+            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps; {held}.",
+        )
+    return (
+        Status.SADDLE,
+        f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} directions of negative "
+        "curvature; solve again with another guess.",
+    )
+
+
+def verdict(
+    problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
+) -> tuple[Status, str]:
+    """Status and sentence of an outcome."""
+    if outcome.stop is Stop.DIVERGED:
+        reason = non_finite_sentence(problem, outcome.x)
+        if reason:
+            return Status.DIVERGED, (
+                f"{reason}, after {outcome.iterations} steps; hand in another guess."
+            )
+    left = "".join(
+        f" A saddle of cost {cost:.10g} was left along negative curvature."
+        for cost in outcome.saddles_left
+    )
+    if outcome.stop is Stop.STATIONARY and n_neg == 0:
+        return (
+            Status.MINIMUM,
+            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps.{left}",
+        )
+    if outcome.stop is Stop.STATIONARY:
+        return (
+            Status.SADDLE,
+            f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
+            "solve again with escape_saddles=True or another guess.",
+        )
+    status, reason = _UNFINISHED[outcome.stop]
+    return status, (
+        f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
+        f"best so far, of cost {outcome.value:.10g}.{left}"
+    )

@@ -1,0 +1,1 @@
+"""Scene files: TOML to a `Task` and back."""

@@ -1,0 +1,126 @@
+"""[start], [goal] and [[via]]: states and goals of frames, checked against the robot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from hovi.discrete.state import State
+from hovi.errors import HoviError, InputError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
+from hovi.planning.task_file.joint_tables import read_configuration, read_velocity
+from hovi.planning.task_file.messages import Keys, TomlText, spelled
+from hovi.planning.task_file.schema import EndTable, GoalTable, ViaTable
+from hovi.robot.robot import Robot
+
+_OF_FRAMES = ("position", "rpy", "axis")
+
+
+def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
+    """A state, or a goal of a frame."""
+    if goal.frame is None:
+        for key in _OF_FRAMES:
+            if getattr(goal, key) is not None:
+                raise toml.error((*keys, key), f"`{key}` needs the `frame` that it is about")
+        return read_state(goal, keys, robot, toml)
+    for key in ("q", "v", "free", "turns"):
+        if getattr(goal, key):
+            raise toml.error((*keys, key), f"a goal of a frame takes no `{key}`: leave it out")
+    rotation = None if goal.rpy is None else pin.rpy.rpyToMatrix(np.array(goal.rpy))
+    axis = None if goal.axis is None else (goal.axis.frame, goal.axis.world)
+    free = tuple(goal.free_velocity)
+    try:
+        chosen = FrameGoal(
+            goal.frame, position=goal.position, rotation=rotation, axis=axis, free_velocity=free
+        )
+        chosen.check(robot)
+    except HoviError as wrong:
+        raise toml.error((*keys, "frame"), str(wrong)) from None
+    return chosen
+
+
+def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State:
+    """The state of [start], [goal] or [[via]]."""
+    name = spelled(keys)
+    if end.q is None:
+        raise toml.error(keys, f"`{name}` needs q, or a frame and where it is to be")
+    q = read_configuration(end.q, keys, robot, toml)
+    v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, keys, robot, toml)
+    free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
+    turns: dict[str, Any] = dict(getattr(end, "turns", {}))
+    state = State(q, v, tuple(free), tuple(free_velocity), turns)
+    for key, check in (
+        ("q", lambda: robot.check_configuration(q, f"{name}.q")),
+        ("v", lambda: robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")),
+        ("free", lambda: state.free_on(robot, name)),
+        ("turns", lambda: state.turns_on(robot, name)),
+    ):
+        try:
+            check()
+        except InputError as wrong:
+            raise toml.error((*keys, key), str(wrong)) from None
+    return state
+
+
+def read_via(
+    tables: list[ViaTable], duration: float | tuple[float, float], robot: Robot, toml: TomlText
+) -> tuple[Via, ...]:
+    """What the motion passes through. duration: in [s], or its bounds."""
+    points = []
+    for i, table in enumerate(tables):
+        longest = float(np.max(duration))
+        if table.time >= longest:
+            sentence = f"a via point at {table.time:g} s is not inside the motion of {longest:g} s"
+            raise toml.error(("via", i, "time"), sentence)
+        goal = read_goal(table, ("via", i), robot, toml)
+        try:
+            points.append(Via(table.time, goal))
+        except InputError as wrong:
+            raise toml.error(("via", i), str(wrong)) from None
+    return tuple(points)
+
+
+def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:
+    """The table that `read_goal` reads back as this goal."""
+    if isinstance(goal, State):
+        return state_table(goal, robot, "goal")
+    table: dict[str, Any] = {"frame": goal.frame}
+    if goal.position is not None:
+        table["position"] = _floats(goal.position)
+    if goal.rotation is not None:
+        table["rpy"] = _floats(pin.rpy.matrixToRpy(np.asarray(goal.rotation)))
+    if goal.axis is not None:
+        table["axis"] = {"frame": _floats(goal.axis[0]), "world": _floats(goal.axis[1])}
+    if goal.free_velocity:
+        table["free_velocity"] = list(goal.free_velocity)
+    return table
+
+
+def via_table(via: Via, robot: Robot) -> dict[str, Any]:
+    """The table [[via]] of a via point."""
+    table = goal_table(via.goal, robot)
+    if isinstance(via.goal, State) and via.goal.v is not None:
+        table["v"] = _floats(via.goal.v)
+    return {"time": float(via.time), **table}
+
+
+def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
+    """The table of a state; a velocity of zero is left out."""
+    q, v = state.on(robot, name)
+    table: dict[str, Any] = {"q": _floats(q)}
+    if np.any(v):
+        table["v"] = _floats(v)
+    for key in ("free", "free_velocity"):
+        if getattr(state, key):
+            table[key] = list(getattr(state, key))
+    if state.turns:
+        turns = {joint: np.asarray(x, dtype=float).tolist() for joint, x in state.turns.items()}
+        table["turns"] = turns
+    return table
+
+
+def _floats(values: Any) -> list[float]:
+    return [float(each) for each in np.asarray(values)]

@@ -1,0 +1,58 @@
+"""The JSON schema of scene files, generated from the tables that check them.
+
+Editors complete and check a scene file with it: `hovi schema --out scene.schema.json`, then
+`#:schema scene.schema.json` in the file's first line.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import Field, create_model
+
+from hovi.effects import REGISTRY
+from hovi.planning.task_file.effect_tables import effect_schema
+from hovi.planning.task_file.schema import LimitsTable, Table, TaskTable
+
+_NO_DEFAULT = ("default", None)
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema() -> dict[str, Any]:
+    """What a scene file may hold, as a JSON schema of the data that TOML gives."""
+    effects: dict[str, Any] = {
+        key: (effect_schema(effect) | None, Field(default=None, description=_purpose(effect)))
+        for key, effect in REGISTRY.items()
+    }
+    limits = Literal["urdf", "none"] | LimitsTable
+    keys: dict[str, Any] = {
+        "effects": (
+            create_model("EffectsTable", __base__=Table, **effects) | None,
+            Field(default=None, description="tables [effects.NAME]: what is simulated"),
+        ),
+        "limits": (limits, Field(default="urdf", description="what bounds the motion")),
+        "tolerance": (
+            float | str | None,
+            Field(default=None, description=TaskTable.model_fields["tolerance"].description),
+        ),
+    }
+    whole = create_model("SceneFile", __base__=TaskTable, __doc__="A scene file of hovi.", **keys)
+    return {"$schema": DIALECT, **_without_null(whole.model_json_schema())}
+
+
+def _without_null(part: Any) -> Any:
+    """TOML has no null: what may be left out is no value, and has no default to write."""
+    if isinstance(part, list):
+        return [_without_null(each) for each in part if each != {"type": "null"}]
+    if not isinstance(part, dict):
+        return part
+    kept = {key: _without_null(each) for key, each in part.items() if (key, each) != _NO_DEFAULT}
+    only = kept.pop("anyOf", ())
+    if len(only) == 1:
+        return {**only[0], **kept}
+    return {"anyOf": only, **kept} if only else kept
+
+
+def _purpose(effect: type) -> str:
+    """The first line of a class's docstring."""
+    return (effect.__doc__ or "").strip().splitlines()[0]

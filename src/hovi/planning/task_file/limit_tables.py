@@ -1,0 +1,77 @@
+"""`limits`: a word, or the table [limits], checked against the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from hovi.errors import InputError
+from hovi.planning.problem.limits import KINDS, Limits, as_limits
+from hovi.planning.task_file.effect_tables import plain
+from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml
+from hovi.planning.task_file.schema import LimitsTable
+from hovi.robot.robot import Robot
+
+WORDS = ("urdf", "none")
+
+
+def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any]:
+    """What `hovi.plan` takes as limits, from what a file says."""
+    if isinstance(given, str) and given in WORDS:
+        return given
+    if not isinstance(given, dict):
+        expected = '"urdf", "none" or a table [limits]'
+        raise toml.error(("limits",), f"`limits` must be {expected}, but it is {in_toml(given)}")
+    try:
+        LimitsTable.model_validate(given)
+    except ValidationError as invalid:
+        raise first_sentence(invalid, LimitsTable, toml, above=("limits",)) from None
+    limits = {key: _by_joint(value, robot) for key, value in given.items()}
+    for kind in KINDS:
+        _check_kind(kind, limits.get(kind, {}), robot, toml)
+    _check(("limits",), limits, robot, toml)
+    return limits
+
+
+def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str | dict[str, Any]:
+    """The word or the table that `read_limits` reads back as these limits."""
+    if isinstance(limits, str):
+        return limits
+    if not isinstance(limits, Limits):
+        return {str(key): plain(each) for key, each in limits.items()}
+    table: dict[str, Any] = {"base": "none", "tolerance": limits.tolerance}
+    for row, kind in enumerate(KINDS):
+        bounded = np.flatnonzero(limits.bounded[row])
+        pairs = {
+            robot.coordinate_names[i]: [float(limits.lower[row, i]), float(limits.upper[row, i])]
+            for i in bounded
+        }
+        table |= {kind: pairs} if pairs else {}
+    return table
+
+
+def _by_joint(value: Any, robot: Robot) -> Any:
+    """A list that holds pairs as a table of joint names, numbers among the pairs and all."""
+    fits = isinstance(value, list) and len(value) == robot.nv
+    if fits and any(isinstance(each, list) for each in value):
+        return dict(zip(robot.coordinate_names, value, strict=True))
+    return value
+
+
+def _check_kind(kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
+    """Each joint by itself where joints are named, for the sake of its line."""
+    if isinstance(given, dict):
+        for joint, bound in given.items():
+            _check(("limits", kind, joint), {"base": "none", kind: {joint: bound}}, robot, toml)
+    else:
+        _check(("limits", kind), {"base": "none", kind: given}, robot, toml)
+
+
+def _check(keys: Keys, limits: Mapping[str, Any], robot: Robot, toml: TomlText) -> None:
+    try:
+        as_limits(robot, limits)
+    except InputError as wrong:
+        raise toml.error(keys, str(wrong)) from None

@@ -1,0 +1,149 @@
+"""Reading a task file: TOML -> checked tables -> robot, scene and task."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from hovi.errors import HoviError, InputError, SceneError, SchemeError
+from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.task_file.effect_tables import read_effects
+from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via
+from hovi.planning.task_file.limit_tables import read_limits
+from hovi.planning.task_file.messages import TomlText, first_sentence
+from hovi.planning.task_file.obstacle_tables import read_clearance
+from hovi.planning.task_file.schema import TaskTable
+from hovi.planning.task_file.task import Task
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name
+from hovi.system.bounded_file import require_file
+from hovi.system.files import reason
+
+MAXIMUM_BYTES = 2_000_000
+MAXIMUM_DOTS = 1_000
+"""Of one line: the time for a dotted key grows with the square of its parts."""
+
+
+def load_task(path: str | Path) -> Task:
+    """The task that a TOML file describes.
+
+    path: the file; the paths in it are relative to its folder.
+    Raises SceneError with the file, the line, the key, what was expected and what came, and
+    ModelError when the robot cannot be loaded.
+    """
+    toml = _read_text(Path(path))
+    table = _validated(toml)
+    _check_names(table, toml)
+    robot, duration = _load_robot(table, toml), _duration(table.duration, toml)
+    return Task(
+        scene=_scene(table, robot, toml),
+        start=read_state(table.start, ("start",), robot, toml),
+        goal=read_goal(table.goal, ("goal",), robot, toml),
+        via=read_via(table.via, duration, robot, toml),
+        duration=duration,
+        time_weight=table.time_weight,
+        scheme=table.scheme.name,
+        intervals=table.scheme.intervals,
+        starts=table.starts,
+        seed=table.seed,
+        limits=read_limits(table.limits, robot, toml),
+        clearance=read_clearance(table, robot, toml),
+        tolerance=_read_tolerance(table.tolerance, robot, toml),
+        name=toml.path.stem,
+    )
+
+
+def _scene(table: TaskTable, robot: Robot, toml: TomlText) -> Scene:
+    effects = read_effects(table.effects, robot, toml)
+    try:
+        return Scene(robot, effects=effects, passive=table.passive)
+    except SceneError as wrong:
+        raise toml.error(("passive",), str(wrong)) from None
+
+
+def _duration(given: float | list[float], toml: TomlText) -> float | tuple[float, float]:
+    """A length of time, or the bounds of one."""
+    numbers = given if isinstance(given, list) else [given]
+    if not all(math.isfinite(each) and each > 0 for each in numbers) or numbers != sorted(numbers):
+        expected = TaskTable.model_fields["duration"].description
+        raise toml.error(("duration",), f"`duration` must be {expected}, but it is {given}")
+    return (given[0], given[1]) if isinstance(given, list) else given
+
+
+def _read_text(path: Path) -> TomlText:
+    try:
+        require_file(path, MAXIMUM_BYTES)
+        return TomlText(path, path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SceneError(f"there is no scene file {path}.") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"{path}: a scene file is UTF-8 text, and this is not.") from None
+    except OSError as refused:
+        raise SceneError(f"{path} cannot be read: {reason(refused)}.") from None
+
+
+def _validated(toml: TomlText) -> TaskTable:
+    for number, line in enumerate(toml.text.splitlines(), start=1):
+        if line.count(".") > MAXIMUM_DOTS:
+            raise SceneError(f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots.")
+    try:
+        data = tomllib.loads(toml.text)
+    except RecursionError:
+        raise SceneError(f"{toml.path}: lists or tables are nested too deeply.") from None
+    except tomllib.TOMLDecodeError as invalid:
+        raise SceneError(_syntax_sentence(toml, str(invalid))) from None
+    except ValueError:
+        raise SceneError(f"{toml.path}: a number has too many digits.") from None
+    try:
+        return TaskTable.model_validate(data)
+    except ValidationError as invalid:
+        raise first_sentence(invalid, TaskTable, toml) from None
+
+
+def _syntax_sentence(toml: TomlText, reason: str) -> str:
+    place = re.search(r" \(at line (\d+), column (\d+)\)$", reason)
+    if place is None:
+        return f"{toml.path} is not valid TOML: {reason.removesuffix('.')}."
+    line, column = place.groups()
+    return f"{toml.path}, line {line}, column {column}: not valid TOML: {reason[: place.start()]}."
+
+
+def _check_names(table: TaskTable, toml: TomlText) -> None:
+    """What can be refused before a robot is loaded."""
+    try:
+        by_name(table.scheme.name)
+    except SchemeError as unknown:
+        raise toml.error(("scheme", "name"), str(unknown)) from None
+
+
+def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
+    folder = toml.path.parent
+    is_file = table.robot.endswith(".urdf")
+    try:
+        return load_robot(
+            folder / table.robot if is_file else table.robot,
+            package_dirs=tuple(folder / each for each in table.package_dirs),
+            free_flyer=table.free_flyer,
+            mimic=table.mimic,
+            locked=tuple(table.locked),
+            srdf=None if table.srdf is None else folder / table.srdf,
+        )
+    except HoviError as refused:
+        line = toml.line(("robot",))
+        raise type(refused)(f"{toml.path}, line {line}: {refused}") from None
+
+
+def _read_tolerance(given: Any, robot: Robot, toml: TomlText) -> float | str | None:
+    if given is None:
+        return None
+    try:
+        Tolerance.of(given, robot)
+    except InputError as wrong:
+        raise toml.error(("tolerance",), str(wrong).removesuffix(".")) from None
+    return given if isinstance(given, str) else float(given)

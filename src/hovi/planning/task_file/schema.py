@@ -1,0 +1,194 @@
+"""The keys of a task file and what each of them must be.
+
+The description of a field ends the sentence "`key` must be ...".
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
+
+from hovi.planning.clearance.clearance import MARGIN
+
+
+def _kind(value: object) -> str:
+    if isinstance(value, dict):
+        return "<table>"
+    return "<list>" if isinstance(value, list) else "<number>"
+
+
+def _kind_or_name(value: object) -> str:
+    return "<name>" if isinstance(value, str) else _kind(value)
+
+
+Numbers = Annotated[list[FiniteFloat], Tag("<list>")]
+ByJoint = Annotated[
+    dict[str, Annotated[Annotated[FiniteFloat, Tag("<number>")] | Numbers, Discriminator(_kind)]],
+    Tag("<table>"),
+]
+Coordinates = Annotated[Numbers | ByJoint, Discriminator(_kind)]
+Configuration = Annotated[
+    Numbers | ByJoint | Annotated[str, Tag("<name>")], Discriminator(_kind_or_name)
+]
+
+Bound = Annotated[
+    Annotated[float, Tag("<number>")] | Annotated[list[float], Tag("<list>")],
+    Discriminator(_kind),
+]
+Bounds = Annotated[
+    Annotated[float, Tag("<number>")]
+    | Annotated[list[Bound], Tag("<list>")]
+    | Annotated[dict[str, Bound], Tag("<table>")],
+    Discriminator(_kind),
+]
+_BOUNDS = (
+    "a positive number, a list with a positive number or a pair [lower, upper] for each joint, "
+    "or a table of joint names"
+)
+
+
+Duration = Annotated[
+    Annotated[float, Tag("<number>")]
+    | Annotated[list[float], Field(min_length=2, max_length=2), Tag("<list>")],
+    Discriminator(_kind),
+]
+
+
+class Table(BaseModel):
+    """A table that takes no other keys and converts nothing."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class EndTable(Table):
+    """[start] or [goal]."""
+
+    q: Configuration = Field(
+        description="a list of finite numbers, one per coordinate, a table of joint names, or the "
+        "name of a pose"
+    )
+    v: Coordinates | None = Field(
+        default=None,
+        description="a list of finite numbers, one per velocity, or a table of joint names",
+    )
+
+
+_JOINTS = 'a list of joint names, or ["all"]'
+
+
+class StartTable(EndTable):
+    """[start]."""
+
+    free: list[str] = Field(default=[], description=_JOINTS)
+    free_velocity: list[str] = Field(default=[], description=_JOINTS)
+
+
+Direction = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class AxisTable(Table):
+    """axis of a goal."""
+
+    frame: Direction = Field(description="a list of three finite numbers: a direction in the frame")
+    world: Direction = Field(description="a list of three finite numbers: a direction in the world")
+
+
+class GoalTable(Table):
+    """[goal], or what a table [[via]] asks: a state, or a goal of a frame."""
+
+    q: Configuration | None = Field(
+        default=None,
+        description="a list of finite numbers, one per coordinate, a table of joint names, or the "
+        "name of a pose",
+    )
+    v: Coordinates | None = Field(
+        default=None,
+        description="a list of finite numbers, one per velocity, or a table of joint names",
+    )
+    free: list[str] = Field(default=[], description=_JOINTS)
+    free_velocity: list[str] = Field(default=[], description=_JOINTS)
+    turns: ByJoint = Field(
+        default={}, description="a table of joint names with full turns of the first guess"
+    )
+    frame: str | None = Field(default=None, description="the name of a frame of the robot")
+    position: Direction | None = Field(default=None, description="a list of three finite numbers")
+    rpy: Direction | None = Field(
+        default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
+    )
+    axis: AxisTable | None = Field(
+        default=None, description="a table with two directions, `frame` and `world`"
+    )
+
+
+class ViaTable(GoalTable):
+    """[[via]]."""
+
+    time: FiniteFloat = Field(gt=0, description="a positive number of seconds")
+
+
+class SchemeTable(Table):
+    """[scheme]."""
+
+    name: str = Field(
+        default="galerkin-2", description='the name of a scheme, such as "galerkin-2"'
+    )
+    intervals: int = Field(
+        default=16, ge=1, le=1_000_000, description="a whole number from 1 to 1,000,000"
+    )
+
+
+class LimitsTable(Table):
+    """[limits]."""
+
+    base: Literal["urdf", "none"] = Field(default="urdf", description='"urdf" or "none"')
+    q: Bounds | None = Field(default=None, description=_BOUNDS)
+    v: Bounds | None = Field(default=None, description=_BOUNDS)
+    a: Bounds | None = Field(default=None, description=_BOUNDS)
+    tau: Bounds | None = Field(default=None, description=_BOUNDS)
+    margin: FiniteFloat = Field(
+        default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
+    )
+    tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="a positive share of the range")
+
+
+class TaskTable(Table):
+    """The whole file."""
+
+    robot: str = Field(
+        description="the path of a .urdf relative to this file, or a name of example-robot-data"
+    )
+    locked: list[str] = Field(default=[], description="a list of joint names")
+    package_dirs: list[str] = Field(
+        default=[], description="a list of folders relative to this file"
+    )
+    srdf: str | None = Field(default=None, description="the path of an .srdf relative to this file")
+    free_flyer: bool = Field(default=False, description="true or false")
+    mimic: bool = Field(default=False, description="true or false")
+    passive: list[str] = Field(default=[], description="a list of joint names")
+    duration: Duration = Field(
+        description="a positive number of seconds, or a list [lower, upper] of two"
+    )
+    time_weight: FiniteFloat = Field(
+        default=0.0, ge=0, description="a number, 0 or more: the cost of a second"
+    )
+    limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
+    obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
+    margin: FiniteFloat = Field(
+        default=MARGIN, ge=0, description="a length of 0 or more, in metres"
+    )
+    self_collision: bool = Field(default=False, description="true or false")
+    starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
+    seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
+    start: StartTable = Field(description="a table [start] with q and, if moving, v")
+    goal: GoalTable = Field(
+        description="a table [goal] with q and, if moving, v, or with a frame and where it is to be"
+    )
+    via: list[ViaTable] = Field(default=[], description="tables [[via]] with time and a goal")
+    scheme: SchemeTable = Field(
+        default=SchemeTable(), description="a table [scheme] with name and intervals"
+    )
+    tolerance: Any = Field(
+        default=None, description='a number, or a text such as "0.1 mm" or "0.01 deg"'
+    )
+    effects: dict[str, dict[str, Any]] = Field(default={}, description="tables [effects.NAME]")

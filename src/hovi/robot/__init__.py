@@ -1,0 +1,1 @@
+"""From a URDF, a name or a Pinocchio model to a `Robot`."""

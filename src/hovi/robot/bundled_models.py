@@ -1,0 +1,37 @@
+"""The scenes and URDFs that travel with hovi."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hovi.errors import SceneError, nearest
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_FOLDERS = (_PACKAGE / "models", _PACKAGE.parents[1] / "models")
+"""Inside an installed wheel, and in a source tree."""
+
+
+def example(name: str) -> Path:
+    """The path of a scene or URDF that travels with hovi.
+
+    name: "two_link_swing_up", "two_link.urdf" and so on; without an ending, a scene is looked
+        for first, then a URDF. Raises SceneError for any other name.
+    """
+    known = _shipped()
+    for file_name in (name, f"{name}.toml", f"{name}.urdf"):
+        if file_name in known:
+            return known[file_name]
+    raise SceneError(f"hovi ships no scene or URDF {name!r}; {nearest(name, known)}")
+
+
+def example_scenes() -> list[str]:
+    """Names of the scenes that travel with hovi, sorted."""
+    return sorted(path.stem for path in _shipped().values() if path.suffix == ".toml")
+
+
+def _shipped() -> dict[str, Path]:
+    for folder in _FOLDERS:
+        files = {p.name: p for p in folder.glob("*") if p.suffix in (".toml", ".urdf")}
+        if files:
+            return files
+    return {}

@@ -1,0 +1,199 @@
+"""A robot in words, for a terminal."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.robot.mimic_model import couplings_of
+from hovi.robot.mimic_tags import held_values
+from hovi.robot.model import couplings_in
+from hovi.robot.source import RobotSource
+from hovi.robot.urdf.check import checked_urdf
+
+Array = npt.NDArray[np.float64]
+
+_TYPES = {
+    "JointModelFreeFlyer": "floating",
+    "JointModelPlanar": "planar",
+    "JointModelSpherical": "spherical",
+    "JointModelSphericalZYX": "spherical",
+    "JointModelTranslation": "translation",
+    "JointModelComposite": "composite",
+}
+_TYPE_BEGINNINGS = {
+    "JointModelRUB": "continuous",
+    "JointModelRevoluteUnbounded": "continuous",
+    "JointModelR": "revolute",
+    "JointModelP": "prismatic",
+    "JointModelH": "helical",
+    "JointModelU": "universal",
+    "JointModelMimic": "mimic",
+}
+_ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
+
+
+def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -> str:
+    """The text of `hovi info`: joints, limits, mass, and what the URDF holds besides."""
+    sections = [
+        _headline(name, model, source),
+        "\n".join(_joint_table(model, _held_followers(source))),
+        _place(model, source, tip_frame),
+    ]
+    parts = [f"  {line}" for line in _opt_in_parts(model)]
+    if parts:
+        sections.append(
+            "\n".join(["Simulated only where an effect of the scene names it:", *parts])
+        )
+    notes = [f"  {line}" for line in _notes(model, source)]
+    if notes:
+        sections.append("\n".join(["Worth knowing:", *notes]))
+    return "\n\n".join(sections)
+
+
+def joint_type(joint: pin.JointModel) -> str:
+    """A joint's type in URDF's words, or Pinocchio's name where URDF has none."""
+    short = str(joint.shortname())
+    beginnings = (word for start, word in _TYPE_BEGINNINGS.items() if short.startswith(start))
+    return _TYPES.get(short) or next(beginnings, short)
+
+
+def _headline(name: str, model: pin.Model, source: RobotSource) -> str:
+    mass = sum(inertia.mass for inertia in model.inertias[1:])
+    origin = {
+        "urdf": f"URDF {source.reference}",
+        "example": f"example-robot-data {source.reference!r}",
+        "model": "a pinocchio.Model",
+    }[source.kind]
+    return (
+        f"{name}: {_count(model.njoints - 1, 'joint')}, nq = {model.nq}, nv = {model.nv}, "
+        f"{mass:.6g} kg in motion, from {origin}"
+    )
+
+
+def _held_followers(source: RobotSource) -> dict[str, float]:
+    """Followers of what does not move, which stand where their offset says and are no joints."""
+    held = held_values(couplings_in(source), source.locked)
+    return {name: value for name, value in held.items() if name not in source.locked}
+
+
+def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
+    names = list(model.names)[1:]
+    width = max((len(name) for name in (*names, *held)), default=5)
+    yield _ROW.format("joint", "type", "lower", "upper", "velocity", "effort", width=width)
+    yield _ROW.format("", "", "[rad, m]", "[rad, m]", "[/s]", "[N m, N]", width=width)
+    couplings = {coupling.follower: coupling for coupling in couplings_of(model)}
+    for joint, name in zip(model.joints[1:], names, strict=True):
+        if name in couplings:
+            yield f"  {name:<{width}}  {'mimic':<11}  = {couplings[name].text()}"
+            continue
+        limits = ("-", "-")
+        if joint.nq == joint.nv == 1:
+            limits = (
+                _number(model.lowerPositionLimit[joint.idx_q]),
+                _number(model.upperPositionLimit[joint.idx_q]),
+            )
+        speed = _number(max(model.velocityLimit[joint.idx_v : joint.idx_v + joint.nv]))
+        effort = _number(max(model.effortLimit[joint.idx_v : joint.idx_v + joint.nv]))
+        yield _ROW.format(name, joint_type(joint), *limits, speed, effort, width=width)
+    for name, value in held.items():
+        yield f"  {name:<{width}}  {'mimic':<11}  = {value:g}"
+
+
+def _place(model: pin.Model, source: RobotSource, tip_frame: str) -> str:
+    base = "floating" if source.free_flyer else "fixed"
+    if source.kind == "model":
+        first = joint_type(model.joints[1]) if model.njoints > 1 else "fixed"
+        base = "floating" if first == "floating" else "fixed"
+    locked = f"; locked: {', '.join(source.locked)}" if source.locked else ""
+    return f"Base: {base}{locked}. Tip frame: {tip_frame} ({_count(model.nframes, 'frame')})."
+
+
+def _opt_in_parts(model: pin.Model) -> Iterator[str]:
+    kinds = (
+        ("damping", model.damping, "N m s/rad or N s/m"),
+        ("dry friction", model.friction, "N m or N"),
+        ("armature (reflected rotor inertia)", model.armature, "kg m^2 or kg"),
+        ("rotor inertia", model.rotorInertia, "kg m^2"),
+    )
+    for what, values, unit in kinds:
+        where = np.flatnonzero(values)
+        if len(where):
+            largest = np.max(np.abs(values))
+            yield f"{what}: {_joints_at(model, where)}, up to {largest:.4g} {unit}"
+
+
+def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
+    pairs = list(zip(model.joints[1:], model.names[1:], strict=True))
+    manifold = [name for joint, name in pairs if joint.nq != joint.nv]
+    if manifold:
+        yield (
+            f"nq and nv differ at {_some(manifold)}: a continuous joint takes (cos, sin) of its "
+            "angle, an orientation a unit quaternion (x, y, z, w)"
+        )
+    for what, limit in (("velocity", model.velocityLimit), ("effort", model.effortLimit)):
+        zero = np.flatnonzero(np.asarray(limit) == 0.0)
+        if len(zero):
+            yield f"the {what} limit is 0 at {_joints_at(model, zero)}"
+    if source.urdf is None:
+        return
+    robot = checked_urdf(source.urdf, source.reference)
+    movable = {name for _, name in pairs}
+    mimics = [j.get("name", "") for j in robot.iterfind("joint") if j.find("mimic") is not None]
+    mimics = [name for name in mimics if name in movable]
+    if mimics and not source.mimic:
+        yield f"{_some(mimics)}: <mimic> counts with mimic=True only; the joint moves freely"
+    if source.mimic and not couplings_in(source):
+        yield "no joint of it mimics another: mimic=True changes nothing"
+    unbounded = [name for name in _ranges_not_kept(model, robot) if source.mimic]
+    if unbounded:
+        yield (
+            f"the position range of {_some(unbounded)} is not kept, as what leads there is a "
+            "continuous joint"
+        )
+    odd = [link.get("name", "") for link in robot.iterfind("link") if _breaks_triangle(link)]
+    if odd:
+        yield f"no rigid body has the principal inertias that are written for {_some(odd)}"
+
+
+def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[str]:
+    """Followers with a range of their own whose leader has no plain position to bound."""
+    for coupling in couplings_of(model):
+        joint = robot.find(f"joint[@name='{coupling.follower}']")
+        continuous = model.joints[model.getJointId(coupling.leader)].nq == 2
+        if continuous and joint is not None and joint.get("type") == "revolute":
+            yield coupling.follower
+
+
+def _breaks_triangle(link: ElementTree.Element) -> bool:
+    """Whether one principal inertia exceeds the sum of the two others by more than 1 %."""
+    inertia = link.find("inertial/inertia")
+    if inertia is None:
+        return False
+    keys = (("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz"))
+    tensor = [[float(inertia.get(key, "0")) for key in row] for row in keys]
+    low, middle, high = np.linalg.eigvalsh(tensor)
+    return bool(high > 1.01 * (low + middle) + 1e-9)
+
+
+def _joints_at(model: pin.Model, coordinates: npt.NDArray[np.intp]) -> str:
+    pairs = [(j, n) for j, n in zip(model.joints[1:], model.names[1:], strict=True) if j.nv]
+    held = [name for joint, name in pairs if np.any((coordinates - joint.idx_v) // joint.nv == 0)]
+    return f"all {len(held)} joints" if len(held) == len(pairs) > 3 else _some(held)
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return ", ".join(names[:4]) + more
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def _number(value: float) -> str:
+    return "none" if abs(value) >= 1e15 else f"{value:.5g}"

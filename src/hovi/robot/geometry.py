@@ -1,0 +1,152 @@
+"""The shapes of a robot, loaded when somebody looks at them: planning never waits for a mesh.
+
+Mesh names come from strangers, so each must lie inside its own package folder (or, for plain
+paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`). A shape
+whose mesh is missing or lies outside is left out and the reason is kept; the robot stays usable.
+"""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pinocchio as pin
+
+from hovi.errors import ModelError
+from hovi.robot.example_robots import example_robot
+from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
+from hovi.robot.source import RobotSource
+from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.normalize import make_plain
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """What could be loaded (None for nothing), and what could not, in a sentence or ""."""
+
+    geometry: pin.GeometryModel | None
+    problem: str
+
+
+def load_shapes(source: RobotSource, kind: str) -> Shapes:
+    """The "visual" or "collision" geometry of a source, its locked joints held."""
+    if source.urdf is None:
+        return Shapes(None, f"robot {source.reference!r} was given without {kind} geometry.")
+    text, problems = _with_found_meshes(source, kind)
+    geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
+    model = build_full_model(source)
+    try:
+        geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
+    except (ValueError, RuntimeError) as error:
+        return Shapes(None, f"the {kind} shapes of {source.reference!r} cannot be read: {error}.")
+    _, (geometry,) = locked_and_coupled(model, [geometry], source.locked, couplings_in(source))
+    problem = _sentence(source, kind, problems)
+    return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
+
+
+def find_mesh(filename: str, source: RobotSource) -> Path:
+    """The file that a mesh name means. Raises ModelError when it escapes or does not exist."""
+    candidates = list(_candidates(filename, source))
+    for root, path in candidates:
+        if not _inside(path, root):
+            raise ModelError(
+                f"mesh {filename!r} lies outside {str(root)!r}: mesh names must stay inside "
+                "their package; to allow another folder, name it in package_dirs."
+            )
+        if path.is_file():
+            return path
+    raise ModelError(f"mesh {filename!r} was not found in {_places(candidates)}.")
+
+
+def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path]]:
+    """(folder that must contain the mesh, place of the mesh), in the order of search."""
+    scheme, _, rest = filename.rpartition("://")
+    if scheme in ("package", "model"):
+        rest = rest.lstrip("/")
+        package = rest.split("/", 1)[0]
+        for folder in _package_folders(package, source):
+            yield folder, Path(os.path.normpath(folder.parent / rest))
+        return
+    path = Path(rest)
+    pairs = [(Path(folder), Path(folder)) for folder in source.package_dirs]
+    if source.folder:
+        pairs.insert(0, (_package_root(Path(source.folder)), Path(source.folder)))
+    if path.is_absolute():
+        inside = [pair for pair in pairs if _inside(Path(os.path.normpath(path)), pair[0])]
+        pairs = inside or pairs[:1]
+    for root, folder in pairs:
+        yield root.absolute(), Path(os.path.normpath(folder.absolute() / path))
+
+
+def _package_root(folder: Path) -> Path:
+    """The folder of the ROS package that a folder belongs to, or the folder itself."""
+    return next((p for p in (folder, *folder.parents) if (p / "package.xml").is_file()), folder)
+
+
+def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
+    """Folders called `package`: in the package folders, or around the URDF file itself."""
+    for parent in _package_dirs(source):
+        yield parent.absolute() / package
+        if parent.name == package:
+            yield parent.absolute()
+    if source.folder:
+        folder = Path(source.folder).absolute()
+        yield from (p for p in (folder, *folder.parents) if p.name == package)
+
+
+def _package_dirs(source: RobotSource) -> list[Path]:
+    folders = [Path(folder) for folder in source.package_dirs]
+    if source.kind == "example":
+        try:
+            folders.append(example_robot(source.reference).package_dir)
+        except ModelError:
+            return folders
+    return folders
+
+
+def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
+    """The URDF with absolute mesh names, without the shapes whose mesh is unusable, and why."""
+    robot = checked_urdf(source.urdf or "", source.reference)
+    problems = []
+    for link in robot.iterfind("link"):
+        for shape in link.findall(kind):
+            if problem := _find_files(shape, source):
+                problems.append(f"link {link.get('name')!r}: {problem}")
+                link.remove(shape)
+    for material in robot.iterfind("material"):
+        if _find_files(material, source):
+            robot.remove(material)
+    make_plain(robot)
+    return ElementTree.tostring(robot, encoding="unicode"), problems
+
+
+def _find_files(element: ElementTree.Element, source: RobotSource) -> str:
+    """Replace the names of meshes and textures below an element by places; or say what is wrong."""
+    for file in (*element.iter("mesh"), *element.iter("texture")):
+        try:
+            file.set("filename", f"file://{find_mesh(file.get('filename', ''), source)}")
+        except ModelError as error:
+            return str(error)
+    return ""
+
+
+def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
+    if not problems:
+        return ""
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return f"robot {source.reference!r} lacks {kind} shapes: {problems[0]}{more}"
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    """By name and by what symbolic links lead to."""
+    named = path.is_relative_to(os.path.normpath(folder.absolute()))
+    return named and path.resolve().is_relative_to(folder.resolve())
+
+
+def _places(candidates: list[tuple[Path, Path]]) -> str:
+    if not candidates:
+        return "any package folder; give package_dirs=[the folder that holds the package]"
+    return ", ".join(repr(str(root)) for root, _ in candidates)

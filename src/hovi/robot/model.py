@@ -1,0 +1,175 @@
+"""From a source to a Pinocchio model: build, give armature, lock and couple joints, check M(q)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import ModelError, nearest
+from hovi.robot.mass_matrix import MassMatrix
+from hovi.robot.mimic_model import Coupling, couplings_of, uncoupled
+from hovi.robot.mimic_tags import held_values, leaders_first, read_couplings, with_mimics
+from hovi.robot.source import RobotSource
+from hovi.robot.urdf.normalize import plain_urdf
+
+Array = npt.NDArray[np.float64]
+
+
+def build_full_model(source: RobotSource) -> pin.Model:
+    """The model of a source's URDF, every joint on its own and none locked. Raises ModelError.
+
+    Where joints mimic others, those come first: Pinocchio couples them in no other order.
+    """
+    if source.urdf is None:
+        raise ModelError(
+            f"robot {source.reference!r} was given as a pinocchio.Model, which no file can hold: "
+            "load it again with hovi.load_robot(model)."
+        )
+    text = plain_urdf(source.urdf, source.reference)
+    root = (pin.JointModelFreeFlyer(),) if source.free_flyer else ()
+    try:
+        model = pin.buildModelFromXML(text, *root)
+    except (ValueError, RuntimeError) as error:
+        raise ModelError(
+            f"Pinocchio cannot read the URDF {source.reference!r}: {error}; "
+            "its parser's own words are on stderr."
+        ) from error
+    if len(set(model.names)) < len(model.names):
+        raise ModelError(
+            f"robot {source.reference!r} has a joint 'root_joint', which is what its floating base "
+            "is called: give that joint another name, or load the robot without free_flyer."
+        )
+    model = _with_armature(model, source.armature)
+    return leaders_first(model, _moving(couplings_in(source), source.locked))
+
+
+def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
+    """The couplings that a source's URDF states, if the robot is to have them."""
+    if not source.mimic:
+        return ()
+    return read_couplings(source.urdf or "", source.reference, source.locked)
+
+
+def build_model(source: RobotSource) -> pin.Model:
+    """The model of a source: locked joints taken out, mimics coupled. Raises ModelError."""
+    model = build_full_model(source)
+    return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
+
+
+def locked_and_coupled(
+    model: pin.Model,
+    geometry: list[pin.GeometryModel] | None,
+    locked: Sequence[str],
+    couplings: Sequence[Coupling] = (),
+) -> tuple[pin.Model, list[pin.GeometryModel]]:
+    """Model and geometry with some joints held and the couplings of the others.
+
+    The `locked` joints are held at the neutral configuration, and their followers at the offset.
+    """
+    joint_ids(model, locked)
+    shapes = list(geometry or [])
+    held = held_values(couplings, locked)
+    if held:
+        ids, dq = joint_ids(model, held), np.zeros(model.nv)
+        for index, value in zip(ids, held.values(), strict=True):
+            if value:
+                dq[model.joints[index].idx_v] = value
+        q = pin.integrate(model, pin.neutral(model), dq)
+        if shapes:
+            model, found = pin.buildReducedModel(model, shapes, ids, q)
+            shapes = list(found)
+        else:
+            model = pin.buildReducedModel(model, ids, q)
+    moving = _moving(couplings, locked)
+    return with_mimics(model, moving) if moving else model, shapes
+
+
+def locked_model(
+    model: pin.Model, geometry: list[pin.GeometryModel], locked: Sequence[str]
+) -> tuple[pin.Model, list[pin.GeometryModel]]:
+    """As `locked_and_coupled` for a model with couplings of its own, which stay."""
+    couplings = couplings_of(model) if locked else ()
+    if couplings:  # Pinocchio does not take a leader out
+        model = leaders_first(uncoupled(model), couplings)
+    return locked_and_coupled(model, geometry, locked, couplings)
+
+
+def _moving(couplings: Sequence[Coupling], locked: Sequence[str]) -> tuple[Coupling, ...]:
+    """The couplings whose follower moves."""
+    held = held_values(couplings, locked)
+    return tuple(coupling for coupling in couplings if coupling.follower not in held)
+
+
+def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
+    """Pinocchio's indices of joints. Raises ModelError for an unknown name."""
+    movable = list(model.names)[1:]
+    for name in names:
+        if name not in movable:
+            raise ModelError(
+                f"robot {model.name!r} has no joint {name!r}: {nearest(name, movable)}"
+            )
+    return [model.getJointId(name) for name in names]
+
+
+def frame_id(model: pin.Model, name: str) -> int:
+    """Pinocchio's index of a frame; of the link where a joint bears the same name."""
+    same = [i for i, frame in enumerate(model.frames) if frame.name == name]
+    return next((i for i in same if model.frames[i].type == pin.BODY), same[0])
+
+
+def check_mass_matrix(model: pin.Model) -> None:
+    """Refuse a model whose mass matrix M(q) is singular to working precision.
+
+    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations (at
+    the neutral one a sound robot may be singular: a bob that hangs straight down resists no
+    turn about the vertical). Raises ModelError naming the joints that nothing resists.
+    """
+    if model.nv == 0:
+        return
+    samples = np.array(list(_sample_configurations(model)))
+    values, vectors = np.linalg.eigh(MassMatrix(model)(samples))
+    free = values <= 10.0 * model.nv * np.finfo(float).eps * values[:, -1:]
+    if free.any():
+        first = int(np.argmax(free.any(axis=1)))
+        share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
+        raise ModelError(_singular_mass_sentence(model, share))
+
+
+def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:
+    pairs = tuple(armature)
+    values = np.array(model.armature, dtype=float)
+    for joint, (_, value) in zip(joint_ids(model, [n for n, _ in pairs]), pairs, strict=True):
+        values[model.joints[joint].idx_v] = value
+    model.armature = values
+    return model
+
+
+def _sample_configurations(model: pin.Model) -> Iterator[Array]:
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        yield pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, model.nv))
+
+
+def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
+    """Name the joints with the largest shares (nv,) in the directions without inertia."""
+    joints = [
+        index
+        for index, joint in enumerate(model.joints[1:], start=1)
+        if share[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * share.max()
+    ]
+    names = [str(model.names[joint]) for joint in joints]
+    moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
+    more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
+    return (
+        f"the mass matrix of robot {model.name!r} is singular to working precision, as nothing "
+        f"resists joint {moved}{more}: give what it moves a mass and an inertia, or lock it with "
+        f"locked={names!r}."
+    )
+
+
+def _link_of(model: pin.Model, joint: int) -> str:
+    frames = (f for f in model.frames if f.parentJoint == joint and f.type == pin.BODY)
+    return next((f" (link {frame.name!r})" for frame in frames), "")

@@ -1,0 +1,399 @@
+"""A robot: its model, its limits and names, and the group operations of its configuration space.
+
+Coordinates follow Pinocchio: q (nq,) in [rad] or [m], v and a (nv,). Continuous, spherical and
+floating joints have nq != nv: their q moves by `integrate` and is compared by `difference`, never
+by + and -. Limits are those of the URDF as Pinocchio reads them: a missing limit is the largest
+double, a velocity or effort limit of 0 in the file stays 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import InputError, ModelError, expect, nearest
+from hovi.robot import model as robot_model
+from hovi.robot.description import describe
+from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code
+from hovi.robot.geometry import Shapes, load_shapes
+from hovi.robot.loading import as_names, example_source, file_source, is_path
+from hovi.robot.mimic_model import Coupling, PortableModel, couplings_of
+from hovi.robot.source import RobotSource
+from hovi.robot.space import pinocchio_configurations as configuration
+from hovi.robot.space.chart import Chart
+from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
+from hovi.robot.srdf import Srdf, parse_srdf, read_srdf_file
+from hovi.robot.urdf.check import MAXIMUM_FREEDOM
+
+__all__ = ["Robot", "RobotSource", "load_robot"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot that is ready to be put into a scene. Made by `load_robot`.
+
+    name: what the user calls it.
+    model: its Pinocchio model, locked joints taken out; treat it as read-only.
+    source: where it came from.
+    given: visual and collision geometry handed over together with a pinocchio.Model.
+    """
+
+    name: str
+    model: pin.Model
+    source: RobotSource
+    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None] = (None, None)
+
+    def __repr__(self) -> str:
+        """A name and sizes, for a terminal; `describe` says more."""
+        return f"<Robot {self.name!r}: nq = {self.nq}, nv = {self.nv}>"
+
+    # Sizes and names
+
+    @property
+    def nq(self) -> int:
+        """Length of a configuration q."""
+        return int(self.model.nq)
+
+    @property
+    def nv(self) -> int:
+        """Number of degrees of freedom: length of v, a and tau."""
+        return int(self.model.nv)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints that move on their own, in Pinocchio's order: none that mimics another."""
+        pairs = zip(self.model.names, self.model.joints, strict=True)
+        return tuple(name for name, joint in list(pairs)[1:] if joint.nv)
+
+    @cached_property
+    def couplings(self) -> tuple[Coupling, ...]:
+        """The joints that mimic others, and how."""
+        return couplings_of(self.model)
+
+    @cached_property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """One name per velocity, (nv,): the joint's name, with [i] where it has several."""
+        return configuration.entry_names(self.model, "nv")
+
+    @cached_property
+    def space(self) -> ConfigurationSpace:
+        """The configuration space as a product of vector spaces and groups.
+
+        It does not fit where a joint is of a kind that has no place in it: see `unplanned_joints`.
+        """
+        return self._space[0]
+
+    @cached_property
+    def chart(self) -> Chart:
+        """The charts q0 (+) x of its configuration space."""
+        return Chart(self.space)
+
+    @property
+    def unplanned_joints(self) -> tuple[str, ...]:
+        """Joints whose configurations are neither vectors nor of one of the known groups."""
+        return self._space[1]
+
+    @cached_property
+    def _space(self) -> tuple[ConfigurationSpace, tuple[str, ...]]:
+        return configuration_space(self.model)
+
+    def hint(self, name: str, valid: Iterable[str] | None = None) -> str:
+        """The end of a sentence about a joint that does not move on its own, or does not exist.
+
+        valid: what would have been accepted; `joint_names` when None.
+        """
+        for coupling in self.couplings:
+            if coupling.follower == name:
+                return f"it mimics {coupling.leader!r}; name that joint."
+        return nearest(name, self.joint_names if valid is None else valid)
+
+    def joint_at(self, place: int) -> str:
+        """The joint to which a place in v belongs."""
+        pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
+        return next(n for n, joint in pairs if joint.idx_v <= place < joint.idx_v + joint.nv)
+
+    @cached_property
+    def manifold_joints(self) -> tuple[str, ...]:
+        """The joints whose configuration is not a plain vector (nq != nv)."""
+        pairs = zip(self.model.names, self.model.joints, strict=True)
+        return tuple(name for name, joint in pairs if joint.nq != joint.nv)
+
+    @cached_property
+    def vector_joints(self) -> bool:
+        """Whether every joint has nq = nv, so that configurations add like vectors."""
+        return not self.manifold_joints
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Every frame of the model: links, joints and extra frames."""
+        return tuple(frame.name for frame in self.model.frames)
+
+    @cached_property
+    def tip_frame(self) -> str:
+        """The last link (or operational frame) of the model: where a tool would sit."""
+        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+        links = [frame.name for frame in self.model.frames if frame.type in kinds]
+        return links[-1] if links else self.frame_names[-1]
+
+    # What the URDF says
+
+    @property
+    def lower(self) -> Array:
+        """Lower position limits, (nq,), in [rad] or [m]."""
+        return np.array(self.model.lowerPositionLimit, dtype=float)
+
+    @property
+    def upper(self) -> Array:
+        """Upper position limits, (nq,), in [rad] or [m]."""
+        return np.array(self.model.upperPositionLimit, dtype=float)
+
+    @property
+    def velocity_limit(self) -> Array:
+        """Largest joint speeds, (nv,), in [rad/s] or [m/s]."""
+        return np.array(self.model.velocityLimit, dtype=float)
+
+    @property
+    def effort_limit(self) -> Array:
+        """Largest joint efforts, (nv,), in [N m] or [N]."""
+        return np.array(self.model.effortLimit, dtype=float)
+
+    @property
+    def damping(self) -> Array:
+        """Viscous damping of the joints, (nv,), in [N m s/rad] or [N s/m]."""
+        return np.array(self.model.damping, dtype=float)
+
+    @property
+    def friction(self) -> Array:
+        """Dry friction of the joints, (nv,), in [N m] or [N]."""
+        return np.array(self.model.friction, dtype=float)
+
+    @property
+    def armature(self) -> Array:
+        """Reflected rotor inertia of the joints, (nv,), in [kg m^2] or [kg]."""
+        return np.array(self.model.armature, dtype=float)
+
+    # What the SRDF says
+
+    @cached_property
+    def poses(self) -> dict[str, Array]:
+        """Named configurations (nq,) of the SRDF; none where there is no SRDF.
+
+        Raises ModelError for an SRDF that cannot be read.
+        """
+        return self.semantics.poses(self.model)
+
+    @cached_property
+    def semantics(self) -> Srdf:
+        """Poses and pairs of links that need no check for collisions, as the SRDF states them."""
+        text = self.source.srdf
+        return Srdf({}, frozenset()) if text is None else parse_srdf(text, self.name)
+
+    def pose(self, name: str) -> Array:
+        """The configuration (nq,) that the SRDF calls `name`. Raises InputError."""
+        if name in self.poses:
+            return self.poses[name].copy()
+        known = nearest(name, self.poses) if self.poses else "it has no SRDF that names any."
+        raise InputError(f"robot {self.name!r} has no pose {name!r}: {known}")
+
+    # Shapes
+
+    @property
+    def visual(self) -> pin.GeometryModel | None:
+        """What the robot looks like, loaded at the first look; None where nothing was found."""
+        return self._visual_shapes.geometry
+
+    @property
+    def collision(self) -> pin.GeometryModel | None:
+        """Its collision shapes, loaded at the first look; None where nothing was found."""
+        return self._collision_shapes.geometry
+
+    @property
+    def collision_problem(self) -> str:
+        """Why `collision` is None or incomplete, in a sentence; "" where nothing is missing."""
+        return self._collision_shapes.problem
+
+    @property
+    def visual_problem(self) -> str:
+        """Why `visual` is None or incomplete, in a sentence; "" where nothing is missing."""
+        return self._visual_shapes.problem
+
+    @cached_property
+    def _visual_shapes(self) -> Shapes:
+        given = self.given[0]
+        return load_shapes(self.source, "visual") if given is None else Shapes(given, "")
+
+    @cached_property
+    def _collision_shapes(self) -> Shapes:
+        given = self.given[1]
+        return load_shapes(self.source, "collision") if given is None else Shapes(given, "")
+
+    # Configurations
+
+    def neutral(self) -> Array:
+        """The neutral configuration, (nq,): zeros, with unit quaternions and angles of 0."""
+        return np.array(pin.neutral(self.model), dtype=float)
+
+    def integrate(self, q: Array, dq: Array) -> Array:
+        """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq)."""
+        if self.vector_joints:
+            return np.asarray(q, dtype=float) + dq
+        if self.unplanned_joints:
+            return configuration.integrate(self.model, q, dq)
+        return self.space.integrate(q, dq)
+
+    def difference(self, q0: Array, q1: Array) -> Array:
+        """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq)."""
+        if self.vector_joints:
+            return np.asarray(q1, dtype=float) - q0
+        if self.unplanned_joints:
+            return configuration.difference(self.model, q0, q1)
+        return self.space.difference(q0, q1)
+
+    def frame_position(self, frame: str, q: Array) -> Array:
+        """Where a frame's origin is in the world, in [m]: q (M, nq) -> (M, 3)."""
+        if frame not in self.frame_names:
+            raise InputError(
+                f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
+            )
+        index = robot_model.frame_id(self.model, frame)
+        return configuration.frame_position(self.model, index, q)
+
+    def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
+        """`q` as a float array (nq,), finite and with unit quaternions and angles.
+
+        name: what the argument is called, for the message. Raises InputError.
+        """
+        checked = configuration.check_vector(q, name, *self._entries)
+        if self.vector_joints:
+            return checked
+        configuration.check_unit_norms(self.model, checked, name)
+        return np.array(pin.normalize(self.model, checked), dtype=float)
+
+    @cached_property
+    def _entries(self) -> tuple[tuple[str, ...], str]:
+        """What the entries of q are called, and a hint where joints have several."""
+        return (
+            configuration.entry_names(self.model, "nq"),
+            configuration.manifold_hint(self.model),
+        )
+
+    def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
+        """`v` as a finite float array (nv,). Raises InputError naming the joint."""
+        return configuration.check_vector(v, name, self.coordinate_names)
+
+    def check_mass_matrix(self) -> None:
+        """Raise ModelError if M(q) is singular to working precision (see robot_model)."""
+        robot_model.check_mass_matrix(self.model)
+
+    # Text and files
+
+    def describe(self) -> str:
+        """What the robot is, for a terminal: joints, limits, mass, and what a scene must name."""
+        text = describe(self.name, self.model, self.source, self.tip_frame)
+        names = ", ".join(repr(name) for name in self.poses)
+        text += f"\n\nPoses that its SRDF names: {names}." if names else ""
+        try:
+            self.check_mass_matrix()
+        except ModelError as singular:
+            text += f"\n\nNothing can be planned on it as it is: {singular}"
+        return text
+
+    def to_dict(self) -> dict[str, Any]:
+        """A JSON-able dictionary that holds the URDF and no path of this machine."""
+        return {"name": self.name, **self.source.to_dict()}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], package_dirs: Iterable[str | Path] = ()) -> Robot:
+        """The robot that `to_dict` wrote, built from the URDF's text.
+
+        package_dirs: folders in which the meshes are found on this machine.
+        Raises ModelError, also for a robot that was given as a pinocchio.Model.
+        """
+        if not isinstance(data, Mapping) or not isinstance(data.get("name"), str):
+            raise ModelError("a stored robot needs a text under 'name'.")
+        source = RobotSource.from_dict(data, tuple(str(folder) for folder in package_dirs))
+        return cls(data["name"], robot_model.build_model(source), source)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a worker process needs: the fields, without shapes that are loaded on demand."""
+        state = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {**state, "model": PortableModel.of(self.model)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """The robot of what `__getstate__` gave."""
+        self.__dict__.update({**state, "model": state["model"].model()})
+
+
+def load_robot(
+    x: str | Path | pin.Model,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    free_flyer: bool | None = None,
+    locked: Iterable[str] = (),
+    visual: pin.GeometryModel | None = None,
+    collision: pin.GeometryModel | None = None,
+    srdf: str | Path | None = None,
+    mimic: bool = False,
+) -> Robot:
+    """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
+
+    x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
+        pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
+    package_dirs: folders in which `package://` meshes are looked up.
+    free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
+    locked: joints held at the neutral configuration; a single name may come without brackets.
+    visual, collision: geometry that goes with a pinocchio.Model.
+    srdf: path of an SRDF with named poses; an example robot's own is found without it.
+    mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
+        take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
+    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock;
+    InputError for a mimic or free_flyer that is neither True nor False.
+    """
+    expect(mimic, bool, "mimic=True or mimic=False")
+    expect(free_flyer or False, bool, "free_flyer=True or free_flyer=False")
+    names = as_names(locked)
+    folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
+    semantics = None if srdf is None else Path(srdf)
+    if isinstance(x, pin.Model):
+        return _from_model(x, x.name, names, (visual, collision), semantics)
+    if not isinstance(x, str | Path):
+        raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
+    if isinstance(x, Path) or is_path(x):
+        source = file_source(Path(x), folders, names, bool(free_flyer), semantics, mimic)
+    elif x in BUILT_IN_CODE:
+        model, *shapes = build_in_code(x)
+        return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
+    else:
+        source = example_source(x, folders, names, free_flyer, semantics, mimic)
+    model = robot_model.build_model(source)
+    return Robot(source.reference if source.kind == "example" else model.name, model, source)
+
+
+def _from_model(
+    model: pin.Model,
+    name: str,
+    locked: tuple[str, ...],
+    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
+    srdf: Path | None = None,
+) -> Robot:
+    if model.nv > MAXIMUM_FREEDOM:
+        raise ModelError(
+            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_FREEDOM} are "
+            "accepted: lock joints with pinocchio.buildReducedModel first."
+        )
+    shapes = [shape.copy() for shape in given if shape is not None]
+    reduced, shapes = robot_model.locked_model(model.copy(), shapes, locked)
+    queue = iter(shapes)
+    kept = [None if shape is None else next(queue) for shape in given]
+    text = None if srdf is None else read_srdf_file(srdf)
+    source = RobotSource(kind="model", reference=name, locked=locked, srdf=text)
+    return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -1,0 +1,1 @@
+"""The configuration space: groups that joints move on, charts, derivatives in the tangent space."""

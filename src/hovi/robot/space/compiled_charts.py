@@ -1,0 +1,97 @@
+"""What charts do to many points and intervals at a time, by the compiled module.
+
+portable: by instructions that every processor has, instead of the fastest that this one has; it
+is there to compare the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _charts
+from hovi.robot.space.groups import Layout
+
+Array = npt.NDArray[np.float64]
+
+
+def rates(
+    layout: Layout, x: Array, carried: Array | None = None, portable: bool = False
+) -> tuple[Array, Array]:
+    """v = J(x) x' and a = J(x) x'' + J' x', each (P, n), of curves exp(x(t)).
+
+    x: (x, x', x''), shape (3, P, n). carried: v and a of curves q(t), shape (2, P, n), for the
+    rates of q(t) (+) x(t).
+    """
+    out = np.empty((2, *x.shape[1:]))
+    _charts.rates(layout, np.ascontiguousarray(x), carried, out, portable)
+    return out[0], out[1]
+
+
+def local_rates(
+    layout: Layout, x: Array, v: Array, a: Array, portable: bool = False
+) -> tuple[Array, Array]:
+    """(x', x'') of curves that are at x with velocities v and accelerations a, all (P, n)."""
+    out = np.empty((2, *x.shape))
+    rows = np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
+    _charts.local_rates(layout, *rows, out, portable)
+    return out[0], out[1]
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledCharts:
+    """The chain rule in the charts of B intervals of one scheme, in m columns of n numbers.
+
+    layout: of the configuration space. table: shape (Q, 3, m). weights: shape (Q,).
+    h: lengths of the intervals, shape (B,). x: (x, x', x'') at the points, shape (3, B Q, n).
+    ends: (x1, h x1'), shape (B, 2, n).
+    """
+
+    layout: Layout
+    table: Array
+    weights: Array
+    h: Array
+    x: Array
+    ends: Array
+    portable: bool = False
+
+    def expand(self, gradient: Array, hessian: Array) -> tuple[Array, Array]:
+        """Gradient (B, m, n) and Hessian (B, m, m, n, n) of h sum_q w_q L in nodal columns.
+
+        gradient: of L in (q, v, a) at the points, 3 n numbers each. hessian: symmetric, (3 n)^2.
+        """
+        B, m, n = self._size
+        H = np.ascontiguousarray(hessian.reshape(-1, 3 * n, 3 * n))
+        gradients, hessians = np.empty((B, m, n)), np.empty((B, m, m, n, n))
+        g = self._at_points(gradient)
+        _charts.expand(*self._arrays, g, H, gradients, hessians, self.portable)
+        return gradients, hessians
+
+    def pull_gradient(self, gradient: Array, regular: bool) -> Array:
+        """The gradient alone, (B, m, n). regular: the table is over (q0, h v0, Z0, Z1, c)."""
+        pulled = np.empty(self._size)
+        g = self._at_points(gradient)
+        _charts.pull_gradient(*self._arrays, g, regular, pulled, self.portable)
+        return pulled
+
+    def push_steps(self, step: Array) -> Array:
+        """Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n)."""
+        B, _, n = self._size
+        change = np.empty((B, len(self.weights), 3, n))
+        _charts.push_steps(*self._arrays, np.ascontiguousarray(step), change, self.portable)
+        return change
+
+    def _at_points(self, gradient: Array) -> Array:
+        return np.ascontiguousarray(gradient.reshape(self.x.shape[1], -1))
+
+    @property
+    def _size(self) -> tuple[int, int, int]:
+        """(B, m, n)."""
+        return len(self.h), self.table.shape[2], self.x.shape[2]
+
+    @property
+    def _arrays(self) -> tuple[Layout, Array, Array, Array, Array, Array]:
+        scheme = np.ascontiguousarray(self.table), self.weights
+        return self.layout, *scheme, np.ascontiguousarray(self.h), self.x, self.ends

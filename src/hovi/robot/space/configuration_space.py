@@ -1,0 +1,243 @@
+"""The configuration space of a robot: a product of vector spaces and groups of its joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import InputError
+from hovi.robot.space.groups import (
+    GROUPS,
+    SE2,
+    SE3,
+    SO2,
+    SO3,
+    Group,
+    Layout,
+    differenced,
+    integrated,
+)
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+_JOINTS = {
+    "JointModelPlanar": SE2,
+    "JointModelSpherical": SO3,
+    "JointModelFreeFlyer": SE3,
+}
+_CONTINUOUS = "JointModelRUB", "JointModelRevoluteUnbounded"
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One group in the product. q, v: its places in q and v."""
+
+    group: Group
+    q: slice
+    v: slice
+
+
+@dataclass(frozen=True)
+class ConfigurationSpace:
+    """Q as a product; each part is a number of plain coordinates or the name of a group.
+
+    parts: such as (3, "SO(2)", 1, "SE(3)"), in Pinocchio's order of q and v.
+    Raises InputError for what is neither.
+    """
+
+    parts: tuple[int | str, ...]
+
+    def __post_init__(self) -> None:
+        for part in self.parts:
+            plain = type(part) is int and part > 0
+            if not plain and not (isinstance(part, str) and part in GROUPS):
+                raise InputError(
+                    f"a part of a configuration space is a positive number of coordinates or one "
+                    f"of {', '.join(GROUPS)}, not {part!r}."
+                )
+
+    @cached_property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return sum(p if isinstance(p, int) else GROUPS[p].nq for p in self.parts)
+
+    @cached_property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return sum(p if isinstance(p, int) else GROUPS[p].nv for p in self.parts)
+
+    @cached_property
+    def factors(self) -> tuple[Factor, ...]:
+        """The groups among the parts."""
+        found = []
+        for part, (_, iq, iv, _) in zip(self.parts, self.layout.tolist(), strict=True):
+            if isinstance(part, str):
+                nq, nv = _sizes(GROUPS[part])
+                found.append(Factor(GROUPS[part], slice(iq, iq + nq), slice(iv, iv + nv)))
+        return tuple(found)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The parts as the compiled charts read them, (kind, place in q, place in v, size)."""
+        rows, iq, iv = [], 0, 0
+        for part in self.parts:
+            kind = 0 if isinstance(part, int) else GROUPS[part].kind
+            nq, nv = (part, part) if isinstance(part, int) else _sizes(GROUPS[part])
+            rows.append((kind, iq, iv, nv))
+            iq, iv = iq + nq, iv + nv
+        return np.array(rows, dtype=np.int64).reshape(-1, 4)
+
+    @cached_property
+    def curved(self) -> tuple[Factor, ...]:
+        """The groups that do not commute, whose charts are not the identity."""
+        return tuple(factor for factor in self.factors if factor.group is not SO2)
+
+    @cached_property
+    def angles(self) -> tuple[Factor, ...]:
+        """The continuous joints."""
+        return tuple(factor for factor in self.factors if factor.group is SO2)
+
+    def names(self, coordinates: Sequence[str]) -> tuple[str, ...]:
+        """Names of the numbers of a configuration, (nq,), from those of its coordinates, (nv,).
+
+        A group's numbers add a part to the name of its joint: wrist[cos], base[x].
+        """
+        named = [""] * self.nq
+        for iq, iv in zip(*self.plain, strict=True):
+            named[iq] = coordinates[iv]
+        for factor in self.factors:
+            joint = coordinates[factor.v.start].removesuffix("[0]")
+            named[factor.q] = [f"{joint}[{part}]" for part in factor.group.parts]
+        return tuple(named)
+
+    @property
+    def vector(self) -> bool:
+        """Whether configurations add like vectors."""
+        return not self.factors
+
+    @property
+    def flat(self) -> bool:
+        """Whether tangent vectors add: only plain coordinates and continuous joints."""
+        return not self.curved
+
+    @cached_property
+    def plain(self) -> tuple[Index, Index]:
+        """Places in q and in v of the plain coordinates."""
+        q, v = np.ones(self.nq, dtype=bool), np.ones(self.nv, dtype=bool)
+        for factor in self.factors:
+            q[factor.q], v[factor.v] = False, False
+        return np.flatnonzero(q), np.flatnonzero(v)
+
+    def integrate(self, q: Array, dq: Array) -> Array:
+        """q (+) dq: configurations (..., nq), tangent vectors (..., nv) -> (..., nq)."""
+        q, dq = np.asarray(q, dtype=np.float64), np.asarray(dq, dtype=np.float64)
+        if self.vector:
+            return q + dq
+        return integrated(self.layout, q, dq)
+
+    def difference(self, q0: Array, q1: Array) -> Array:
+        """q1 (-) q0: the tangent vector of least angles that moves q0 to q1, (..., nv)."""
+        q0, q1 = np.asarray(q0, dtype=np.float64), np.asarray(q1, dtype=np.float64)
+        if self.vector:
+            return q1 - q0
+        return differenced(self.layout, q0, q1)
+
+    def difference_near(self, q0: Array, q1: Array, expected: Array) -> Array:
+        """As `difference`, with the full turns that come nearest to an expected answer, (..., nv).
+
+        Orientations are followed so beyond half a turn, where `difference` would jump.
+        """
+        if self.vector:
+            return q1 - q0
+        return differenced(self.layout, q0, q1, expected)
+
+    def normalized(self, q: Array) -> Array:
+        """Configurations (..., nq) with quaternions and (cos, sin) of unit norm."""
+        result = np.array(q, dtype=np.float64)
+        for group, rows, _ in self._grouped:
+            result[..., rows] = group.normalized(result[..., rows])
+        return result
+
+    def nearest(self, q: Array, other: Array) -> Array:
+        """Configurations (..., nq) with those signs of quaternions that are nearest to another."""
+        result = np.array(q, dtype=np.float64)
+        for factor in self.curved:
+            if factor.group is not SE2:
+                part = slice(factor.q.stop - 4, factor.q.stop)
+                against = np.sum(q[..., part] * other[..., part], axis=-1, keepdims=True) < 0
+                result[..., part] = np.where(against, -q[..., part], q[..., part])
+        return result
+
+    def coordinates(self, q: Array) -> Array:
+        """The plain coordinates at their places in v, 0 elsewhere: (..., nq) -> (..., nv)."""
+        if self.vector:
+            return q
+        result = np.zeros((*q.shape[:-1], self.nv))
+        iq, iv = self.plain
+        result[..., iv] = q[..., iq]
+        return result
+
+    @cached_property
+    def _grouped(self) -> list[tuple[Group, Index, Index]]:
+        """Each group with the places of all its factors in q (F, nq) and in v (F, nv)."""
+        found = []
+        for group in GROUPS.values():
+            chosen = [factor for factor in self.factors if factor.group is group]
+            if chosen:
+                rows = np.array([range(f.q.start, f.q.stop) for f in chosen], dtype=np.intp)
+                columns = np.array([range(f.v.start, f.v.stop) for f in chosen], dtype=np.intp)
+                found.append((group, rows, columns))
+        return found
+
+
+def configuration_space(model: pin.Model) -> tuple[ConfigurationSpace, tuple[str, ...]]:
+    """The space of a model's joints, and the names of joints that are none of its parts.
+
+    Such joints count as plain coordinates in the space, which then fits only where there are none.
+    """
+    parts: list[int | str] = []
+    unknown = []
+    for name, joint in zip(model.names[1:], list(model.joints)[1:], strict=True):
+        found = _parts_of(joint)
+        if found is None:
+            unknown.append(str(name))
+        parts += found if found is not None else [joint.nv]
+    return ConfigurationSpace(tuple(_merged(parts))), tuple(unknown)
+
+
+def _parts_of(joint: pin.JointModel) -> list[int | str] | None:
+    """The parts of a joint, those of a composite's members; None for one that has none."""
+    kind = joint.shortname()
+    if kind == "JointModelComposite":
+        members = [_parts_of(member) for member in joint.extract().joints]
+        known = [part for member in members if member is not None for part in member]
+        return known if all(member is not None for member in members) else None
+    if kind.startswith(_CONTINUOUS):
+        return [SO2.name]
+    if kind in _JOINTS:
+        return [_JOINTS[kind].name]
+    if joint.nq != joint.nv:
+        return None
+    return [int(joint.nv)] if joint.nv else []
+
+
+def _merged(parts: Sequence[int | str]) -> list[int | str]:
+    """Neighbouring plain coordinates as one part."""
+    merged: list[int | str] = []
+    for part in parts:
+        last = merged[-1] if merged else None
+        if isinstance(part, int) and isinstance(last, int):
+            merged[-1] = last + part
+        else:
+            merged.append(part)
+    return merged
+
+
+def _sizes(group: Group) -> tuple[int, int]:
+    return group.nq, group.nv

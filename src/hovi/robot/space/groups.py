@@ -1,0 +1,127 @@
+"""The groups that joints move on, SO(2), SE(2), SO(3) and SE(3): exp and log over batches.
+
+Elements and tangent vectors are those of Pinocchio: (cos, sin); (x, y, cos, sin) with (v, w); a
+unit quaternion (x, y, z, w) with w in the body's axes; (p, quaternion) with (v, w). Tangent
+vectors are left-invariant: g (+) d = g exp(d).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _charts
+from hovi.errors import InputError
+
+Array = npt.NDArray[np.float64]
+Layout = npt.NDArray[np.int64]
+"""Rows (kind, place in q, place in v, size in v) for the parts of a configuration."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """One of the groups.
+
+    name: as files name it. kind: as layouts name it. nq: numbers of an element. nv: of a tangent
+        vector.
+    angular: places of the rotation in a tangent vector.
+    places: of a tangent vector in those of SE(3), (linear, angular), a plane at right angles to z.
+    unit: places in an element of what has unit norm.
+    parts: names of an element's numbers.
+    """
+
+    name: str
+    kind: int
+    nq: int
+    nv: int
+    angular: tuple[int, ...]
+    places: tuple[int, ...]
+    unit: tuple[int, ...]
+    parts: tuple[str, ...]
+
+    def integrate(self, g: Array, d: Array) -> Array:
+        """g exp(d): elements (..., nq) and tangent vectors (..., nv) -> (..., nq)."""
+        return integrated(self._layout, g, d)
+
+    def difference(self, g0: Array, g1: Array) -> Array:
+        """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
+        return differenced(self._layout, g0, g1)
+
+    def difference_near(self, g0: Array, g1: Array, expected: Array) -> Array:
+        """As `difference`, with the full turns that come nearest to an expected answer."""
+        return differenced(self._layout, g0, g1, expected)
+
+    @property
+    def _layout(self) -> Layout:
+        return np.array([[self.kind, 0, 0, self.nv]])
+
+    def normalized(self, g: Array) -> Array:
+        """Elements (..., nq) with their unit part of unit norm."""
+        result = np.array(g, dtype=np.float64)
+        part = result[..., list(self.unit)]
+        size = np.sqrt(np.sum(part * part, axis=-1, keepdims=True))
+        result[..., list(self.unit)] = part / size
+        return result
+
+
+def integrated(layout: Layout, q: Array, dq: Array) -> Array:
+    """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq).
+
+    Raises InputError for a number of numbers that is not the layout's.
+    """
+    nq, nv = _totals(layout)
+    _check_numbers("configuration", nq, q)
+    _check_numbers("tangent vector", nv, dq)
+    lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
+    result = np.empty((*lead, nq))
+    _charts.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
+    return result
+
+
+def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = None) -> Array:
+    """q1 (-) q0 for configurations (..., nq) -> tangent vectors (..., nv): see Group.
+
+    Raises InputError for a number of numbers that is not the layout's.
+    """
+    nq, nv = _totals(layout)
+    _check_numbers("configuration", nq, q0, q1)
+    if expected is not None:
+        _check_numbers("tangent vector", nv, expected)
+    lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
+    result = np.empty((*lead, nv))
+    near = None if expected is None else _rows(expected, lead)
+    _charts.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
+    return result
+
+
+def _totals(layout: Layout) -> tuple[int, int]:
+    """(nq, nv) of a layout, whose last part ends them."""
+    kind, q, v, size = layout[-1].tolist()
+    return q + next((g.nq for g in GROUPS.values() if g.kind == kind), size), v + size
+
+
+def _check_numbers(what: str, count: int, *arrays: Array) -> None:
+    """Compiled code reads and writes as many numbers as the layout says, whatever came."""
+    for array in arrays:
+        came = array.shape[-1] if array.ndim else 0
+        if came != count:
+            raise InputError(
+                f"a {what} has {count} numbers here, got {came} in an array of shape "
+                f"{array.shape}: give (..., {count})."
+            )
+
+
+def _rows(x: Array, lead: tuple[int, ...]) -> Array:
+    """(..., n) as rows (P, n) in one piece."""
+    full = x if x.shape[:-1] == lead else np.broadcast_to(x, (*lead, x.shape[-1]))
+    return np.ascontiguousarray(full, dtype=np.float64).reshape(-1, x.shape[-1])
+
+
+_TURN = ("qx", "qy", "qz", "qw")
+SO2 = Group("SO(2)", 1, 2, 1, (0,), (5,), (0, 1), ("cos", "sin"))
+SE2 = Group("SE(2)", 2, 4, 3, (2,), (0, 1, 5), (2, 3), ("x", "y", "cos", "sin"))
+SO3 = Group("SO(3)", 3, 4, 3, (0, 1, 2), (3, 4, 5), (0, 1, 2, 3), _TURN)
+SE3 = Group("SE(3)", 4, 7, 6, (3, 4, 5), (0, 1, 2, 3, 4, 5), (3, 4, 5, 6), ("x", "y", "z", *_TURN))
+GROUPS = {group.name: group for group in (SO2, SE2, SO3, SE3)}

@@ -1,0 +1,162 @@
+"""What an SRDF says beside a URDF: named poses, and links that need no check for collisions.
+
+An SRDF is XML: `<group_state name="ready"><joint name="elbow" value="1.2"/></group_state>` and
+`<disable_collisions link1="hand" link2="finger"/>`. Groups do not matter here: states of one name
+are taken together, and what they leave out is neutral.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import ModelError
+from hovi.system.bounded_file import require_file
+from hovi.system.files import reason
+
+Array = npt.NDArray[np.float64]
+
+MAXIMUM_BYTES = 8_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Srdf:
+    """The parts of an SRDF that hovi reads.
+
+    states: values by joint by name of the pose, in [rad] or [m].
+    disabled: unordered pairs of links whose collisions are not to be checked.
+    """
+
+    states: Mapping[str, Mapping[str, tuple[float, ...]]]
+    disabled: frozenset[frozenset[str]]
+
+    def poses(self, model: pin.Model) -> dict[str, Array]:
+        """Configurations (nq,) by name: neutral, except for the joints that a state lists.
+
+        Joints that the model does not have, or that mimic others, are passed over, and so are
+        states of such joints alone. Raises ModelError for a joint that is given the wrong count
+        of numbers.
+        """
+        pairs = zip(model.names, model.joints, strict=True)
+        known = {name for name, joint in list(pairs)[1:] if joint.nv}
+        poses = {}
+        for name, joints in self.states.items():
+            values = {joint: value for joint, value in joints.items() if joint in known}
+            if values:
+                poses[name] = _configuration(model, name, values)
+        return poses
+
+
+def read_srdf_file(path: Path) -> str:
+    """The text of an SRDF file. Raises ModelError: no such file, too large, not UTF-8."""
+    try:
+        require_file(path, MAXIMUM_BYTES)
+        return path.read_bytes().decode()
+    except OSError as error:
+        raise ModelError(f"cannot read the SRDF {str(path)!r}: {reason(error)}.") from error
+    except UnicodeDecodeError as error:
+        raise ModelError(f"the SRDF {path.name!r} is not UTF-8 text: save it as UTF-8.") from error
+
+
+def parse_srdf(text: str, name: str = "robot.srdf") -> Srdf:
+    """The poses and pairs of an SRDF's text.
+
+    name: what to call the SRDF in messages. Raises ModelError in one sentence.
+    """
+    root = _root(text, name)
+    states: dict[str, dict[str, tuple[float, ...]]] = {}
+    for state in root.iterfind("group_state"):
+        pose = states.setdefault(_attribute(state, "name", name), {})
+        for joint in state.iterfind("joint"):
+            pose[_attribute(joint, "name", name)] = _numbers(joint, name)
+    pairs = (
+        frozenset(_attribute(pair, end, name) for end in ("link1", "link2"))
+        for pair in root.iterfind("disable_collisions")
+    )
+    return Srdf(states, frozenset(pairs))
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds a tree, but refuses what entities would need."""
+
+    def doctype(self, *_: object) -> NoReturn:
+        raise ModelError("an SRDF needs no DOCTYPE and no entities: delete that declaration.")
+
+
+def _root(text: str, name: str) -> ElementTree.Element:
+    parser = ElementTree.XMLParser(target=_Builder())
+    try:
+        parser.feed(text)
+        root: ElementTree.Element = parser.close()
+    except (ElementTree.ParseError, UnicodeEncodeError) as error:
+        raise ModelError(f"SRDF {name!r} is not well-formed XML: {error}.") from error
+    if root.tag != "robot":
+        raise ModelError(f"SRDF {name!r}: its root element must be <robot>, not <{root.tag[:40]}>.")
+    return root
+
+
+def _attribute(element: ElementTree.Element, key: str, name: str) -> str:
+    value = element.get(key)
+    if not value:
+        raise ModelError(f"SRDF {name!r}: a <{element.tag}> lacks its attribute {key!r}.")
+    return value
+
+
+def _numbers(joint: ElementTree.Element, name: str) -> tuple[float, ...]:
+    text = _attribute(joint, "value", name)
+    try:
+        numbers = tuple(float(each) for each in text.split())
+    except ValueError:
+        numbers = (math.nan,)
+    if not all(math.isfinite(each) for each in numbers):
+        raise ModelError(
+            f"SRDF {name!r}: the value of joint {joint.get('name')!r} must be finite numbers, "
+            f"got {text[:40]!r}."
+        )
+    return numbers
+
+
+def _configuration(model: pin.Model, name: str, values: Mapping[str, tuple[float, ...]]) -> Array:
+    q = np.array(pin.neutral(model), dtype=float)
+    angles = np.zeros(model.nv)
+    for joint_name, numbers in values.items():
+        joint = model.joints[model.getJointId(joint_name)]
+        if len(numbers) == joint.nq:
+            q[joint.idx_q : joint.idx_q + joint.nq] = numbers
+        elif len(numbers) == joint.nv:
+            angles[joint.idx_v : joint.idx_v + joint.nv] = numbers
+        else:
+            raise ModelError(
+                f"pose {name!r} gives joint {joint_name!r} {len(numbers)} numbers; "
+                f"it takes {joint.nq}."
+            )
+    return np.array(pin.integrate(model, pin.normalize(model, q), angles), dtype=float)
+
+
+def checked_pairs(
+    model: pin.Model, geometry: pin.GeometryModel, disabled: frozenset[frozenset[str]]
+) -> list[tuple[int, int]]:
+    """Pairs of shapes, by place in the geometry, that self-collision is about.
+
+    Shapes of two links on different joints, neither of which carries the other directly, unless
+    the pair is disabled.
+    """
+    shapes = list(geometry.geometryObjects)
+    links = [str(model.frames[shape.parentFrame].name) for shape in shapes]
+    parents = list(model.parents)
+    pairs = []
+    for i, j in itertools.combinations(range(len(shapes)), 2):
+        a, b = sorted((shapes[i].parentJoint, shapes[j].parentJoint))
+        adjacent = a == b or parents[b] == a
+        if not adjacent and frozenset((links[i], links[j])) not in disabled:
+            pairs.append((i, j))
+    return pairs

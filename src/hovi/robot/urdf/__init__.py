@@ -1,0 +1,1 @@
+"""What a URDF has to be before Pinocchio reads it."""

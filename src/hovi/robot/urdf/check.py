@@ -1,0 +1,134 @@
+"""What a URDF must be before Pinocchio reads it.
+
+Pinocchio takes "1,5" for a mass of 0, loads negative masses, explains a broken tree on stderr
+only and needs memory that grows with the cube of the degrees of freedom. So the text is counted
+first, then parsed without entities, then held against a table of rules (urdf_rules.py). The first
+rule that is broken raises one sentence that names the link or joint. What passes reaches Pinocchio
+as plain_urdf.py writes it again, never as it came.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import NoReturn
+from xml.parsers import expat
+
+from hovi.errors import ModelError
+from hovi.robot.urdf.rules import RULES
+from hovi.system.bounded_file import require_file
+from hovi.system.files import reason
+
+MAXIMUM_BYTES = 32_000_000
+MAXIMUM_LINKS = 1_000
+MAXIMUM_DEPTH = 64
+MAXIMUM_ELEMENTS = 100_000
+MAXIMUM_ATTRIBUTES = 64
+"""Of one element: Pinocchio's parser compares each with every other."""
+MAXIMUM_FREEDOM = 250
+"""Pinocchio's workspace holds tensors of 48 nv^3 bytes: 0.8 GB at 250 degrees of freedom."""
+
+_FREEDOM = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
+
+
+def read_urdf(path: Path) -> str:
+    """The text of a URDF file. Raises ModelError: no such file, too large, not UTF-8."""
+    try:
+        require_file(path, MAXIMUM_BYTES)
+        return path.read_bytes().decode()
+    except FileNotFoundError as error:
+        raise ModelError(f"cannot read the URDF {str(path)!r}: no such file.") from error
+    except OSError as error:
+        raise ModelError(f"cannot read the URDF {str(path)!r}: {reason(error)}.") from error
+    except UnicodeDecodeError as error:
+        raise ModelError(
+            f"the URDF {path.name!r} is not UTF-8 text (byte {error.start}): save it as UTF-8."
+        ) from error
+
+
+def check_urdf(text: str, name: str = "robot.urdf") -> None:
+    """Hold the text of a URDF against every rule.
+
+    name: what to call the URDF in the message.
+    Raises ModelError with one sentence: what was expected, what came, what to do.
+    """
+    checked_urdf(text, name)
+
+
+def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
+    """The element <robot> of a URDF's text that passes every rule. Raises ModelError."""
+    if len(text) > MAXIMUM_BYTES:
+        raise ModelError(_too_large(name, len(text)))
+    robot = _Reader(name).read(text)
+    for rule in RULES:
+        for sentence in rule(robot):
+            raise ModelError(f"URDF {name!r}: {sentence}")
+    return robot
+
+
+class _Reader:
+    """Expat into an element tree, counting what there is as it comes."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.depth = self.elements = self.links = self.freedom = 0
+        self.builder = ElementTree.TreeBuilder()
+
+    def read(self, text: str) -> ElementTree.Element:
+        parser = expat.ParserCreate()
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.StartDoctypeDeclHandler = self.doctype
+        try:
+            parser.Parse(text, True)  # as UTF-8, whatever the declaration says
+        except (expat.ExpatError, UnicodeEncodeError) as error:
+            raise ModelError(f"URDF {self.name!r} is not well-formed XML: {error}.") from error
+        return self.builder.close()
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.depth += 1
+        self.elements += 1
+        if self.depth == 1 and tag != "robot":
+            self.refuse(f"its root element must be <robot>, not <{tag[:40]}>.")
+        if self.depth > MAXIMUM_DEPTH:
+            self.refuse(f"elements are nested more than {MAXIMUM_DEPTH} deep.")
+        if self.elements > MAXIMUM_ELEMENTS:
+            self.refuse(f"it has more than {MAXIMUM_ELEMENTS:,} elements, the most accepted.")
+        if len(attributes) > MAXIMUM_ATTRIBUTES:
+            self.refuse(f"<{tag[:40]}> has more than {MAXIMUM_ATTRIBUTES} attributes.")
+        if tag.startswith("xacro:"):
+            self.refuse(f"<{tag[:40]}> is xacro, not URDF: run xacro on the file first.")
+        if self.depth == 2:
+            self.count(tag, attributes.get("type", ""))
+        self.builder.start(tag, attributes)
+
+    def end(self, tag: str) -> None:
+        self.depth -= 1
+        self.builder.end(tag)
+
+    def count(self, tag: str, joint_type: str) -> None:
+        self.links += tag == "link"
+        if self.links > MAXIMUM_LINKS:
+            self.refuse(
+                f"it has more than {MAXIMUM_LINKS} links, the most that is accepted: "
+                "merge links that do not move against each other."
+            )
+        self.freedom += _FREEDOM.get(joint_type, 0) if tag == "joint" else 0
+        if self.freedom > MAXIMUM_FREEDOM:
+            self.refuse(
+                f"it has more than {MAXIMUM_FREEDOM} degrees of freedom, the most that is "
+                "accepted (memory grows with their cube): make some joints fixed."
+            )
+
+    def doctype(self, *_: object) -> None:
+        self.refuse("a URDF needs no DOCTYPE and no entities: delete that declaration.")
+
+    def refuse(self, sentence: str) -> NoReturn:
+        raise ModelError(f"URDF {self.name!r}: {sentence}")
+
+
+def _too_large(name: str, size: int) -> str:
+    return (
+        f"URDF {name!r} has {size / 1e6:.0f} MB, at most {MAXIMUM_BYTES / 1e6:.0f} MB are "
+        "accepted: meshes belong in files of their own."
+    )

@@ -1,0 +1,1 @@
+"""A robot with effects, and the Lagrangians on T^(k)Q that it defines."""

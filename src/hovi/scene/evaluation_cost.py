@@ -1,0 +1,141 @@
+"""What each effect of a scene costs: instructions of the expression graph, and measured time."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, Self
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.effects import Effect
+from hovi.robot.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+POINTS = 64
+"""Points of one evaluation: about as many as a motion of 16 intervals has."""
+SECONDS = 0.02
+"""For how long each scene is evaluated again and again."""
+LEAST_TURNS = 3
+
+
+class AccountedScene(Protocol):
+    """What is asked of a scene."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def effects(self) -> Sequence[Effect]:
+        """Its effects."""
+
+    def without(self, key: str) -> Self:
+        """The same scene without one of its effects."""
+
+    def graph(self) -> ca.Function:
+        """(q, v, a, t) -> (tau, L~)."""
+
+    def evaluation(self) -> Callable[..., Any]:
+        """(q, v, a, t) -> L~ with its derivatives at a batch of points."""
+
+
+@dataclass(frozen=True)
+class EffectCost:
+    """What one effect adds.
+
+    key: of the effect. touches: what it may touch, in words.
+    instructions: what it adds to the graph of (tau, L~); nothing where only numbers change.
+    seconds, seconds_without: per point of an evaluation with derivatives.
+    """
+
+    key: str
+    touches: str
+    instructions: int
+    seconds: float
+    seconds_without: float
+
+
+@dataclass(frozen=True)
+class SceneAccount:
+    """What a scene costs.
+
+    instructions: of its graph. seconds: per point of an evaluation with derivatives.
+    effects: each effect's share, as the scene is with it and as it would be without it.
+    """
+
+    instructions: int
+    seconds: float
+    effects: tuple[EffectCost, ...]
+
+    def lines(self) -> list[str]:
+        """The account as text, a line for each effect."""
+        first = (
+            f"cost: {_microseconds(self.seconds)} per point with derivatives, "
+            f"{self.instructions} instructions in the expression graph"
+        )
+        if not self.effects:
+            return [first]
+        width = max(len(cost.key) for cost in self.effects)
+        head = f"  {'':{width}}  {'touches':12}  {'instructions':>12}  {'without it':>11}"
+        return [first, head, *(self._line(cost, width) for cost in self.effects)]
+
+    def _line(self, cost: EffectCost, width: int) -> str:
+        without = _microseconds(cost.seconds_without)
+        return f"  {cost.key:{width}}  {cost.touches:12}  {cost.instructions:>+12d}  {without:>11}"
+
+
+def _microseconds(seconds: float) -> str:
+    us = 1e6 * seconds
+    return f"{us:.3g} us" if us < 1000 else f"{us:.0f} us"
+
+
+def account(scene: AccountedScene) -> SceneAccount:
+    """Count and measure a scene, and the same scene without each of its effects."""
+    bare = [scene.without(effect.key) for effect in scene.effects]
+    instructions = scene.graph().n_instructions()
+    seconds, *without = seconds_per_point([scene, *bare])
+    costs = tuple(
+        EffectCost(
+            effect.key,
+            ", ".join(effect.touches),
+            instructions - other.graph().n_instructions(),
+            seconds,
+            its_seconds,
+        )
+        for effect, other, its_seconds in zip(scene.effects, bare, without, strict=True)
+    )
+    return SceneAccount(instructions, seconds, costs)
+
+
+def seconds_per_point(scenes: Sequence[AccountedScene]) -> list[float]:
+    """The shortest time of an evaluation with derivatives, per point, in [s], of each scene.
+
+    They take turns, so that what else the machine does falls on all of them alike.
+    """
+    evaluations = [scene.evaluation() for scene in scenes]
+    batches = [_points(scene.robot) for scene in scenes]
+    shortest = [np.inf] * len(scenes)
+    ends = time.perf_counter() + SECONDS * len(scenes)
+    for turn in itertools.count():
+        for i, (evaluate, points) in enumerate(zip(evaluations, batches, strict=True)):
+            evaluate(*points)  # what the one before it left in the caches does not count
+            began = time.perf_counter()
+            evaluate(*points)
+            shortest[i] = min(shortest[i], time.perf_counter() - began)
+        if turn >= LEAST_TURNS and time.perf_counter() > ends:
+            break
+    return [float(each) / POINTS for each in shortest]
+
+
+def _points(robot: Robot) -> tuple[Array, Array, Array, Array]:
+    random = np.random.default_rng(0)
+    dq, v, a = random.uniform(-1.0, 1.0, (3, POINTS, robot.nv))
+    q = np.stack([pin.integrate(robot.model, pin.neutral(robot.model), x) for x in dq])
+    return q, v, a, np.linspace(0.0, 1.0, POINTS)

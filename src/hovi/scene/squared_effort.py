@@ -1,0 +1,42 @@
+"""Squares of residuals at points in a diagonal metric, and what their Jacobians make of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import _packed
+
+Array = npt.NDArray[np.float64]
+
+
+def weighted_square(residuals: Array, metric: Array, weights: Array) -> float:
+    """sum_p w_p 1/2 r^T diag(R) r.
+
+    residuals: r at the points, shape (P, n). metric: R, shape (n,). weights: w, shape (P,).
+    """
+    return _packed.weighted_square(residuals, metric, weights)
+
+
+def expand_squares(
+    residuals: Array, metric: Array, jacobian: Array, force: Array | None = None
+) -> tuple[Array, Array]:
+    """1/2 r^T diag(R) r at each point, (P,), and J^T (diag(R) r + force), (P, k).
+
+    residuals: r, shape (P, n). metric: R, shape (n,). jacobian: J = dr/dx, shape (P, n, k).
+    force: what pulls at the residuals besides, shape (P, n); nothing when None.
+    """
+    points, _, k = jacobian.shape
+    values, gradient = np.empty(points), np.empty((points, k))
+    _packed.expand_squares(residuals, metric, jacobian, force, values, gradient)
+    return values, gradient
+
+
+def predict(residuals: Array, metric: Array, jacobian: Array, change: Array) -> Array:
+    """diag(R) (r + J dx), shape (P, n).
+
+    change: dx, shape (P, k); the others as for `expand_squares`.
+    """
+    predicted = np.empty(residuals.shape)
+    _packed.predict(residuals, metric, jacobian, change, predicted)
+    return predicted

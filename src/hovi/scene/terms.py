@@ -1,0 +1,92 @@
+"""What the effects of a scene add, as expressions of the same symbols."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.effects import Effect, SceneSymbols, Touch
+from hovi.errors import SceneError
+from hovi.robot.robot import Robot
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneTerms:
+    """The sums of what effects add to RNEA and to the cost.
+
+    robot: of the scene. effects: its effects.
+    Everything raises SceneError for an effect that touches what it does not say.
+    """
+
+    robot: Robot
+    effects: Sequence[Effect]
+
+    @cached_property
+    def symbols(self) -> SceneSymbols:
+        """What the expressions are written in, the motion of the base included."""
+        symbols = SceneSymbols.of(self.robot)
+        motions = [effect.base(self.robot, symbols) for effect in self.effects]
+        named = [motion for motion in motions if motion is not None]
+        return dataclasses.replace(symbols, base=named[0]) if named else symbols
+
+    @cached_property
+    def torque(self) -> ca.SX | None:
+        """What the effects add to RNEA, a column of nv; or None."""
+        return self._sum(Touch.TORQUE, "torque", self.symbols)
+
+    @cached_property
+    def potential(self) -> ca.SX | None:
+        """V of the effects, a number; or None."""
+        return self._sum(Touch.COST, "potential", self.symbols)
+
+    def effort_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
+        """phi(tau, v) of the effects, a number; or None."""
+        return self._sum(Touch.COST, "effort_cost", tau, v)
+
+    @cached_property
+    def effort_weight(self) -> Array:
+        """R of the effect that states it, or ones, shape (nv,)."""
+        weights = [effect.effort_weight(self.robot) for effect in self.effects]
+        named = [weight for weight in weights if weight is not None]
+        return named[0] if named else np.ones(self.robot.nv)
+
+    @cached_property
+    def timed(self) -> tuple[str, ...]:
+        """Keys of the effects whose torque, cost or motion of the base depends on the time."""
+        resting, robot = dataclasses.replace(self.symbols, base=None), self.robot
+        timed = []
+        for effect in self.effects:
+            terms = (
+                effect.torque(robot, resting),
+                effect.potential(robot, resting),
+                effect.base(robot, resting),
+            )
+            if any(term is not None and ca.depends_on(term, resting.t) for term in terms):
+                timed.append(effect.key)
+        return tuple(timed)
+
+    def _sum(self, touch: Touch, term: str, *symbols: Any) -> ca.SX | None:
+        named = list(self._touching(touch, term, *symbols))
+        return sum(named[1:], named[0]) if named else None
+
+    def _touching(self, touch: Touch, term: str, *symbols: Any) -> Iterator[ca.SX]:
+        """The terms of one kind that effects add."""
+        for effect in self.effects:
+            added = getattr(effect, term)(self.robot, *symbols)
+            if added is None:
+                continue
+            if touch not in effect.touches:
+                raise SceneError(
+                    f"effect {effect.key!r} adds to the {touch} without saying so: put "
+                    f"Touch.{touch.name} into its `touches`."
+                )
+            yield added

@@ -1,0 +1,1 @@
+"""Pictures, replay pages and tables of a motion."""

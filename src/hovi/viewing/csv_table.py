@@ -1,0 +1,69 @@
+"""A motion as a table of numbers for other programs."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.trajectory import Sample, Trajectory
+from hovi.errors import DisplayError, InputError, expect
+from hovi.system.files import reason, whole_file
+
+Array = npt.NDArray[np.float64]
+
+MOST_ROWS = 50_000_000
+_BATCH = 10_000
+
+
+def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
+    """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
+
+    The first line names the columns: t, then q_, v_, a_ and tau_ with the coordinate's name; a
+    continuous joint's q has the columns [cos] and [sin], a quaternion's [qx] to [qw]. Rows are
+    1/rate apart; the last is at exactly T, where the limits from the left are taken (from the
+    right elsewhere).
+
+    path: the file, written whole or not at all.
+    rate: samples per second, positive.
+    Raises InputError for a bad rate, DisplayError when the file cannot be written.
+    """
+    expect(trajectory, Trajectory, "the trajectory of a solution")
+    times = _times(trajectory.duration, rate)
+    try:
+        with whole_file(path) as stream:
+            stream.write((",".join(_columns(trajectory)) + "\n").encode())
+            for t, sample in _batches(trajectory, times):
+                table = np.column_stack([t, *sample])
+                lines = (",".join(map(repr, row)) for row in table.tolist())
+                stream.write("".join(line + "\n" for line in lines).encode())
+    except OSError as error:
+        raise DisplayError(f"cannot write the table {str(path)!r}: {reason(error)}.") from error
+
+
+def _times(duration: float, rate: float) -> Array:
+    """Multiples of 1/rate below T, and T."""
+    if not (math.isfinite(rate) and rate > 0):
+        raise InputError(f"the rate must be a positive number of samples per second, got {rate}.")
+    if duration * rate > MOST_ROWS:
+        raise InputError(f"{duration * rate:.3g} rows are too many; lower the rate.")
+    times = np.arange(math.ceil(duration * rate)) / rate
+    # A multiple that misses T by rounding alone is T.
+    before = times[times < duration * (1 - 1e-12)]
+    return np.append(before, duration)
+
+
+def _columns(trajectory: Trajectory) -> list[str]:
+    names = [name.replace(",", "_").replace('"', "_") for name in trajectory.coordinate_names]
+    places = names if trajectory.space is None else trajectory.space.names(names)
+    columns = ["t", *(f"q_{name}" for name in places)]
+    return columns + [f"{letter}_{name}" for letter in ("v", "a", "tau") for name in names]
+
+
+def _batches(trajectory: Trajectory, times: Array) -> Iterator[tuple[Array, Sample]]:
+    for start in range(0, len(times), _BATCH):
+        t = times[start : start + _BATCH]
+        yield t, trajectory.sample(t)

@@ -1,0 +1,364 @@
+"""Watching a motion: live in a browser at its own pace, or as one page that plays offline."""
+
+from __future__ import annotations
+
+import html as html_text
+import itertools
+import math
+import os
+import time
+import warnings
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import DisplayError, expect
+from hovi.robot.robot import Robot
+from hovi.system.files import reason, whole_file
+from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights, node_name
+from hovi.viewing.imposed_clearance import with_obstacles
+from hovi.viewing.meshcat_page import Page
+from hovi.viewing.meshcat_server import ServedPage
+from hovi.viewing.skeleton import skeleton
+
+with warnings.catch_warnings():
+    # meshcat imports a module that ZeroMQ calls obsolete; hovi does not use that part of it.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    import meshcat
+    import meshcat.animation
+    import meshcat.geometry
+    from pinocchio.visualize import MeshcatVisualizer
+
+Array = npt.NDArray[np.float64]
+
+_FIELD_OF_VIEW = math.radians(75.0)  # meshcat's camera, vertically
+_ELEVATION = 0.25
+_TRACE_COLOR = (0.80, 0.47, 0.65)
+_TRACE_WIDTH = 0.006  # of the picture's size
+_FRAME_RATE = 60.0
+_MAX_FRAMES = 20_000
+_VIEW_SAMPLES = 60
+_TRACE_SAMPLES = 2_000
+_BROWSER_SECONDS = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A motion on a page. In Jupyter, the last line of a cell shows it.
+
+    trajectory: the motion.
+    visualizer: Pinocchio's, for whoever wants to draw more (`visualizer.viewer` is meshcat's).
+    url: the page's address.
+    page: what the page shows; a ServedPage while a server answers at `url`.
+    highlights: links that stand out at limits; None where none ever does.
+    """
+
+    trajectory: Trajectory
+    visualizer: MeshcatVisualizer
+    url: str
+    page: Page
+    highlights: Highlights | None = None
+
+    def play(self, *, speed: float = 1.0, loop: bool = False, rate: float = _FRAME_RATE) -> None:
+        """Move the robot on the page in real time, by the monotonic clock.
+
+        speed: motion seconds per second. rate: frames per second.
+        loop: play again and again until interrupted (Ctrl-C, or Jupyter's stop button).
+        """
+        _check_positive("speed", speed)
+        _check_positive("rate", rate)
+        try:
+            self._play_once(speed, rate)
+            while loop:
+                self._play_once(speed, rate)
+        except KeyboardInterrupt:
+            if not loop:
+                raise
+
+    def close(self) -> None:
+        """Stop the server, if there is one. An open page keeps what it shows."""
+        if isinstance(self.page, ServedPage):
+            self.page.close()
+
+    def _play_once(self, speed: float, rate: float) -> None:
+        duration = self.trajectory.duration
+        start, elapsed = time.monotonic(), 0.0
+        while elapsed * speed < duration:
+            self.visualizer.display(self.trajectory.configurations(elapsed * speed)[0])
+            if self.highlights is not None:
+                self.highlights.show(self.visualizer, elapsed * speed)
+            due = (math.floor(elapsed * rate) + 1) / rate
+            time.sleep(max(0.0, start + min(due, duration / speed) - time.monotonic()))
+            elapsed = time.monotonic() - start
+        self.visualizer.display(self.trajectory.configurations(duration)[0])
+        if self.highlights is not None:
+            self.highlights.show(self.visualizer, duration)
+
+    def _repr_html_(self) -> str:
+        """The page in a notebook: by its address while it is served, else the page itself."""
+        if isinstance(self.page, ServedPage):
+            source = f'src="{self.url}"'
+        else:
+            source = f'srcdoc="{html_text.escape(self.page.offline_html())}"'
+        return f'<iframe {source} style="width:100%;height:480px;border:none"></iframe>'
+
+    def __enter__(self) -> Self:
+        """The replay itself; leaving the block closes it."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Stop serving."""
+        self.close()
+
+
+def replay(
+    trajectory: Trajectory,
+    *,
+    speed: float = 1.0,
+    loop: bool = False,
+    trace: bool = True,
+    open_browser: bool = False,
+    html: str | os.PathLike[str] | None = None,
+    port: int = 0,
+    announce: Callable[[str], object] = print,
+) -> Replay:
+    """Show a motion: live on a page of this machine, or as one file that plays offline.
+
+    The live page plays the motion once in real time (or for ever) and the function returns; the
+    page stays served until the Replay is closed or the process ends, and browsers that come
+    later can play the motion themselves.
+
+    trajectory: the motion. A robot without visual models is drawn as a skeleton.
+    speed: motion seconds per second. loop: play again and again until interrupted.
+    trace: draw the path of the robot's tip.
+    open_browser: open the page in the default browser and wait for it before playing.
+    html: write one self-contained page there instead, whole or not at all, and serve nothing.
+    port: of the live page on 127.0.0.1; 0 for any free one.
+    announce: called with the page's address before the motion starts.
+    Raises DisplayError when the page cannot be served, opened or written.
+    """
+    _check_positive("speed", speed)
+    if html is not None:
+        return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
+    robot = _robot(trajectory)
+    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
+    page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)
+    try:
+        visualizer = _draw(trajectory, robot, page, trace, highlights)
+        shown = Replay(trajectory, visualizer, page.web_url, page, highlights)
+        announce(page.web_url)
+        if open_browser:
+            _open(page)
+        shown.play(speed=speed, loop=loop)
+        # Whoever opens the page from now on gets the motion with its controls.
+        page.keep(_animation(trajectory, visualizer, loop, highlights))
+    except BaseException:
+        page.close()
+        raise
+    return shown
+
+
+def write_html(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    *,
+    speed: float = 1.0,
+    loop: bool = False,
+    trace: bool = True,
+) -> Replay:
+    """Write one page that plays the motion with its own controls and needs no network.
+
+    The same motion gives the same bytes. Arguments as in `replay`. Raises DisplayError.
+    """
+    _check_positive("speed", speed)
+    robot = _robot(trajectory)
+    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
+    page = Page(_title(trajectory, robot), _note(robot, highlights))
+    visualizer = _draw(trajectory, robot, page, trace, highlights)
+    page.keep(_animation(trajectory, visualizer, loop, highlights))
+    text = page.offline_html(speed)
+    try:
+        with whole_file(path) as stream:
+            stream.write(text.encode())
+    except OSError as error:
+        raise DisplayError(f"cannot write the page {str(path)!r}: {reason(error)}.") from error
+    return Replay(trajectory, visualizer, Path(path).resolve().as_uri(), page, highlights)
+
+
+def _robot(trajectory: Trajectory) -> Robot:
+    expect(trajectory, Trajectory, "the trajectory of a solution")
+    if trajectory.robot is None:
+        raise DisplayError(
+            "this motion was saved without its robot, which was a bare Pinocchio model: there is "
+            "nothing to draw; load the robot from a URDF and plan again."
+        )
+    return trajectory.robot
+
+
+def _open(page: ServedPage) -> None:
+    advice = f"open {page.web_url} yourself, or write a page with html=..."
+    if not webbrowser.open(page.web_url, new=2):
+        raise DisplayError(f"no browser could be started; {advice}")
+    if not page.wait(_BROWSER_SECONDS):
+        raise DisplayError(f"no browser showed the page in {_BROWSER_SECONDS:.0f} s; {advice}")
+
+
+def _note(robot: Robot, highlights: Highlights | None) -> str:
+    notes = [robot.visual_problem, "" if highlights is None else AT_LIMIT_NOTE]
+    return " ".join(note for note in notes if note)
+
+
+def _draw(
+    trajectory: Trajectory, robot: Robot, page: Page, trace: bool, highlights: Highlights | None
+) -> MeshcatVisualizer:
+    """The robot at the start of the motion, its tip's path, and the camera on both."""
+    visual = robot.visual
+    if visual is None or visual.ngeoms == 0:
+        visual = skeleton(robot.model)
+    if highlights is not None:
+        visual = highlights.with_bright_copies(visual)
+    visual = with_obstacles(visual, trajectory)
+    visualizer = MeshcatVisualizer(robot.model, None, visual)
+    visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
+    visualizer.loadViewerModel(rootNodeName="robot")
+    visualizer.setBackgroundColor("gray")
+    visualizer.display(trajectory.q[0])
+    if highlights is not None:
+        highlights.show(visualizer, 0.0)
+    lower, upper = _swept_box(visualizer, _along(trajectory, _VIEW_SAMPLES))
+    if trace:
+        tip = robot.frame_position(robot.tip_frame, _along(trajectory, _TRACE_SAMPLES))
+        _draw_trace(visualizer, tip, _TRACE_WIDTH * float(np.linalg.norm(upper - lower)))
+    _set_the_stage(visualizer, lower, upper)
+    return visualizer
+
+
+def _along(trajectory: Trajectory, most: int) -> Array:
+    """Configurations at even times, at most so many, shape (M, nq)."""
+    count = int(min(most, 1 + _VIEW_SAMPLES * trajectory.grid.intervals))
+    return trajectory.configurations(np.linspace(0.0, trajectory.duration, count))
+
+
+def _swept_box(visualizer: MeshcatVisualizer, q: Array) -> tuple[Array, Array]:
+    """Lower and upper corner of what the drawn robot passes through, each (3,), in [m]."""
+    corners = [_corners(item) for item in visualizer.visual_model.geometryObjects]
+    points = [np.zeros((1, 3))]  # the base belongs to the picture
+    for placements in _placements(visualizer, q):
+        pairs = zip(corners, placements, strict=True)
+        points += [c @ place.rotation.T + place.translation for c, place in pairs]
+    swept = np.concatenate(points)
+    return swept.min(axis=0), swept.max(axis=0)
+
+
+def _corners(item: pin.GeometryObject) -> Array:
+    """Corners of a drawn object's own bounding box, shape (8, 3), in [m]."""
+    item.geometry.computeLocalAABB()
+    box = item.geometry.aabb_local
+    choices = np.array(list(itertools.product((0, 1), repeat=3)))
+    corners: Array = np.where(choices, box.max_, box.min_)
+    return corners
+
+
+def _draw_trace(visualizer: MeshcatVisualizer, points: Array, width: float) -> None:
+    """A path as close points: browsers draw lines one pixel wide, whatever is asked."""
+    colors = np.tile(_TRACE_COLOR, (len(points), 1))
+    geometry = meshcat.geometry.PointsGeometry(*(x.T.astype(np.float32) for x in (points, colors)))
+    material = meshcat.geometry.PointsMaterial(size=width)
+    visualizer.viewer["trace"].set_object(meshcat.geometry.Points(geometry, material))
+
+
+def _set_the_stage(visualizer: MeshcatVisualizer, lower: Array, upper: Array) -> None:
+    """Look across the larger horizontal extent, from far enough to have everything in view.
+
+    meshcat's camera turns about the world's origin, so the middle of the motion is put there.
+    """
+    size, center = upper - lower, 0.5 * (lower + upper)
+    aside = np.array([size[1], -size[0], 0.0])
+    direction = aside / max(float(np.linalg.norm(aside)), 1e-12) + np.array([0, 0, _ELEVATION])
+    diagonal = max(float(np.linalg.norm(size)), 1e-3)
+    distance = 0.5 * diagonal / math.sin(_FIELD_OF_VIEW / 2)
+    x, y, z = distance * direction / np.linalg.norm(direction)
+    viewer = visualizer.viewer
+    camera = viewer["/Cameras/default/rotated/<object>"]
+    camera.set_property("position", [x, z, -y])  # this node's y points up
+    camera.set_property("far", max(100.0, 4 * distance))
+    viewer["/meshcat"].set_transform(_shift(-center))
+    viewer["/Grid"].set_transform(_shift(np.array([-center[0], -center[1], lower[2] - center[2]])))
+    viewer["/Axes"].set_transform(_shift(-center) @ np.diag([*np.full(3, 0.2 * diagonal), 1.0]))
+
+
+def _shift(offset: Array) -> Array:
+    placement = np.eye(4)
+    placement[:3, 3] = offset
+    return placement
+
+
+def _placements(visualizer: MeshcatVisualizer, q: Array) -> list[list[pin.SE3]]:
+    """Placement of every drawn object, for each configuration in q (M, nq)."""
+    model, visual = visualizer.model, visualizer.visual_model
+    data, visual_data = model.createData(), visual.createData()
+    placements = []
+    for configuration in q:
+        pin.updateGeometryPlacements(model, data, visual, visual_data, configuration)
+        placements.append([place.copy() for place in visual_data.oMg])
+    return placements
+
+
+def _frame_times(trajectory: Trajectory) -> Array:
+    """Times of an animation's frames, its two ends included."""
+    frames = int(min(_MAX_FRAMES, math.ceil(trajectory.duration * _FRAME_RATE))) + 1
+    return np.linspace(0.0, trajectory.duration, max(frames, 2))
+
+
+def _animation(
+    trajectory: Trajectory,
+    visualizer: MeshcatVisualizer,
+    loop: bool,
+    highlights: Highlights | None,
+) -> dict[str, object]:
+    """The message that makes a page play the motion: tracks by drawn object, in seconds."""
+    times = _frame_times(trajectory)
+    visible = {} if highlights is None else highlights.changes(visualizer)
+    placements = _placements(visualizer, trajectory.configurations(times))
+    animation = meshcat.animation.Animation()
+    for number, item in enumerate(visualizer.visual_model.geometryObjects):
+        places = [frame[number] for frame in placements]
+        turns = [pin.Quaternion(place.rotation).coeffs() for place in places]
+        tracks = {
+            "position": _track("position", "vector3", times, [p.translation for p in places]),
+            "quaternion": _track("quaternion", "quaternion", times, turns),
+        }
+        name = node_name(visualizer, item)
+        if name in visible:
+            keys, flags = visible[name]
+            tracks["visible"] = _track("visible", "bool", keys, list(flags))
+        node = visualizer.viewer[name]
+        animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
+    repetitions = math.inf if loop else 1
+    command = meshcat.commands.SetAnimation(animation, play=True, repetitions=repetitions)
+    message: dict[str, object] = command.lower()
+    return message
+
+
+def _track(
+    name: str, kind: str, times: Array, values: list[Array]
+) -> meshcat.animation.AnimationTrack:
+    return meshcat.animation.AnimationTrack(
+        name, kind, times.tolist(), [value.tolist() for value in values]
+    )
+
+
+def _title(trajectory: Trajectory, robot: Robot) -> str:
+    return f"{robot.name}, {trajectory.duration:g} s"
+
+
+def _check_positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise DisplayError(f"{name} must be a positive number, got {value}.")

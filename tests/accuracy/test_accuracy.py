@@ -1,0 +1,279 @@
+"""Work-precision diagrams: errors in units, orders, fronts, budgets, and the true motion."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi.accuracy import MotionError, Run, work_precision
+from hovi.accuracy.budget import Budget
+from hovi.accuracy.diagram import Diagram
+from hovi.accuracy.measuring import LADDER, measure
+from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
+from hovi.accuracy.picture import work_precision_figure
+from hovi.accuracy.reference_motion import Yardstick
+from hovi.accuracy.tables import as_csv
+from hovi.cli import main
+from hovi.discrete.state import State
+from hovi.errors import InputError, UnmeasurableError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
+from hovi.robot.bundled_models import example
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from samples import paper_arm
+
+Array = npt.NDArray[np.float64]
+FEW = ("galerkin-0", "galerkin-1", "hermite-simpson")
+
+
+@pytest.fixture(scope="module")
+def reach() -> Diagram:
+    return work_precision(
+        load_task(example("two_link_reach")), schemes=FEW, repeats=1, clock="processor"
+    )
+
+
+def run(method: str, intervals: int, cost: float, seconds: float, joints: float = 1e-3) -> Run:
+    error = MotionError(cost, joints, 1.0)
+    return Run(method, "hovi", 4, intervals, True, "", 1.0, 3, error, 0.1, 1.0, (seconds,))
+
+
+def diagram_of(reach: Diagram, *runs: Run) -> Diagram:
+    return Diagram("synthetic", "near", reach.resolved, runs)
+
+
+def test_errors_are_in_radians_and_in_millimetres_at_the_tip(pendulum: Robot) -> None:
+    turn, T = 1e-3, 2.0
+
+    def still(t: Array) -> Array:
+        return np.zeros((len(t), 1))
+
+    def turned(t: Array) -> Array:
+        return np.where(t[:, None] > T / 2, turn, 0.0)
+
+    length = np.linalg.norm(pendulum.frame_position(pendulum.tip_frame, np.zeros((1, 1))))
+    error = Yardstick(pendulum, T, still, 2.0).error(2.0 * (1 + 1e-5), turned)
+    assert error.cost == pytest.approx(1e-5, rel=1e-9)
+    assert error.joints == turn
+    assert error.tip == pytest.approx(1e3 * 2 * length * math.sin(turn / 2), rel=1e-9)
+
+
+def test_the_motion_that_others_are_measured_against_solves_pontryagins_equations(
+    reach: Diagram,
+) -> None:
+    motion = reach.resolved.trajectory
+    y = np.concatenate([motion.q, motion.v, motion.momenta[:, 0], motion.momenta[:, 1]], axis=1).T
+    ends = (paper_arm.HANG, paper_arm.REST, paper_arm.REACH_Q, paper_arm.REACH_V)
+    true = paper_arm.extremal(ends, 1.0, (motion.t, y), tolerance=1e-9)
+    assert reach.resolved.cost == pytest.approx(true.cost, rel=1e-9)
+    t = reach.resolved.yardstick.times
+    np.testing.assert_allclose(motion.configurations(t), true.at(t)[0], rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", FEW)
+def test_the_error_of_the_cost_falls_with_the_order_of_the_scheme(
+    reach: Diagram, method: str
+) -> None:
+    fine = [r for r in reach.of(method) if 1e-10 < r.error.cost < 1e-5 and r.intervals >= 24]
+    assert len(fine) >= 3
+    slope = np.polyfit(
+        np.log([r.intervals for r in fine]), np.log([r.error.cost for r in fine]), 1
+    )[0]
+    assert fine[0].order is not None
+    assert -slope == pytest.approx(fine[0].order, abs=0.3)
+
+
+def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) -> None:
+    assert reach.methods == FEW
+    assert reach.complete
+    for each in reach.runs:
+        assert each.intervals in LADDER
+        assert each.counts == (each.success and each.error.joints <= 0.1)
+        assert each.setup_seconds > 0
+        assert each.first_seconds > 0
+        assert len(each.repeats) == (1 if each.counts else 0)
+        assert each.cold_seconds == each.setup_seconds + each.first_seconds
+    finest = reach.of("galerkin-1")[-1]
+    assert finest.cost == pytest.approx(reach.resolved.cost, rel=1e-11)
+
+
+def test_what_a_tolerance_chooses_is_within_it(reach: Diagram) -> None:
+    assert [choice.tolerance for choice in reach.choices] == [1e-3, 1e-5, 1e-7, 1e-9]
+    for choice in reach.choices:
+        assert choice.success
+        assert choice.error.cost <= choice.tolerance
+        assert choice.estimate is not None
+        assert choice.estimate <= choice.tolerance
+        assert choice.intervals >= 1
+
+
+def test_a_goal_of_a_frame_has_a_diagram_too(arm_scene: Scene) -> None:
+    goal = FrameGoal(arm_scene.robot.tip_frame, position=(1.5, 0.0, 1.0))
+    task = Task(arm_scene, State(paper_arm.HANG), goal, 1.0, limits="none")
+    diagram = work_precision(task, schemes=["galerkin-3"], repeats=1, budget=10.0)
+    assert min(run.error.cost for run in diagram.runs) < 1e-9
+
+
+def test_an_error_that_is_small_by_luck_promises_nothing(reach: Diagram) -> None:
+    lucky = run("a", 8, 1e-9, 1.0)
+    diagram = diagram_of(reach, lucky, run("a", 16, 1e-5, 2.0), run("a", 32, 1e-7, 3.0))
+    assert [error for _, error in diagram.kept("a")] == [1e-5, 1e-5, 1e-7]
+    cheapest = diagram.cheapest(1e-6)
+    assert cheapest is not None
+    assert cheapest.intervals == 32
+    assert diagram.cheapest(1e-8) is None
+
+
+def test_the_front_holds_what_nobody_beats_in_both_time_and_error(reach: Diagram) -> None:
+    fast, accurate = run("a", 8, 1e-3, 1.0), run("b", 8, 1e-6, 2.0)
+    beaten, astray = run("c", 8, 1e-4, 3.0), run("d", 8, 0.0, 0.1, joints=2.0)
+    assert not astray.counts
+    assert diagram_of(reach, fast, accurate, beaten, astray).front() == (fast, accurate)
+
+
+class Pretended(Method):
+    """Errors of order 4 against a motion of cost 1, and times that it claims."""
+
+    order = 4
+
+    def __init__(self, name: str, seconds: float) -> None:
+        self.name, self.family, self.seconds = name, "nobody", seconds
+        self.solves = 0
+
+    def prepare(self, intervals: int) -> Prepared:
+        if intervals > 64:
+            raise UnmeasurableError("it has no more than 64 intervals.")
+
+        def solve() -> Answer:
+            self.solves += 1
+            error = float(intervals) ** -4
+
+            def away(t: Array) -> Array:
+                return np.full((len(t), 1), error)
+
+            return Answer(True, "", 1 + error, away, 1, self.seconds * intervals)
+
+        return Prepared(solve, 0.0)
+
+
+def measured(pendulum: Robot, budget: float, *methods: Method) -> Any:
+    yardstick = Yardstick(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
+    return measure(methods, yardstick, Budget(budget), lambda text, fraction: None)
+
+
+def test_a_method_that_refuses_a_grid_keeps_its_runs_and_is_named(pendulum: Robot) -> None:
+    found = measured(pendulum, 1e6, Pretended("short", 1e-9))
+    assert max(run.intervals for run in found.runs) == 64
+    assert found.notes == ("short: it has no more than 64 intervals.",)
+
+
+def test_a_solve_that_would_take_a_tenth_of_the_budget_is_the_last_of_its_method(
+    pendulum: Robot,
+) -> None:
+    slow = Pretended("slow", 1.0)  # one second per interval
+    found = measured(pendulum, 100.0, slow)
+    assert [run.intervals for run in found.runs] == [4, 6, 8, 12]
+    assert [len(run.repeats) for run in found.runs] == [2, 1, 1, 1]  # until they take 5 s
+    assert slow.solves == 4 + 5
+
+
+def test_a_method_that_one_of_its_family_beats_by_far_stops_climbing(pendulum: Robot) -> None:
+    found = measured(pendulum, 1e9, Pretended("fast", 1.0), Pretended("slow", 40.0))
+    assert max(run.intervals for run in found.runs if run.method == "fast") == 64
+    assert [run.intervals for run in found.runs if run.method == "slow"] == [4]
+
+
+def test_the_processor_clock_stands_still_while_a_process_waits() -> None:
+    watch = Stopwatch("processor")
+    time.sleep(0.3)
+    assert watch.seconds < 0.2
+    subprocess.run([sys.executable, "-c", "sum(range(5_000_000))"], check=True)
+    assert watch.seconds > 0.01  # a child's work counts
+
+
+def test_a_budget_of_nothing_is_refused() -> None:
+    with pytest.raises(InputError, match="positive number of seconds, not 0"):
+        Budget(0.0)
+
+
+def test_the_picture_has_a_curve_for_every_scheme(reach: Diagram) -> None:
+    figure = work_precision_figure(reach)
+    legend = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert legend[:3] == [
+        "galerkin-0, order 4",
+        "galerkin-1, order 6",
+        "hermite-simpson, order 4",
+    ]
+    assert len(figure.axes) == 4
+    named = [text.get_text() for text in figure.axes[0].texts]
+    assert named[0].startswith("1e-03")
+    assert named[-1].endswith("1e-09")
+    assert all(ax.get_yscale() == "log" for ax in figure.axes)
+
+
+def test_stars_that_coincide_have_one_label(reach: Diagram) -> None:
+    errors = (1e-3, 1.1e-3, 1e-6, 1e-9)
+    chosen = tuple(
+        dataclasses.replace(choice, error=dataclasses.replace(choice.error, cost=error))
+        for choice, error in zip(reach.choices, errors, strict=True)
+    )
+    apart = dataclasses.replace(reach, choices=chosen)
+    named = [text.get_text() for text in work_precision_figure(apart).axes[0].texts]
+    assert named == ["1e-03 to 1e-05", "1e-07", "1e-09"]
+
+
+def test_the_csv_has_a_line_per_run(reach: Diagram) -> None:
+    rows = list(csv.DictReader(io.StringIO(as_csv(reach))))
+    assert len(rows) == len(reach.runs)
+    for row, each in zip(rows, reach.runs, strict=True):
+        assert float(row["cost_error"]) == each.error.cost
+        assert float(row["setup_seconds"]) == each.setup_seconds
+
+
+def test_the_command_writes_a_picture_and_both_tables(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["accuracy", "two_link_reach", "--budget", "3", "--out", str(tmp_path / "new")]
+    assert main([*arguments, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    names = sorted(path.name for path in (tmp_path / "new").iterdir())
+    assert names == [f"two_link_reach_accuracy.{ending}" for ending in ("csv", "json", "png")]
+    assert json.loads((tmp_path / "new" / names[1]).read_text()) == found
+    assert found["resolved"]["cost"] == pytest.approx(paper_arm.REACH_COST, rel=1e-10)
+    assert any("cost" in run["front"] for run in found["runs"])
+
+
+def test_a_scene_with_limits_says_that_the_diagram_leaves_them_out() -> None:
+    task = load_task(example("ur5_reach_limited"))
+    diagram = work_precision(task, schemes=["galerkin-5"], budget=5.0, repeats=1)
+    assert any("has limits" in note for note in diagram.notes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--budget", "0"], "positive number of seconds"),
+        (["--guess", "qubic"], "did you mean 'cubic'"),
+        (["--clock", "well"], "did you mean 'wall'"),
+        (["--out", __file__], "is a file; name a folder"),
+    ],
+)
+def test_misuse_is_one_sentence(
+    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["accuracy", "two_link_reach", *arguments]) == 2
+    assert sentence in capsys.readouterr().err

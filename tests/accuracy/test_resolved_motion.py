@@ -1,0 +1,52 @@
+"""The motions that methods are measured against, held against Pontryagin's equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
+from hovi.errors import UnmeasurableError
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.solver import Solution
+from hovi.planning.task_file.reading import load_task
+from hovi.robot.bundled_models import example
+from hovi.scene.scene import Scene
+from oracles.pontryagin_oracle import extremal
+
+
+def resolved(scene: str) -> tuple[ResolvedMotion, Solution]:
+    task = load_task(example(scene))
+    found = plan(task.scene, task.start, task.goal, task.duration, limits="none")
+    assert found.problem is not None
+    return resolve(found.problem, found, lambda: False), found
+
+
+@pytest.mark.parametrize(
+    ("scene", "tolerance"),
+    [
+        ("two_link_reach", 1e-6),
+        pytest.param("ur5_reach", 1e-6, marks=pytest.mark.long),
+        pytest.param("panda_reach", 1e-5, marks=pytest.mark.long),
+    ],
+)
+def test_a_resolved_motion_solves_pontryagins_equations(scene: str, tolerance: float) -> None:
+    motion, found = resolved(scene)
+    path, problem = motion.trajectory, found.problem
+    assert problem is not None
+    momenta = np.moveaxis(path.momenta, 1, 0)
+    guess = np.concatenate([path.q, path.v, *momenta], axis=1).T
+    true = extremal(problem.scene.model, problem.boundary, path.t, guess, tolerance)
+    assert motion.cost == pytest.approx(true.cost, rel=1e-2 * tolerance)
+    t = motion.yardstick.times
+    np.testing.assert_allclose(path.configurations(t), true.q(t), rtol=0, atol=0.1 * tolerance)
+    assert motion.uncertainty.cost <= 1e-12
+    assert motion.uncertainty.joints <= 1e-9
+
+
+def test_a_motion_that_costs_nothing_has_no_relative_error(arm_scene: Scene) -> None:
+    hanging = [-np.pi / 2, 0.0]
+    found = plan(arm_scene, hanging, hanging, 1.0, limits="none")
+    assert found.problem is not None
+    with pytest.raises(UnmeasurableError, match="errors are relative to its cost"):
+        resolve(found.problem, found, lambda: False)

@@ -1,0 +1,524 @@
+"""The command: exit codes, one JSON object, one sentence for every bad input, Ctrl-C."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hovi.cli import main
+from hovi.discrete.trajectory import Trajectory
+from hovi.robot.bundled_models import example, example_scenes
+
+REACH = example("two_link_reach.toml").read_text()
+URDF = example("two_link.urdf").read_text()
+
+Outcome = tuple[int, str, str]
+Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """One command in this process: exit code, stdout, stderr."""
+
+    def run(*arguments: str | Path) -> Outcome:
+        code = main([str(each) for each in arguments])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def run_process(*arguments: str | Path, cwd: Path | None = None) -> Outcome:
+    """One command as a person starts it."""
+    command = [sys.executable, "-m", "hovi", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture(scope="module")
+def motion(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("motion") / "reach.npz"
+    assert main(["plan", "two_link_reach", "--out", str(path)]) == 0
+    return path
+
+
+def scene(folder: Path, text: str = REACH, urdf: str | None = URDF) -> Path:
+    if urdf is not None:
+        (folder / "two_link.urdf").write_text(urdf)
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return path
+
+
+# Planning
+
+NUMBERS = ("cost", "nit", "n_neg", "setup_seconds", "solve_seconds", "intervals")
+
+
+def only_object(text: str) -> dict[str, Any]:
+    """The one JSON object on stdout, free of NaN and infinities."""
+
+    def refuse(constant: str) -> float:
+        raise AssertionError(f"{constant} is not JSON")
+
+    fields = json.loads(text, parse_constant=refuse)
+    assert isinstance(fields, dict)
+    return fields
+
+
+def test_json_is_one_object_with_the_promised_keys(run: Run) -> None:
+    code, out, err = run("plan", "two_link_reach", "--json")
+    assert (code, err) == (0, "")
+    fields = only_object(out)
+    assert fields["success"] is True
+    assert fields["status"] == "minimum"
+    assert fields["message"]
+    assert 0 < fields["error_estimate"] < 1e-7
+    assert (fields["scheme"], fields["intervals"], fields["n_neg"]) == ("galerkin-2", 16, 0)
+    assert math.isclose(fields["cost"], 20.2088008, rel_tol=1e-6)
+    assert all(isinstance(fields[key], (int, float)) for key in NUMBERS)
+    assert list(fields["peaks"]) == ["shoulder", "elbow"]
+    assert fields["limits"] is None
+    assert fields["excess"] is None
+
+
+def test_options_take_the_place_of_what_the_scene_says(run: Run) -> None:
+    options = ("--scheme", "galerkin-1", "--intervals", "24", "--seed", "7", "--starts", "1")
+    _, out, _ = run("plan", "two_link_reach", "--json", *options)
+    fields = only_object(out)
+    assert [fields[key] for key in ("scheme", "intervals", "seed", "starts")] == [
+        "galerkin-1",
+        24,
+        7,
+        1,
+    ]
+
+
+def test_without_limits_people_see_which_of_the_urdf_are_exceeded(run: Run) -> None:
+    code, out, _ = run("plan", "ur5_reach")
+    assert code == 0
+    for fragment in ("minimum", "galerkin-2 on 16 intervals", "wrist_3_joint", "150"):
+        assert fragment in out
+    assert "! beyond a limit of the URDF: the motion was planned without it." in out
+
+
+def test_with_limits_people_see_the_room_that_is_left(run: Run) -> None:
+    code, out, _ = run("plan", "ur5_reach_limited", "--no-certificate")
+    assert code == 0
+    assert "beyond" not in out
+    assert "* at a limit" in out
+    (row,) = [line for line in out.splitlines() if "elbow_joint" in line]
+    assert re.search(r"3\.14 +\*0\.0 %", row)  # its velocity, of 3.14 rad/s
+    (row,) = [line for line in out.splitlines() if "shoulder_lift_joint" in line]
+    assert "*" not in row
+
+
+def test_json_tells_how_close_each_limit_comes(run: Run, tmp_path: Path) -> None:
+    motion = tmp_path / "ur5.npz"
+    code, out, _ = run("plan", "ur5_reach_limited", "--json", "--out", motion)
+    fields = only_object(out)
+    assert code == 0
+    trajectory = Trajectory.load(motion)
+    assert fields["intervals"] == trajectory.grid.intervals
+    assert 0 <= fields["excess"] <= 1e-6
+    assert list(fields["limits"]) == ["q", "v", "a", "tau"]
+    for name, room in fields["limits"]["v"].items():
+        left = (3.14 - fields["peaks"][name]["v"]) / 6.28
+        assert math.isclose(room, left, abs_tol=1e-4)
+    assert set(fields["limits"]["a"].values()) == {None}
+
+
+def test_split_intervals_are_counted(run: Run) -> None:
+    fields = only_object(run("plan", "panda_reach_limited", "--json")[1])
+    assert fields["success"]
+    assert fields["intervals"] > 16
+
+
+def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
+    code, out, _ = run("plan", "ur5_reach", "--tolerance", "1e-6", "--json")
+    told = json.loads(out)
+    assert code == 0
+    assert 0 < told["error_estimate"] <= 1e-6
+    assert told["tolerance_reached"] is True
+    assert told["errors"]["cost"] == pytest.approx(told["error_estimate"])
+    assert told["errors"]["frame"] == "tool0"
+    assert told["grids"][-1]["intervals"] == told["intervals"]
+    assert told["grids"][-1]["error"] < 1e-2 * told["grids"][0]["error"]
+    _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm")
+    assert re.search(r"estimated error \S+ mm at the tip, 0.1 mm at the tip asked for", out)
+    assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
+
+
+SWING_UP = """robot = "two_link.urdf"
+duration = {duration}
+limits = "none"
+start.q = [-1.5707963267948966, 0.0]
+goal.q = [1.5707963267948966, 0.0]
+[effects.gravity]
+"""
+
+
+def test_a_cost_that_means_nothing_is_called_so_right_below_it(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("plan", scene(tmp_path, SWING_UP.format(duration=200.0)))
+    assert code == 0
+    found = re.search(
+        r"^cost +(\S+)\n! +the grid is too coarse for this motion: discrete action (\S+), "
+        r"integral (\S+); use more intervals or a tolerance$",
+        out,
+        re.MULTILINE,
+    )
+    assert found is not None
+    cost, action, integral = (float(number) for number in found.groups())
+    assert action == pytest.approx(cost, rel=0.05)
+    assert abs(integral - action) > 0.5 * integral
+    out = run("plan", scene(tmp_path, SWING_UP.format(duration=5.0)))[1]
+    assert "the grid is too coarse" not in out
+    assert "! coarse the two differ by more than 1 %" in out
+
+
+def test_a_plan_comes_with_its_certificate(run: Run) -> None:
+    told = json.loads(run("plan", "two_link_reach", "--json")[1])
+    certificate = told["certificate"]
+    assert certificate["action"] == pytest.approx(told["cost"], rel=1e-14)
+    assert certificate["integral"] == pytest.approx(told["cost"], rel=1e-5)
+    assert told["error_estimate"] == certificate["errors"]["cost"] < 1e-7
+    assert certificate["hamiltonian"] == pytest.approx(55.452, abs=1e-2)
+    assert certificate["replay"]["q_rad"] < 1e-8
+    assert certificate["replay"]["certifies"] == "dynamics and torques, not optimality"
+    text = run("plan", "two_link_reach")[1]
+    assert "this certifies dynamics and torques, not optimality" in text
+    assert re.search(r"^energy +Pontryagin's H = 55\.45", text, re.MULTILINE)
+    told = json.loads(run("plan", "two_link_reach", "--no-certificate", "--json")[1])
+    assert (told["certificate"], told["error_estimate"]) == (None, None)
+
+
+def test_a_scene_may_name_a_tolerance(run: Run, tmp_path: Path) -> None:
+    path = scene(tmp_path, "tolerance = '0.01 deg'\n" + REACH)
+    told = json.loads(run("plan", path, "--json")[1])
+    assert told["tolerance"] == "0.01 deg"
+    assert told["errors"]["q_rad"] <= np.deg2rad(0.01)
+    told = json.loads(run("plan", path, "--intervals", "8", "--json")[1])
+    assert (told["scheme"], told["intervals"]) == ("galerkin-2", 8)
+    assert "tolerance" not in told
+    assert "tolerance 0.01 deg" in run("info", path)[1]
+
+
+def test_limits_are_overridden_by_a_word(run: Run) -> None:
+    fields = only_object(run("plan", "ur5_reach_limited", "--limits", "none", "--json")[1])
+    assert fields["limits"] is None
+    fields = only_object(run("plan", "two_link_reach", "--limits", "urdf", "--json")[1])
+    assert all(room > 0.4 for room in fields["limits"]["tau"].values())
+
+
+def test_a_goal_outside_the_limits_is_infeasible_with_the_reason(run: Run, tmp_path: Path) -> None:
+    text = REACH.replace('limits = "none"\n', "") + "[limits.q]\nelbow = 0.5\n"
+    code, out, _ = run("plan", scene(tmp_path, text), "--json")
+    fields = only_object(out)
+    assert (code, fields["status"]) == (1, "infeasible")
+    assert "goal" in fields["message"]
+    assert "'elbow'" in fields["message"]
+    assert "! beyond one" in run("plan", tmp_path / "scene.toml")[1]
+
+
+def test_a_written_motion_is_the_one_that_was_planned(motion: Path) -> None:
+    trajectory = Trajectory.load(motion)
+    np.testing.assert_allclose(trajectory.q[-1], [0.3, 0.7], atol=1e-12)
+    np.testing.assert_allclose(trajectory.v[-1], [0.5, -0.4], atol=1e-12)
+
+
+def test_a_motion_is_a_guess_for_another_grid(run: Run, motion: Path) -> None:
+    _, out, _ = run("plan", "two_link_reach", "--guess", motion, "--intervals", "20", "--json")
+    fields = only_object(out)
+    assert fields["success"]
+    assert fields["nit"] < 5
+
+
+def test_a_time_limit_returns_the_best_so_far(run: Run, tmp_path: Path) -> None:
+    motion = tmp_path / "best.npz"
+    limit = ("--time-limit", "0.01", "--out", motion, "--json")
+    code, out, _ = run("plan", "two_link_swing_up", *limit)
+    fields = only_object(out)
+    assert code == (0 if fields["success"] else 1)
+    assert fields["status"] in ("time_limit", "minimum")
+    assert Trajectory.load(motion).duration == 10.0
+
+
+def test_an_interrupt_prints_the_best_so_far(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hovi", "plan", "two_link_swing_up", "--json"]
+    command += ["--starts", "1000"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        time.sleep(4.0)
+        os.kill(process.pid, signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert "Traceback" not in err
+    fields = only_object(out)
+    assert process.returncode == (0 if fields["success"] else 1)
+    assert math.isfinite(fields["cost"])
+
+
+INTERRUPTED_IMPORT = """
+import os, signal, sys
+from hovi.__main__ import run
+
+module = sys.argv.pop(1)
+
+class Interrupt:
+    def find_spec(self, name, *rest):
+        if name == module:
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupt())
+run()
+"""
+
+
+def interrupted_import(module: str, *arguments: str | Path) -> Outcome:
+    """A command that gets Ctrl-C when it begins to import a module."""
+    command = [sys.executable, "-c", INTERRUPTED_IMPORT, module, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def test_an_interrupt_while_a_run_imports_keeps_the_best_so_far(tmp_path: Path) -> None:
+    free = REACH.replace("duration = 1.0", "time_weight = 3.0\nduration = [0.5, 40.0]")
+    options = scene(tmp_path, free), "--intervals", "4000", "--json"
+    code, out, err = interrupted_import("scipy.optimize", "plan", *options)
+    fields = only_object(out)
+    assert (code, err, fields["status"]) == (1, "", "interrupted")
+    assert math.isfinite(fields["cost"])
+
+
+@pytest.mark.parametrize("module", ["typer", "numpy", "pinocchio"])
+def test_an_interrupt_while_a_command_imports_what_it_begins_with_ends_it(module: str) -> None:
+    assert interrupted_import(module, "plan", "two_link_reach") == (130, "", "")
+
+
+# Looking at robots, scenes and motions
+
+
+def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
+    for what in ("two_link_elbow", scene(tmp_path), example("two_link.urdf"), "ur5"):
+        code, out, err = run("info", what)
+        assert (code, err) == (0, "")
+        assert "elbow" in out
+    assert "joint_limit_potential" in run("info", "two_link_elbow")[1]
+    assert "Base: floating" in run("info", "ur5", "--free-flyer")[1]
+
+
+@pytest.mark.parametrize("name", ["ARM.URDF", "arm.xml", "arm.xacro", "folder/arm"])
+def test_info_takes_the_paths_that_load_robot_takes(run: Run, tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(URDF)
+    code, out, err = run("info", path)
+    assert (code, err) == (0, "")
+    assert "elbow" in out
+    assert "no-such.xml" in run("info", "no-such.xml")[2]
+
+
+def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> None:
+    target = tmp_path / "reach.csv"
+    code, out, _ = run("export", motion, "--csv", target, "--rate", "100")
+    assert code == 0
+    assert str(target) in out
+    assert len(target.read_text().splitlines()) == 102
+    assert run("export", motion, "--csv")[0] == 0
+    assert motion.with_suffix(".csv").exists()
+
+
+def test_a_motion_becomes_a_picture(run: Run, motion: Path, tmp_path: Path) -> None:
+    code, out, _ = run("plot", motion, "--out", tmp_path)
+    assert code == 0
+    assert f"wrote {tmp_path / 'reach.png'}" in out
+    assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_motion_becomes_a_page(run: Run, motion: Path, tmp_path: Path) -> None:
+    page = tmp_path / "reach.html"
+    assert run("replay", motion, "--html", page)[0] == 0
+    assert "<html" in page.read_text()[:1000].lower()
+
+
+def test_a_live_replay_serves_its_page_until_it_is_interrupted(motion: Path) -> None:
+    command = [sys.executable, "-m", "hovi", "replay", str(motion), "--no-browser"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        assert process.stdout is not None
+        address = re.search(r"http://\S+?(?=;)", process.stdout.readline())
+        assert address is not None
+        with urllib.request.urlopen(address[0], timeout=10) as page:
+            assert page.status == 200
+        time.sleep(1.5)  # longer than the motion
+        assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 0
+    assert "Traceback" not in err
+
+
+# Bad input
+
+
+def refused(outcome: Outcome, *expected: str) -> None:
+    code, out, err = outcome
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    for fragment in expected:
+        assert fragment in err
+
+
+def chain(links: int) -> str:
+    """A URDF of many links, quickly."""
+    inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+    link = '<link name="l{0}"><inertial><mass value="1"/>' + inertia + "</inertial></link>"
+    joint = (
+        '<joint name="j{0}" type="revolute"><parent link="l{0}"/><child link="l{1}"/>'
+        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    )
+    parts = [link.format(i) for i in range(links)]
+    parts += [joint.format(i, i + 1) for i in range(links - 1)]
+    return f'<robot name="chain">{"".join(parts)}</robot>'
+
+
+MODELS = {
+    "not a URDF": ("not a robot", []),
+    "another XML": ("<sdf><model/></sdf>", ["robot"]),
+    "NaN mass": (URDF.replace('mass value="0.375"', 'mass value="NaN"'), ["upper_arm", "mass"]),
+    "negative mass": (URDF.replace('mass value="0.25"', 'mass value="-1"'), ["forearm", "mass"]),
+    "20,000 links": (chain(20_000), ["links"]),
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_bad_robot_is_refused(model: str, run: Run, tmp_path: Path) -> None:
+    urdf, expected = MODELS[model]
+    path = scene(tmp_path, urdf=urdf)
+    refused(run("plan", path), "two_link.urdf", *expected)
+    refused(run("info", tmp_path / "two_link.urdf"), *expected)
+
+
+SCENES = {
+    "start of wrong length": ("q = [-1.5707963267948966, 0.0]", "q = [1, 2, 3]", ["shoulder"]),
+    "NaN in the goal": ("q = [0.3, 0.7]", "q = [nan, 0.7]", ["goal.q[0]", "nan"]),
+    "T = 0": ("duration = 1.0", "duration = 0.0", ["duration", "0.0"]),
+    "T < 0": ("duration = 1.0", "duration = -1.0", ["duration", "-1.0"]),
+    "N = 0": ("intervals = 16", "intervals = 0", ["intervals"]),
+    "unknown effect": ("[effects.gravity]", "[effects.gravitas]", ["'gravity'"]),
+    "unknown scheme": ("galerkin-2", "galerkin-two", ["'galerkin-2'"]),
+    "unit": ("duration", 'tolerance = "1 mmm"\nduration', ["tolerance", "'mm'", "line"]),
+    "degenerate scheme": ("galerkin-2", "mean-difference", ["mean-difference"]),
+    "unknown key": ("intervals =", "intervalls =", ["'intervals'", "line 17"]),
+}
+
+
+@pytest.mark.parametrize("mistake", SCENES)
+def test_a_bad_scene_is_refused(mistake: str, run: Run, tmp_path: Path) -> None:
+    old, new, expected = SCENES[mistake]
+    assert old in REACH
+    refused(run("plan", scene(tmp_path, REACH.replace(old, new)), "--json"), *expected)
+
+
+COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
+    "no such scene": (["plan", "nowhere.toml"], ["nowhere.toml"]),
+    "nearly a shipped scene": (["plan", "two_link_swingup"], ["'two_link_swing_up'"]),
+    "tolerance": (["plan", "two_link_reach", "--tolerance", "1 mmm"], ["'1 mmm'", "'mm'"]),
+    "frame": (["plan", "two_link_reach", "--tolerance", "1 mm at foot"], ["'foot'"]),
+    "two ways": (
+        ["plan", "two_link_reach", "--tolerance", "1e-6", "--intervals", "8"],
+        ["--tolerance chooses"],
+    ),
+    "N = 0": (["plan", "two_link_reach", "--intervals", "0"], ["intervals"]),
+    "no starts": (["plan", "two_link_reach", "--starts", "0"], ["starts"]),
+    "scheme": (["plan", "two_link_reach", "--scheme", "galerkn-2"], ["'galerkin-2'"]),
+    "guess": (["plan", "two_link_reach", "--guess", "cubik"], ["'cubic'"]),
+    "limits": (["plan", "two_link_reach", "--limits", "urd"], ["--limits", "'urdf'"]),
+    "no such guess": (["plan", "two_link_reach", "--guess", "no.npz"], ["no.npz"]),
+    "time limit": (["plan", "two_link_reach", "--time-limit", "nan"], ["--time-limit"]),
+    "ending": (["plan", "two_link_reach", "--out", "motion.toml"], [".npz"]),
+    "folder": (["plan", "two_link_reach", "--out", "/nowhere/m.npz"], ["/nowhere"]),
+    "option": (["plan", "two_link_reach", "--interval", "3"], ["--intervals"]),
+    "number": (["plan", "two_link_reach", "--intervals", "many"], ["--intervals"]),
+    "no scene": (["plan"], ["SCENE"]),
+    "no such robot": (["info", "pandaa"], ["'panda'"]),
+    "no such scene, to info": (["info", "two_link_swingup"], ["'two_link_swing_up'"]),
+    "no such URDF": (["info", "nowhere.urdf"], ["nowhere.urdf"]),
+    "no such motion": (["plot", "nowhere.npz"], ["nowhere.npz"]),
+    "no format": (["export", "nowhere.npz"], ["--csv"]),
+    "command": (["plann"], ["plan"]),
+}
+
+
+@pytest.mark.parametrize("mistake", COMMANDS)
+def test_a_bad_command_is_refused(mistake: str, run: Run) -> None:
+    arguments, expected = COMMANDS[mistake]
+    refused(run(*arguments), *expected)
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan"])
+@pytest.mark.parametrize("command", [("export", "--csv", "--rate"), ("replay", "--speed")])
+def test_rates_and_speeds_are_positive(
+    command: tuple[str, ...], value: str, run: Run, motion: Path
+) -> None:
+    refused(run(command[0], motion, *command[1:], value))
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"hello"])
+def test_a_file_that_is_no_motion_is_refused(content: bytes, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "strange.npz"
+    path.write_bytes(content)
+    refused(run("export", path, "--csv"), "strange.npz")
+
+
+# As a process
+
+
+def test_the_version_is_printed_without_loading_a_robot_library() -> None:
+    script = "import sys, hovi.cli; hovi.cli.main(['--version']); print('pinocchio' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    version, loaded = done.stdout.splitlines()
+    assert version.startswith("hovi ")
+    assert loaded == "False"
+
+
+def test_a_process_ends_with_the_exit_code_and_no_traceback(tmp_path: Path) -> None:
+    refused(run_process("plan", "nowhere.toml", cwd=tmp_path), "nowhere.toml")
+    code, out, err = run_process("plan", "two_link_reach", "--json", cwd=tmp_path)
+    assert (code, err) == (0, "")
+    assert only_object(out)["success"]
+
+
+def test_help_names_every_command(run: Run) -> None:
+    code, out, _ = run("--help")
+    assert code == 0
+    for command in ("plan", "replay", "plot", "export", "info"):
+        assert command in out
+
+
+def test_every_shipped_scene_is_known_by_name(run: Run) -> None:
+    for name in example_scenes():
+        assert run("info", name)[0] == 0

@@ -1,0 +1,76 @@
+"""Contracted derivatives are those of the sum over the points, written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi._native import _packed
+from hovi.discrete.contraction import contract
+
+Array = npt.NDArray[np.float64]
+
+SHAPES = [(1, 1, 4, 1), (3, 4, 6, 6), (2, 2, 4, 7), (5, 3, 5, 2), (2, 5, 8, 13), (1, 4, 6, 31)]
+"""Intervals B, points Q, columns m, components n."""
+
+
+def random_batch(B: int, Q: int, m: int, n: int) -> tuple[Array, Array, Array, Array, Array]:
+    """A table, weights, unequal steps, and gradients and symmetric Hessians at the points."""
+    random = np.random.default_rng(B + 10 * Q + 100 * m + 1000 * n)
+    H = random.normal(size=(B * Q, 3 * n, 3 * n))
+    table, weights = random.normal(size=(Q, 3, m)), random.uniform(size=Q)
+    steps = random.uniform(0.1, 2.0, B)
+    return table, weights, steps, random.normal(size=(B * Q, 3 * n)), H + H.transpose(0, 2, 1)
+
+
+def written_out(
+    table: Array, weights: Array, steps: Array, gradient: Array, hessian: Array
+) -> tuple[Array, Array]:
+    """The sums of h w A^T g and h w A^T H A."""
+    B, Q, n = len(steps), len(weights), gradient.shape[1] // 3
+    A = table / steps[:, None, None, None] ** np.arange(3)[:, None]
+    g, H = gradient.reshape(B, Q, 3, n), hessian.reshape(B, Q, 3, n, 3, n)
+    hw = steps[:, None] * weights
+    return (
+        np.einsum("bq,bqri,bqrx->bix", hw, A, g),
+        np.einsum("bq,bqri,bqsj,bqrxsy->bijxy", hw, A, A, H, optimize=True),
+    )
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_contracted_derivatives_are_the_sums_over_points(shape: tuple[int, int, int, int]) -> None:
+    batch = random_batch(*shape)
+    for found, expected in zip(contract(*batch), written_out(*batch), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_the_upper_triangle_is_the_lower_one_to_the_last_bit(
+    shape: tuple[int, int, int, int],
+) -> None:
+    _, hessian = contract(*random_batch(*shape))
+    m = hessian.shape[1]
+    for i in range(m):
+        for j in range(i):
+            np.testing.assert_array_equal(hessian[:, j, i], hessian[:, i, j].transpose(0, 2, 1))
+
+
+def test_an_interval_has_the_same_bytes_in_every_batch() -> None:
+    table, weights, steps, gradient, hessian = random_batch(3, 4, 6, 6)
+    together = contract(table, weights, steps, gradient, hessian)
+    for k in range(3):
+        points = slice(4 * k, 4 * k + 4)
+        alone = contract(table, weights, steps[k : k + 1], gradient[points], hessian[points])
+        for one, other in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(one[k], other[0])
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_any_processor_contracts_alike(shape: tuple[int, int, int, int]) -> None:
+    batch = random_batch(*shape)
+    fast = contract(*batch)
+    slow = tuple(np.empty_like(array) for array in fast)
+    _packed.contract(*batch, *slow, portable=True)
+    for one, other in zip(fast, slow, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-14 * np.abs(other).max())

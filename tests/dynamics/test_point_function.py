@@ -1,0 +1,135 @@
+"""A function at many points is the function at each of them."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi.dynamics.point_function import CHUNK, PointFunction
+
+Array = npt.NDArray[np.float64]
+
+
+def sparse_function() -> ca.Function:
+    """A number, a column, and a 2 x 3 matrix with structural zeros that is not symmetric."""
+    x, t = ca.SX.sym("x", 2), ca.SX.sym("t")
+    matrix = ca.SX(2, 3)
+    matrix[0, 1], matrix[1, 0], matrix[1, 2] = x[0] * x[1], ca.sin(x[1]), t
+    return ca.Function("f", [x, t], [ca.sumsqr(x), ca.vertcat(x[1], t * x[0], 3), matrix])
+
+
+def by_hand(x: Array, t: Array) -> tuple[Array, Array, Array]:
+    a, b = x.T
+    number, column = a**2 + b**2, np.stack([b, t * a, np.full_like(t, 3.0)], axis=1)
+    matrix = np.zeros((len(t), 2, 3))
+    matrix[:, 0, 1], matrix[:, 1, 0], matrix[:, 1, 2] = a * b, np.sin(b), t
+    return number, column, matrix
+
+
+@pytest.mark.parametrize("points", [0, 1, 2, 7, CHUNK, CHUNK + 1, 2 * CHUNK + 5])
+def test_batches_of_any_size_give_the_function_at_every_point(points: int) -> None:
+    random = np.random.default_rng(points)
+    x, t = random.normal(size=(points, 2)), random.normal(size=(points, 1))
+    found = PointFunction(sparse_function())(x, t)
+    for result, expected in zip(found, by_hand(x, t[:, 0]), strict=True):
+        assert result.shape == expected.shape
+        np.testing.assert_allclose(result, expected, rtol=1e-14, atol=0)
+
+
+def test_any_memory_layout_is_accepted() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(20, 2)), np.arange(20)[:, None]
+    for view in (np.asfortranarray(x), np.repeat(x, 2, axis=0)[::2], x.astype(np.float32)):
+        for result, expected in zip(
+            function(view, t), by_hand(view.astype(float), t[:, 0] * 1.0), strict=True
+        ):
+            np.testing.assert_allclose(result, expected, rtol=1e-6)
+
+
+def test_results_of_an_earlier_call_are_left_alone() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(2, 6, 2)), np.ones((6, 1))
+    first = function(x[0], t)
+    kept = [result.copy() for result in first]
+    function(x[1], t)
+    for result, before in zip(first, kept, strict=True):
+        np.testing.assert_array_equal(result, before)
+
+
+def test_many_batch_sizes_in_turn_give_the_same_results() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(30, 2)), np.ones((30, 1))
+    whole = function(x, t)
+    for points in [*range(1, 20), *range(1, 20)]:
+        for part, expected in zip(function(x[:points], t[:points]), whole, strict=True):
+            np.testing.assert_array_equal(part, expected[:points])
+
+
+def heavy_function() -> ca.Function:
+    """Enough instructions for threads to share a dozen points."""
+    x = ca.SX.sym("x", 3)
+    y = x
+    for _ in range(800):
+        y = ca.sin(y) * y[0] + ca.cos(y[1] * y[2])
+    return ca.Function("heavy", [x], [y, ca.dot(x, y)])
+
+
+@pytest.mark.parametrize("points", [5, 64, 101, CHUNK + 7])
+def test_the_number_of_threads_does_not_change_a_bit(
+    points: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.random.default_rng(points).normal(size=(points, 3))
+    results = []
+    for threads in ("1", "2", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        results.append([r.tobytes() for r in PointFunction(heavy_function())(x)])
+    assert results[0] == results[1] == results[2]
+
+
+def test_threads_share_only_what_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    used = {
+        (name, points): max(threads for _, threads in PointFunction(function)._parts(points))
+        for name, function in (("light", sparse_function()), ("heavy", heavy_function()))
+        for points in (2, 500)
+    }
+    heavy = {("heavy", 2): 1, ("heavy", 500): 2}
+    assert used == {("light", 2): 1, ("light", 500): 1, **heavy}
+
+
+@pytest.mark.parametrize("points", [0, 1, 5, 500, 2 * CHUNK + 1])
+def test_the_parts_of_a_batch_cover_it_once(points: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    parts = list(PointFunction(heavy_function())._parts(points))
+    covered = [i for part, _ in parts for i in range(part.start, part.stop)]
+    assert covered == list(range(points))
+    assert all((part.stop - part.start) % threads == 0 for part, threads in parts)
+    assert all(part.stop - part.start <= CHUNK for part, _ in parts)
+
+
+def test_calls_from_many_threads_do_not_disturb_each_other() -> None:
+    function = PointFunction(heavy_function())
+    x = np.random.default_rng(0).normal(size=(40, 3))
+    whole = [result.copy() for result in function(x)]
+
+    def first(points: int) -> bool:
+        return all(
+            np.array_equal(part, expected[:points])
+            for part, expected in zip(function(x[:points]), whole, strict=True)
+        )
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(first, [1 + i % 40 for i in range(200)]))
+
+
+def test_a_pickled_function_gives_the_same_bytes() -> None:
+    function = PointFunction(sparse_function())
+    x, t = np.random.default_rng(0).normal(size=(6, 2)), np.ones((6, 1))
+    copy = pickle.loads(pickle.dumps(function))
+    for result, expected in zip(copy(x, t), function(x, t), strict=True):
+        np.testing.assert_array_equal(result, expected)

@@ -1,0 +1,236 @@
+"""Effects that make no sense are refused in one sentence, from Python and from scene files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hovi.effects import (
+    Armature,
+    Custom,
+    Drag,
+    DryFriction,
+    Effect,
+    EffortWeight,
+    Gravity,
+    JointSprings,
+    MovingBase,
+    Payload,
+    PowerCost,
+    ReferenceCost,
+    VelocityCost,
+    ViscousFriction,
+    Wrench,
+)
+from hovi.effects.expressions.formula import LONGEST
+from hovi.errors import SceneError
+from hovi.planning.task_file.reading import load_task
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
+
+TIP = "panda_hand_tcp"
+CASES: dict[str, tuple[Effect, str]] = {
+    "no direction": (Gravity(9.8, (0.0, 0.0, 0.0)), "direction must be three finite numbers"),
+    "negative friction": (
+        ViscousFriction({"panda_joint2": -0.1}),
+        r"viscous_friction': coefficient of joint 'panda_joint2' must be finite and 0 or more, got",
+    ),
+    "misspelt joint": (ViscousFriction({"panda_joint9": 1.0}), "did you mean 'panda_joint7'"),
+    "short list": (ViscousFriction((1.0, 2.0)), "needs one number per joint coordinate, 7"),
+    "no friction": (ViscousFriction(), "needs either coefficient or from_urdf = true; neither"),
+    "both": (ViscousFriction(0.1, from_urdf=True), "from_urdf = true; both were given"),
+    "no friction in the URDF": (DryFriction(from_urdf=True), "states no friction; give the"),
+    "negative dry friction": (DryFriction(-1.0), "coulomb of joint 'panda_joint1' must be finite"),
+    "static below": (DryFriction(1.0, 0.5), "must not be below Coulomb's 1, got 0.5"),
+    "sharp sign": (DryFriction(1.0, width=0.0), "width must be positive and finite, got 0"),
+    "negative armature": (Armature(-0.1), "inertia of joint 'panda_joint1' must be finite and 0"),
+    "no armature in the model": (Armature(from_urdf=True), "states no armature"),
+    "negative stiffness": (JointSprings(-2.0), "stiffness of joint 'panda_joint1'"),
+    "rest nowhere": (JointSprings(2.0, np.nan), "rest of joint 'panda_joint1' must be finite"),
+    "unknown frame": (Payload("panda_hand_tcpp", 1.0), "no frame 'panda_hand_tcpp': did you mean"),
+    "negative mass": (Payload(TIP, -1.0), "mass must be finite and 0 or more, got -1.0 kg"),
+    "mass of the base": (Payload("panda_link0", 1.0), "is fixed to the base"),
+    "no center": (Payload(TIP, 1.0, (0.0, np.nan, 0.0)), "center must be three finite numbers"),
+    "flat center": (Payload(TIP, 1.0, (0.0, 0.0)), "center must be three"),  # type: ignore[arg-type]
+    "half an inertia": (Payload(TIP, 1.0, inertia=(1.0,)), "six numbers"),  # type: ignore[arg-type]
+    "flat wind": (Drag(TIP, wind=(1.0, 2.0)), "wind needs three components, got 2"),  # type: ignore[arg-type]
+    "no body": (
+        Payload(TIP, 1.0, inertia=(1.0, 1.0, -0.1, 0.0, 0.0, 0.0)),
+        "must not have a negative principal value",
+    ),
+    "NaN wrench": (
+        Wrench(TIP, (0.0, np.nan, 0.0)),
+        "'wrench': force, component y must be a finite number or a formula, got nan",
+    ),
+    "wrench nowhere": (Wrench("tool1"), "has no frame 'tool1'"),
+    "axes": (Wrench(TIP, axes="wrold"), "axes 'wrold': did you mean 'world'"),
+    "negative area": (Drag(TIP, -1.0), "area must be finite and 0 or more"),
+    "wind of joints": (Drag(TIP, wind=('q["x"]', 0.0, 0.0)), "brackets only behind q, v and a"),
+    "base on a joint": (MovingBase(("x", 0.0, 0.0)), "names 'x', which is unknown"),
+    "zero weight": (EffortWeight({"panda_joint1": 0.0}), "weight of joint 'panda_joint1' must be"),
+    "negative cost": (VelocityCost(-1.0), "velocity_cost': weight of joint 'panda_joint1'"),
+    "negative reference": (ReferenceCost({}, -1.0), "weight must be finite and 0 or more"),
+    "reference of nobody": (ReferenceCost({"joint": 1.0}), "has no joint 'joint'"),
+    "negative power": (PowerCost(-1.0), "power_cost': weight of joint"),
+    "sharp power": (PowerCost(1.0, 0.0), "width must be positive and finite, got 0.0 W"),
+    "nobody's torque": (Custom({"panda_joint": 1.0}), "no joint 'panda_joint': did you mean"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_an_effect_that_makes_no_sense_is_refused_in_one_sentence(panda: Robot, case: str) -> None:
+    effect, sentence = CASES[case]
+    with pytest.raises(SceneError, match=sentence) as refused:
+        Scene(panda, [effect])
+    text = str(refused.value)
+    assert "\n" not in text
+    assert text.startswith(f"effect {effect.key!r}")
+    assert text.endswith((".", "?"))
+
+
+FORMULAS = {
+    "syntax": ("1 +", "is not arithmetic"),
+    "a name": ("u", "names 'u', which is unknown"),
+    "a function": ("sine(t)", "calls 'sine', which is unknown: did you mean 'sin'"),
+    "arguments": ("atan2(t)", "calls 'atan2' with 1 arguments; it takes 2"),
+    "keywords": ("sin(x=t)", "holds more than"),
+    "attributes": ("t.__class__", "holds more than"),
+    "calls of calls": ("(sin)(t)(t)", "holds more than"),
+    "strings": ("'t'", "holds more than"),
+    "truth": ("True", "holds more than"),
+    "lambdas": ("(lambda: 1)()", "holds more than"),
+    "a comparison": ("t > 1", "holds more than"),
+    "a joint's name": ('v["elbwo"]', "the joint 'elbwo', which is unknown: did you mean 'elbow'"),
+    "no joint": ("v", "needs a joint behind 'v', as in v"),
+    "a number for a joint": ("v[0]", "brackets only behind q, v and a"),
+    "an escape": (r"'\d'", "holds more than"),
+    "infinity": ("1e999", "must be a finite number or a formula"),
+    "a division by zero": ("1/0", "must be a finite number or a formula"),
+    "powers of powers": ("9**9**9**9", "must be a finite number or a formula"),
+    "length": ("+".join("t" * LONGEST), "has at most 2000 characters"),
+    "depth": ("(" * 300 + "t" + ")" * 300, "is not arithmetic"),
+    "signs": ("-" * 900 + "t", "is nested too deeply|is not arithmetic"),
+}
+
+
+@pytest.mark.parametrize("case", FORMULAS)
+def test_a_formula_is_arithmetic_and_nothing_else(two_link: Robot, case: str) -> None:
+    text, sentence = FORMULAS[case]
+    with pytest.raises(SceneError, match=sentence):
+        Scene(two_link, [Custom({"elbow": text})])
+
+
+def test_a_formula_means_what_it_says(two_link: Robot) -> None:
+    text = '-2*sin(pi*t)**2/4 + atan2(q["elbow"], 2) - max(v["shoulder"], +0.1)*abs(a["elbow"])'
+    scene = Scene(two_link, [Custom({"shoulder": text})])
+    random = np.random.default_rng(0)
+    q, v, a = random.normal(size=(3, 20, 2))
+    t = random.uniform(0, 2, 20)
+    expected = -2 * np.sin(np.pi * t) ** 2 / 4 + np.arctan2(q[:, 1], 2)
+    expected -= np.maximum(v[:, 0], 0.1) * np.abs(a[:, 1])
+    bare = Scene(two_link).inverse_dynamics(q, v, a)
+    added = scene.inverse_dynamics(q, v, a, t) - bare
+    np.testing.assert_allclose(added[:, 0], expected, atol=1e-13)
+    np.testing.assert_array_equal(added[:, 1], 0.0)
+
+
+def test_a_base_that_floats_is_not_moved_as_well() -> None:
+    robot = load_robot("solo8", free_flyer=True)
+    with pytest.raises(SceneError, match="'root_joint' of robot 'solo8' floats"):
+        Scene(robot, [MovingBase()])
+
+
+def test_a_joint_without_a_single_position_has_no_spring() -> None:
+    robot = load_robot("kinova")
+    with pytest.raises(SceneError, match=r"'j2s6s200_joint_1' has no single position"):
+        Scene(robot, [JointSprings({"j2s6s200_joint_1": 2.0})])
+    Scene(robot, [JointSprings({"j2s6s200_joint_2": 2.0})])
+    with pytest.raises(SceneError, match=r"names the joint 'j2s6s200_joint_1', which is unknown"):
+        Scene(robot, [Custom({"j2s6s200_joint_2": 'q["j2s6s200_joint_1"]'})])
+
+
+# In scene files
+
+FILE = """robot = "two_link.urdf"
+duration = 1.0
+[start]
+q = [0.0, 0.0]
+[goal]
+q = [1.0, 0.0]
+"""
+TABLES = {
+    "number": (
+        '[effects.viscous_friction]\ncoefficient = "much"',
+        r"line 8: `effects.viscous_friction.coefficient` must be a finite number or a list, "
+        r'each a finite number or a table of names, each with a finite number, but it is "much"',
+    ),
+    "truth": (
+        "[effects.viscous_friction]\nfrom_urdf = 1",
+        "line 8: `effects.viscous_friction.from_urdf` must be true or false, but it is 1",
+    ),
+    "negative": (
+        "[effects.viscous_friction]\ncoefficient = { elbow = -1.0 }",
+        "line 7: effect 'viscous_friction': coefficient of joint 'elbow' must be finite and 0",
+    ),
+    "no number": (
+        "[effects.dry_friction]\ncoulomb = nan",
+        "line 8: `effects.dry_friction.coulomb` must be a finite number or",
+    ),
+    "vector": (
+        '[effects.wrench]\nframe = "lower_arm"\nforce = [1.0, 2.0]',
+        r"line 9: `effects.wrench.force\[2\]` is missing; it must be given as well",
+    ),
+    "component": (
+        '[effects.wrench]\nframe = "lower_arm"\nforce = [1.0, true, 0.0]',
+        r"line 9: `effects.wrench.force\[1\]` must be a finite number or a string, but it is true",
+    ),
+    "key": (
+        "[effects.payload]\nmas = 1.0",
+        "line 8: unknown key `effects.payload.mas`; did you mean 'mass'",
+    ),
+    "missing": (
+        "[effects.payload]\nmass = 1.0",
+        "line 7: `effects.payload.frame` is missing; it must be a string",
+    ),
+    "scalar for a vector": (
+        '[effects.wrench]\nframe = "lower_arm"\nforce = 1.0',
+        "line 9: `effects.wrench.force` must be a list of 3, each a finite number or a string, but",
+    ),
+    "twice": ("[effects.gravity]\n[effects.gravity]", r"Cannot declare .* twice"),
+    "effect": ("[effects.gravitation]", "no effect 'gravitation'; did you mean 'gravity'"),
+}
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_a_mistake_in_a_table_is_named_with_its_line(
+    models: Path, tmp_path: Path, case: str
+) -> None:
+    table, sentence = TABLES[case]
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE.replace("two_link.urdf", str(models / "two_link.urdf")) + table + "\n")
+    with pytest.raises(SceneError, match=sentence):
+        load_task(path)
+
+
+@pytest.mark.parametrize(
+    ("table", "effect"),
+    [
+        ("[effects.viscous_friction]\ncoefficient = 1", ViscousFriction(1.0)),
+        ("[effects.viscous_friction]\ncoefficient = [1, 2.5]", ViscousFriction((1.0, 2.5))),
+        ("[effects.armature]\ninertia = { elbow = 1 }", Armature({"elbow": 1.0})),
+        (
+            '[effects.moving_base]\nposition = [0, "sin(t)", 1.0]',
+            MovingBase((0.0, "sin(t)", 1.0)),
+        ),
+    ],
+    ids=["a number", "a list", "a table", "formulas"],
+)
+def test_a_table_may_say_it_in_several_ways(
+    models: Path, tmp_path: Path, table: str, effect: Any
+) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE.replace("two_link.urdf", str(models / "two_link.urdf")) + table + "\n")
+    assert load_task(path).scene.effects == (effect,)

@@ -1,0 +1,199 @@
+"""Variational orders by the paper's definition, and the orders of the flow that follow."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.effects import Gravity
+from hovi.errors import InputError
+from hovi.flows.legendre_transforms import legendre
+from hovi.flows.order_of_accuracy import variational_order
+from hovi.flows.scheme_lagrangian import SchemeLagrangian
+from hovi.flows.stepper import flow
+from hovi.robot.robot import Robot
+from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian
+from hovi.scene.scene import Scene
+from hovi.scene.standard_lagrangians import spline
+from hovi.schemes import by_name, galerkin
+
+Array = npt.NDArray[np.float64]
+
+SEGMENTS = 50
+
+
+def jets(n: int, size: float) -> Array:
+    """(q, v, a, jerk) of solutions' starts, shape (4, SEGMENTS, n)."""
+    return size * np.random.default_rng(n).normal(size=(4, SEGMENTS, n))
+
+
+@pytest.fixture(scope="module")
+def arm(arm_scene: Scene) -> EffortLagrangian:
+    return arm_scene.effort_lagrangian()
+
+
+@pytest.fixture(scope="module")
+def six_joints(ur5: Robot) -> EffortLagrangian:
+    return Scene(ur5, [Gravity()]).effort_lagrangian()
+
+
+ORDERS = [
+    ("taylor-midpoint", 2, [0.005, 0.0025, 0.00125]),
+    ("taylor-trapezoid", 2, [0.005, 0.0025, 0.00125]),
+    ("hermite-simpson", 4, [0.02, 0.014, 0.01]),
+    ("galerkin-0", 4, [0.02, 0.014, 0.01]),
+    ("galerkin-1", 6, [0.04, 0.028, 0.02]),
+]
+
+
+@pytest.mark.parametrize(("name", "order", "steps"), ORDERS)
+def test_the_slope_of_the_variational_error_is_order_plus_one_on_the_arm(
+    arm: EffortLagrangian, name: str, order: int, steps: list[float]
+) -> None:
+    measured = variational_order(arm, by_name(name), steps, *jets(2, 0.5))
+    assert measured.order == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize(("name", "order", "steps"), ORDERS)
+def test_the_slope_of_the_variational_error_is_order_plus_one_on_six_joints(
+    six_joints: EffortLagrangian, name: str, order: int, steps: list[float]
+) -> None:
+    measured = variational_order(six_joints, by_name(name), steps, *jets(6, 0.1))
+    assert measured.order == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize(("r", "segments"), [(2, 8), (3, 8)])
+def test_higher_orders_in_extended_precision(arm_scene: Scene, r: int, segments: int) -> None:
+    assert extended_slope(arm_scene, r, segments) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("r", [2, 3])
+def test_higher_orders_in_extended_precision_on_fifty_segments(arm_scene: Scene, r: int) -> None:
+    assert extended_slope(arm_scene, r, SEGMENTS) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
+
+
+def extended_slope(scene: Scene, r: int, segments: int) -> float:
+    """Slope of max |L_d - L_d^e| with 40 digits; L_d^e with nine inner modes, of order 22."""
+    mp = pytest.importorskip("mpmath")
+    from oracles.extended_precision import action, graph
+
+    lagrangian = scene.effort_lagrangian()
+    torque = graph(casadi_functions(scene.model).inverse_dynamics)
+    x, p = legendre(lagrangian, *jets(2, 0.5)[:, :segments])
+    errors, steps = [], [0.03, 0.021, 0.015]
+    with mp.workdps(40):
+        for h in steps:
+            exact = SchemeLagrangian(lagrangian, galerkin(9), h).from_start(x, p)
+            close = SchemeLagrangian(lagrangian, galerkin(r), h).between(x, exact.w)
+            pairs = [
+                [
+                    action(lambda *jet: sum(u * u for u in torque(*jet)) / 2, h, *ends)
+                    for ends in (
+                        (x[i], exact.w[i], close.inner[i]),
+                        (x[i], exact.w[i], exact.inner[i]),
+                    )
+                ]
+                for i in range(segments)
+            ]
+            errors.append(float(max(abs(a - b) for a, b in pairs)))
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+def nonlinear(k: int) -> CasadiLagrangian:
+    """A Lagrangian of order k with every kind of coupling, in the plane."""
+    jet = [ca.SX.sym(f"q{j}", 2) for j in range(k + 1)]
+    q, top = jet[0], jet[-1]
+    L = ca.sumsqr(top) / 2 * (2 + ca.cos(q[0])) + top[0] * top[1] * ca.sin(q[1])
+    return CasadiLagrangian(jet, L - ca.cos(q[0] + q[1]) + sum(ca.sumsqr(x) for x in jet[1:-1]))
+
+
+@pytest.mark.parametrize(
+    ("k", "r", "steps"),
+    [
+        (1, 0, [0.04, 0.02, 0.01]),
+        (1, 1, [0.1, 0.05, 0.025]),
+        (1, 2, [0.14, 0.1, 0.07]),
+        (2, 0, [0.1, 0.05, 0.025]),
+        (2, 1, [0.14, 0.1, 0.07]),
+        (3, 0, [0.14, 0.1, 0.07]),
+    ],
+)
+def test_galerkin_has_order_2_r_plus_k_for_lagrangians_of_any_order(
+    k: int, r: int, steps: list[float]
+) -> None:
+    starts = 0.7 * np.random.default_rng(k).normal(size=(2 * k, SEGMENTS, 2))
+    measured = variational_order(nonlinear(k), galerkin(r, k), steps, *starts)
+    assert measured.order == pytest.approx(2 * (r + k), abs=0.3)
+
+
+# The flow from momenta has the order of its L_d
+
+
+DURATION = {2: 0.4, 6: 0.1}  # the arm with six joints is far less stable
+
+
+@cache
+def reference(lagrangian: EffortLagrangian) -> tuple[Array, Array, Array, Array]:
+    """A start, and where the exact flow carries it."""
+    duration = DURATION[lagrangian.nv]
+    x, p = legendre(lagrangian, *jets(lagrangian.nv, 0.25)[:, 0])
+    motion = flow(SchemeLagrangian(lagrangian, galerkin(6), duration / 8), x, p, 8, force=True)
+    return x, p, motion.x[-1], motion.p[-1]
+
+
+FLOWS = [
+    ("taylor-midpoint", 2, [16, 32, 64]),
+    ("taylor-trapezoid", 2, [16, 32, 64]),
+    ("galerkin-0", 4, [8, 12, 16]),
+    ("galerkin-1", 6, [5, 7, 10]),
+]
+
+
+@pytest.mark.parametrize("robot", ["arm", "six_joints"])
+@pytest.mark.parametrize(("name", "order", "counts"), FLOWS)
+def test_the_flow_from_momenta_has_the_order_of_its_discrete_lagrangian(
+    request: pytest.FixtureRequest, robot: str, name: str, order: int, counts: list[int]
+) -> None:
+    lagrangian = request.getfixturevalue(robot)
+    T = DURATION[lagrangian.nv]
+    x, p, x_end, p_end = reference(lagrangian)
+    errors = []
+    for N in counts:
+        motion = flow(SchemeLagrangian(lagrangian, by_name(name), T / N), x, p, N, force=True)
+        errors.append([np.abs(motion.x[-1] - x_end).max(), np.abs(motion.p[-1] - p_end).max()])
+    slopes = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
+    np.testing.assert_allclose(slopes, order, rtol=0, atol=0.3)
+
+
+@pytest.mark.parametrize("name", ["taylor-midpoint", "galerkin-0"])
+def test_a_flow_started_from_two_exact_nodes_may_be_wrong_at_every_step_length(
+    arm: EffortLagrangian, name: str
+) -> None:
+    # with the Taylor scheme the error does not shrink with h: start from Legendre momenta
+    T = DURATION[2]
+    x, p, x_end, _ = reference(arm)
+    errors = []
+    for N in (20, 40):
+        ld = SchemeLagrangian(arm, by_name(name), T / N)
+        second = flow(SchemeLagrangian(arm, galerkin(6), T / N), x, p, 1, force=True).x[1]
+        start = ld.joining(x[None], second[None]).p0[0]
+        errors.append(np.abs(flow(ld, x, start, N, force=True).x[-1] - x_end).max())
+    assert (errors[1] > 0.5 * errors[0]) == (name == "taylor-midpoint")
+
+
+def test_the_cubic_spline_is_exact_on_four_coefficients() -> None:
+    measured = variational_order(spline(2), galerkin(0), [0.4, 0.2], *jets(2, 1.0))
+    assert measured.errors.max() < 1e-14
+    coarse = variational_order(spline(2), by_name("taylor-trapezoid"), [0.4, 0.2], *jets(2, 1.0))
+    np.testing.assert_allclose(coarse.slopes, 3.0, atol=1e-9)
+
+
+def test_a_step_beyond_the_exact_solution_is_refused(arm: EffortLagrangian) -> None:
+    with pytest.raises(InputError, match="step"):
+        variational_order(arm, galerkin(1), [30.0], *jets(2, 0.5))

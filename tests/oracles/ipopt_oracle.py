@@ -1,0 +1,68 @@
+"""The discrete action minimised by Ipopt, written down in CasADi interval by interval."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.dynamics.symbolic_dynamics import casadi_functions
+from hovi.planning.problem.problem import TrajectoryProblem
+
+Array = npt.NDArray[np.float64]
+
+
+def least_action(
+    problem: TrajectoryProblem, guess: DiscretePath, seed: int = 0, move: float = 1e-3
+) -> tuple[float, Array]:
+    """The cost and the nodes (q, v), shape (N - 1, 2 n), that Ipopt finds near a path.
+
+    Each unknown of the guess is first moved at random, by `move` or so. The problem's limits hold
+    at the quadrature points.
+    """
+    grid, n = problem.grid, problem.robot.nv
+    N, r = grid.intervals, grid.inner_modes
+    nodes, modes = ca.MX.sym("nodes", 2 * n, N - 1), ca.MX.sym("modes", n, r * N)
+    q0, v0, q1, v1 = problem.boundary
+    ends = [np.concatenate(end)[:, None] for end in ((q0, v0), (q1, v1))]
+    all_nodes = ca.horzcat(ends[0], nodes, ends[1])
+    left, right = all_nodes[:, :-1], all_nodes[:, 1:]
+    actions, outputs = _interval_action(problem).map(N)(left, right, modes)
+    action = ca.sum2(actions)
+    x = ca.vertcat(ca.vec(nodes), ca.vec(modes))
+    quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-8}
+    program = {"x": x, "f": action}
+    bounds = {}
+    if problem.limits is not None:
+        program["g"] = ca.vec(outputs)
+        rows = outputs.shape[0] * N // problem.limits.lower.size
+        for name, bound in (("lbg", problem.limits.lower), ("ubg", problem.limits.upper)):
+            bounds[name] = np.tile(bound.ravel(), rows)
+    solver = ca.nlpsol("least_action", "ipopt", program, quiet)
+    inner = np.concatenate([np.hstack([guess.q, guess.v])[1:-1].ravel(), guess.inner.ravel()])
+    start = inner + move * np.random.default_rng(seed).standard_normal(inner.shape)
+    result = solver(x0=start, **bounds)
+    assert solver.stats()["success"]
+    found = result["x"].full().ravel()[: 2 * n * (N - 1)]
+    return float(result["f"]), found.reshape(N - 1, 2 * n)
+
+
+def _interval_action(problem: TrajectoryProblem) -> ca.Function:
+    """L_d(q0 v0, q1 v1, c) of an interval: h sum_j w_j 1/2 |tau_j|^2 by the scheme's numbers.
+
+    And (q, v, a, tau) at its quadrature points, one after the other.
+    """
+    scheme, h, n = problem.grid.schemes[0], float(problem.grid.steps[0]), problem.robot.nv
+    tau = casadi_functions(problem.scene.model).inverse_dynamics
+    left, right = ca.SX.sym("left", 2 * n), ca.SX.sym("right", 2 * n)
+    c = ca.SX.sym("c", n, scheme.inner_modes)
+    q0, v0, q1, v1 = left[:n], left[n:], right[:n], right[n:]
+    columns = ca.horzcat(h * v0, q1 - q0 - h * v0, h * (v1 - v0), h**2 * c)
+    action, outputs = 0, []
+    for weight, rows in zip(scheme.weights, scheme.table, strict=True):
+        x, hv, hha = ca.horzsplit(columns @ rows.T)
+        effort = tau(q0 + x, hv / h, hha / h**2)
+        action += h * weight * ca.sumsqr(effort) / 2
+        outputs += [q0 + x, hv / h, hha / h**2, effort]
+    return ca.Function("L_d", [left, right, c], [action, ca.vertcat(*outputs)])

@@ -1,0 +1,159 @@
+"""Motions that keep their distance: the terms of the interior point, and whole plans."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.distances import Distances
+from hovi.planning.clearance.obstacles import Box, Obstacle, Sphere
+from hovi.planning.clearance.violation import approach_along
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.clearance_outputs import ClearanceOutputs
+from hovi.planning.solver.solver import guess_path, solve
+from hovi.planning.solver.status import Status
+from hovi.schemes import galerkin
+
+Array = npt.NDArray[np.float64]
+HANG, REACH = [-np.pi / 2, 0.0], [0.3, 0.7]
+BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
+"""In the way of the arm's forearm between HANG and REACH."""
+
+
+def problem(scene: hovi.Scene, *obstacles: Obstacle, intervals: int = 16) -> TrajectoryProblem:
+    """The reach of the two-link arm in a second and a half, 0.05 m away from obstacles."""
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.5, intervals, galerkin(2)))
+    clearance = Clearance(obstacles, 0.05)
+    return TrajectoryProblem(ld, hovi.State(HANG), hovi.State(REACH), clearance=clearance)
+
+
+def least_distance(
+    trajectory: Trajectory, robot: hovi.Robot, clearance: Clearance, samples: int = 10_000
+) -> float:
+    q = trajectory.configurations(np.linspace(0.0, trajectory.duration, samples))
+    return float(Distances(robot, clearance).values(q).min())
+
+
+def test_the_model_with_distances_is_that_of_linear_and_square_terms(
+    arm_scene: hovi.Scene,
+) -> None:
+    """phi(x) = action + sum weights (rho y + sigma (y - y0)^2 / 2), with multipliers rho."""
+    given = problem(arm_scene, BALL, intervals=4)
+    assert given.distances is not None
+    limits = as_limits(arm_scene.robot, {"base": "none", "v": 9.0})
+    limited = LimitedAction(given, limits, more=ClearanceOutputs(given.distances, 0.05))
+    random = np.random.default_rng(0)
+    x = guess_path(given, "cubic")
+    y0 = limited.outputs(x).y
+    assert y0.shape == (16, 2 + 3)
+    rho, sigma = random.standard_normal(y0.shape), random.uniform(0.0, 9.0, y0.shape)
+    model = limited.model(x, sigma, rho, rho)
+    step = 0.1 * model.random_vector(1)
+
+    def phi(share: float) -> float:
+        outputs = limited.outputs(limited.retract(x, share * step, model))
+        terms = rho * outputs.y + sigma * (outputs.y - y0) ** 2 / 2
+        return outputs.value + float(np.sum(limited.bounds.weights * terms))
+
+    h = 1e-3
+    slope = (8 * (phi(h) - phi(-h)) - (phi(2 * h) - phi(-2 * h))) / (12 * h)
+    assert float(np.vdot(model.gradient, step)) == pytest.approx(slope, rel=1e-6)
+    curve = (16 * (phi(h) + phi(-h)) - (phi(2 * h) + phi(-2 * h)) - 30 * phi(0.0)) / (12 * h * h)
+    local = model.gather(step)
+    square = np.einsum("kia,kijab,kjb->", local, model.intervals.hessian, local)
+    assert float(square) == pytest.approx(curve, rel=1e-3)
+    _, dy = limited.linear_outputs(step, model)
+    up, down = (limited.outputs(limited.retract(x, s * h * step, model)).y for s in (1, -1))
+    np.testing.assert_allclose(dy, (up - down) / (2 * h), rtol=1e-4, atol=1e-5)
+
+
+def test_a_ball_in_the_way_is_passed_at_the_margin(arm_scene: hovi.Scene) -> None:
+    """At 10,000 samples; the motion leans on it, and costs more than the one through it."""
+    free = solve(problem(arm_scene))
+    kept = problem(arm_scene, BALL)
+    assert kept.clearance is not None
+    assert least_distance(free.trajectory, arm_scene.robot, kept.clearance) < -0.05
+    solution = solve(kept)
+    assert solution.status is Status.MINIMUM, solution.message
+    assert solution.n_neg == 0
+    distance = least_distance(solution.trajectory, arm_scene.robot, kept.clearance)
+    assert 0.05 <= distance <= 0.055
+    assert solution.cost > free.cost
+    assert solution.trajectory.metadata["clearance"] == kept.clearance.to_dict()
+
+
+def test_an_obstacle_that_nothing_comes_near_changes_nothing(arm_scene: hovi.Scene) -> None:
+    free = solve(problem(arm_scene))
+    far = solve(problem(arm_scene, Sphere([-5.0, 3.0, 0.0], 0.3)))
+    assert far.cost == pytest.approx(free.cost, rel=1e-9)
+    np.testing.assert_allclose(far.trajectory.q, free.trajectory.q, atol=1e-6)
+
+
+def test_approaches_are_those_of_dense_sampling(arm_scene: hovi.Scene) -> None:
+    given = problem(arm_scene, BALL, intervals=6)
+    assert given.distances is not None
+    motion = solve(problem(arm_scene, intervals=6)).trajectory
+    found = approach_along(motion, given.distances, 0.05)
+    dense = given.distances.values(motion.configurations(np.linspace(0.0, 1.5, 60_001)))
+    near = dense.min(axis=0) < 0.05
+    assert near.any()
+    np.testing.assert_allclose(found.distance.min(axis=0)[near], dense.min(axis=0)[near], atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "words"),
+    [
+        (Sphere([1.7, 0.0, 1.2], 0.4, name="ball"), ("goal", "'forearm'", "'ball'", "overlap by")),
+        (Sphere([0.0, 0.0, -2.62], 0.05), ("start", "'tip'", "'sphere 1'", "0.01 m apart", "0.05")),
+        (Box([0.4, 0.4, 0.4], [2.0, 0, 1.2], name="box"), ("goal", "'box'", "overlap by")),
+    ],
+)
+def test_an_end_that_is_too_near_is_infeasible_before_any_step(
+    arm_scene: hovi.Scene, obstacle: Obstacle, words: tuple[str, ...]
+) -> None:
+    solution = hovi.plan(arm_scene, HANG, REACH, 1.5, obstacles=[obstacle], margin=0.05)
+    assert solution.status is Status.INFEASIBLE
+    assert not solution.success
+    assert solution.nit == 0
+    for word in words:
+        assert word in solution.message
+
+
+def test_a_ball_that_bars_the_way_is_infeasible_and_named(arm_scene: hovi.Scene) -> None:
+    """The upper arm cannot pass it in its plane, whatever the forearm does."""
+    barred = problem(arm_scene, Sphere([0.49, 0.0, -0.41], 0.2, name="ball"))
+    solution = solve(barred)
+    assert solution.status is Status.INFEASIBLE
+    for word in ("'upper_arm'", "obstacle 'ball'", "overlap by", "at t ="):
+        assert word in solution.message
+
+
+def test_a_start_in_which_links_overlap_is_infeasible_and_names_them(ur5: hovi.Robot) -> None:
+    scene = hovi.Scene(ur5, [hovi.effects.Gravity()])
+    folded, open_ = [0.0, -1.5, 2.9, 0.0, 0.0, 0.0], [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
+    solution = hovi.plan(scene, folded, open_, 2.0, limits="none", self_collision=True)
+    assert solution.status is Status.INFEASIBLE
+    assert solution.nit == 0
+    for word in ("at the start link", "'upper_arm_link'", "'wrist_2_link'", "overlap by"):
+        assert word in solution.message
+
+
+def test_the_shipped_scene_keeps_its_margin_at_ten_thousand_samples(ur5: hovi.Robot) -> None:
+    task = hovi.load_task(hovi.example("ur5_around_sphere"))
+    kept, ends = task.clearance, (task.start, task.goal, task.duration)
+    free = hovi.plan(task.scene, *ends, limits=task.limits)
+    assert least_distance(free.trajectory, ur5, kept) < -0.05
+    solution = hovi.plan(
+        task.scene, *ends, limits=task.limits, obstacles=kept.obstacles, margin=kept.margin
+    )
+    assert solution.success, solution.message
+    assert solution.n_neg == 0
+    assert least_distance(solution.trajectory, ur5, kept) >= kept.margin

@@ -1,0 +1,153 @@
+"""Robots in free fall: their base carries no torque, and what that keeps is kept."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.errors import InputError
+from hovi.planning.problem.conserved_momentum import falls_freely, free_fall_contradiction
+
+
+@cache
+def spacecraft() -> hovi.Task:
+    return hovi.load_task(hovi.example("spacecraft_reorients"))
+
+
+@cache
+def reorientation(intervals: int, modes: int = 1) -> hovi.Solution:
+    task = spacecraft()
+    grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.galerkin(modes))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    guess = "cubic" if intervals == 8 else reorientation(8).trajectory
+    return hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal), guess)
+
+
+def momentum_map(solution: hovi.Solution) -> np.ndarray:
+    """J = Ad*_{q^-1} p of the base at every node: force and moment of p in the world's frame."""
+    rows = []
+    for q, (p, _) in zip(solution.trajectory.q, solution.trajectory.momenta, strict=True):
+        base = pin.XYZQUATToSE3(q[:7])
+        rows.append(base.act(pin.Force(p[:6])).vector)
+    return np.array(rows)
+
+
+def test_the_spacecraft_ends_turned_and_its_place_follows() -> None:
+    solution = reorientation(16)
+    assert solution.success, solution.message
+    motion = solution.trajectory
+    goal = np.array(spacecraft().goal.q)
+    turn = pin.XYZQUATToSE3(motion.q[-1, :7]).rotation.T @ pin.XYZQUATToSE3(goal[:7]).rotation
+    assert np.linalg.norm(pin.log3(turn)) < 1e-12
+    np.testing.assert_allclose(motion.q[-1, 8:], goal[8:], atol=1e-14)
+    assert np.linalg.norm(motion.q[-1, :3]) > 1e-3
+    np.testing.assert_allclose(motion.v[-1], 0.0, atol=1e-7)
+
+
+def test_the_six_momenta_of_the_action_are_equal_at_every_node() -> None:
+    """Discrete Noether, the multipliers of the base included; the goal fixes how it is turned."""
+    J = momentum_map(reorientation(8))
+    size = np.max(np.abs(J))
+    assert size > 1e-3
+    assert np.max(np.ptp(J, axis=0)) < 1e-10 * size
+
+
+def test_the_mechanical_momentum_drifts_by_the_order_of_the_scheme() -> None:
+    """A motion that keeps its equations at the points only keeps momentum up to quadrature."""
+    model = spacecraft().scene.model
+    drifts = []
+    grids = [16, 32, 64]
+    for N in grids:
+        motion, data = reorientation(N).trajectory, model.createData()
+        h = [
+            pin.computeCentroidalMomentum(model, data, q, v).vector.copy()
+            for q, v in zip(motion.q, motion.v, strict=True)
+        ]
+        drifts.append(np.max(np.abs(h)))
+    slopes = -np.diff(np.log(drifts)) / np.diff(np.log(grids))
+    assert np.all(slopes > 5.7)
+    assert drifts[-1] < 2e-10
+
+
+def test_the_center_of_mass_of_a_falling_quadruped_moves_on_a_parabola() -> None:
+    task = hovi.load_task(hovi.example("solo_in_flight"))
+    solution = hovi.plan(task.scene, task.start, task.goal, task.duration, limits="none")
+    assert solution.success, solution.message
+    t = np.linspace(0, task.duration, 21)
+    sample, data = solution.trajectory.sample(t), task.scene.model.createData()
+    center = np.array([pin.centerOfMass(task.scene.model, data, q).copy() for q in sample.q])
+    fall = center[0] - np.outer(t**2 / 2, [0.0, 0.0, 9.81])
+    np.testing.assert_allclose(center, fall, atol=1e-7)
+    np.testing.assert_allclose(sample.q[-1, 7:], task.goal.q[7:], atol=1e-12)
+
+
+def contradiction(**changes: object) -> str:
+    """What is said of the reorientation with another goal."""
+    task = spacecraft()
+    goal = dataclasses.replace(task.goal, **changes)
+    solution = hovi.plan(task.scene, task.start, goal, task.duration, limits="none")
+    assert solution.status is hovi.Status.INFEASIBLE
+    assert not solution.success
+    return solution.message
+
+
+def test_a_goal_that_moves_the_center_of_mass_is_infeasible() -> None:
+    message = contradiction(free=())
+    assert "cannot move the center of mass" in message
+    assert "leave the goal's base position free" in message
+
+
+def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
+    v = np.zeros(9)
+    v[3:6] = [0.0, 0.0, 0.1]
+    task = spacecraft()
+    state = hovi.State(task.start.q, v)
+    free = np.zeros((2, 2, 9), dtype=bool)
+    free[1, 0, :3] = True
+    q, _ = task.start.on(task.scene.robot, "start")
+    sentence = free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), free, 8.0)
+    assert "angular momentum is off by" in sentence
+    moving = hovi.plan(task.scene, state, task.start, 8.0, limits="none")
+    assert moving.status is hovi.Status.INFEASIBLE
+
+
+def test_a_redundant_goal_is_met() -> None:
+    """Everything is fixed, in agreement with what free fall keeps."""
+    free = reorientation(16)
+    end, problem = free.trajectory.q[-1], free.problem
+    again = hovi.solve(problem.between(problem.start, hovi.State(end)), free.trajectory)
+    assert again.success, again.message
+    assert again.cost == pytest.approx(free.cost, rel=1e-9)
+    np.testing.assert_allclose(again.trajectory.q[-1], end, atol=1e-8)
+
+
+def test_friction_on_the_base_is_no_free_fall() -> None:
+    """One coefficient for every coordinate brakes the base as well; those of the arm do not."""
+    task = spacecraft()
+    robot, passive = task.scene.robot, task.scene.passive
+    everywhere = hovi.Scene(robot, [hovi.effects.ViscousFriction(0.1)], passive=passive)
+    assert not falls_freely(everywhere)
+    joints = dict.fromkeys(robot.joint_names[1:], 0.1)
+    assert falls_freely(hovi.Scene(robot, [hovi.effects.ViscousFriction(joints)], passive=passive))
+
+
+def test_parts_of_an_orientation_cannot_be_free_alone() -> None:
+    task = spacecraft()
+    goal = dataclasses.replace(task.goal, free=("root_joint[3]", "root_joint[4]"))
+    with pytest.raises(InputError, match="the place, one turn, all turns or everything"):
+        hovi.plan(task.scene, task.start, goal, 1.0)
+
+
+def test_a_base_with_thrusters_may_go_anywhere() -> None:
+    task = spacecraft()
+    scene = hovi.Scene(task.scene.robot)
+    goal = dataclasses.replace(task.goal, free=(), free_velocity=())
+    solution = hovi.plan(scene, task.start, goal, task.duration, limits="none")
+    assert solution.success, solution.message
+    J = momentum_map(solution)
+    assert np.max(np.ptp(J, axis=0)) < 1e-10 * np.max(np.abs(J))

@@ -1,0 +1,139 @@
+"""Goals of frames: the equations, and configurations that meet them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.errors import InputError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.inverse_kinematics import inverse_kinematics
+from hovi.planning.problem.joint_condition import JointCondition
+from hovi.planning.problem.node_conditions import Condition
+from hovi.robot.robot import Robot
+from oracles.finite_differences import derivative
+
+
+def placement(robot: Robot, frame: str, q: np.ndarray) -> pin.SE3:
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, q)
+    return data.oMf[robot.model.getFrameId(frame)].copy()
+
+
+def goals(robot: Robot, frame: str, q: np.ndarray) -> dict[str, FrameGoal]:
+    """One goal of every kind, met at q."""
+    pose = placement(robot, frame, q)
+    axis = ([0.0, 0.0, 2.0], pose.rotation[:, 2])
+    return {
+        "pose": FrameGoal(frame, pose),
+        "matrix": FrameGoal(frame, pose.homogeneous),
+        "position": FrameGoal(frame, position=pose.translation),
+        "rotation": FrameGoal(frame, rotation=pose.rotation),
+        "axis": FrameGoal(frame, axis=axis),
+        "position and axis": FrameGoal(frame, position=pose.translation, axis=axis),
+    }
+
+
+KINDS = ("pose", "matrix", "position", "rotation", "axis", "position and axis")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_equations_of_a_goal_have_exact_derivatives(panda: Robot, kind: str) -> None:
+    random = np.random.default_rng(1)
+    target, q = random.uniform(-1, 1, (2, 7))
+    condition = goals(panda, "panda_hand", target)[kind].condition(panda)
+    v, weights = np.zeros(7), random.standard_normal(condition.size)
+    c, J = condition.evaluate(q, v)
+    assert c.shape == (condition.size,)
+    np.testing.assert_allclose(
+        J[:, 0], derivative(lambda x: condition.evaluate(x, v)[0], q), atol=1e-9
+    )
+    assert not J[:, 1].any()
+    slope = derivative(lambda x: weights @ condition.evaluate(x, v)[1][:, 0], q)
+    np.testing.assert_allclose(condition.curvature(q, v, weights)[0, :, 0], slope, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_inverse_kinematics_meets_every_kind_of_goal(panda: Robot, ur5: Robot, kind: str) -> None:
+    random = np.random.default_rng(2)
+    for robot, frame in ((panda, "panda_hand"), (ur5, "tool0")):
+        target = random.uniform(0.6 * robot.lower, 0.6 * robot.upper).clip(-2, 2)
+        goal = goals(robot, frame, target)[kind]
+        reached = inverse_kinematics(robot, goal, robot.neutral(), robot.lower, robot.upper)
+        assert reached.reason == ""
+        assert np.all(reached.q >= robot.lower)
+        assert np.all(reached.q <= robot.upper)
+        pose, wanted = placement(robot, frame, reached.q), placement(robot, frame, target)
+        if goal.position is not None:
+            np.testing.assert_allclose(pose.translation, wanted.translation, atol=1e-10)
+        if goal.rotation is not None:
+            assert np.linalg.norm(pin.log3(pose.rotation.T @ wanted.rotation)) < 1e-9
+        if goal.axis is not None:
+            np.testing.assert_allclose(pose.rotation[:, 2], wanted.rotation[:, 2], atol=1e-9)
+
+
+def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
+    """Kinova has joints whose configurations are (cos, sin); a frame goal and a joint goal."""
+    robot = hovi.load_robot("kinova")
+    random = np.random.default_rng(3)
+    q = robot.integrate(robot.neutral(), random.uniform(-1, 1, robot.nv))
+    target = robot.integrate(q, random.uniform(-0.5, 0.5, robot.nv))
+    v, held = np.zeros(robot.nv), np.ones((2, robot.nv), dtype=bool)
+    for condition in (
+        goals(robot, robot.tip_frame, target)["pose"].condition(robot),
+        JointCondition(robot, target, v, held),
+    ):
+        weights = random.standard_normal(condition.size)
+        J = condition.evaluate(q, v)[1][:, 0]
+
+        def moved(d: np.ndarray, condition: Condition = condition) -> np.ndarray:
+            return condition.evaluate(robot.integrate(q, d), v)[0]
+
+        np.testing.assert_allclose(J, derivative(moved, np.zeros(robot.nv)), atol=1e-9)
+        slope = derivative(
+            lambda d, moved=moved, weights=weights: (
+                weights @ derivative(lambda e: moved(d + e), np.zeros(robot.nv))
+            ),
+            np.zeros(robot.nv),
+        )
+        curvature = condition.curvature(q, v, weights)[0, :, 0]
+        np.testing.assert_allclose(curvature, slope, atol=1e-6)
+
+
+def test_a_goal_out_of_reach_is_told_with_what_is_missing(ur5: Robot) -> None:
+    reached = inverse_kinematics(ur5, FrameGoal("tool0", position=[3.0, 0, 0]), ur5.neutral())
+    assert "frame 'tool0' misses it by" in reached.reason
+    missing = float(reached.reason.split("misses it by ")[1].split(" m")[0])
+    tip = placement(ur5, "tool0", reached.q).translation
+    assert missing == pytest.approx(np.linalg.norm(tip - [3.0, 0, 0]), rel=1e-2)
+    assert missing > 1.5
+
+
+def test_half_a_turn_away_does_not_count_as_met(ur5: Robot) -> None:
+    """There the sines of the turn vanish as well."""
+    pose = placement(ur5, "tool0", np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2]))
+    turned = pose.rotation @ np.diag([1.0, -1.0, -1.0])
+    condition = FrameGoal("tool0", rotation=turned).condition(ur5)
+    q = np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2])
+    assert np.max(np.abs(condition.evaluate(q, np.zeros(6))[0])) < 1e-12
+    assert condition.missed(q)[1] == pytest.approx(np.pi)
+
+
+def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
+    for arguments, sentence in (
+        ({}, "needs a pose, a position"),
+        ({"position": [0, 0]}, "three finite numbers"),
+        ({"position": [0, 0, np.nan]}, "three finite numbers"),
+        ({"rotation": 2 * np.eye(3)}, "orthonormal"),
+        ({"rotation": -np.eye(3)}, "reflection"),
+        ({"axis": ([0, 0, 0], [0, 0, 1])}, "no length"),
+        ({"pose": np.eye(4), "position": [0, 0, 0]}, "not both"),
+        ({"rotation": np.eye(3), "axis": ([0, 0, 1], [0, 0, 1])}, "not both"),
+        ({"pose": np.eye(3)}, r"\(4, 4\)"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            FrameGoal("tool0", **arguments)
+    with pytest.raises(InputError, match="did you mean 'tool0'"):
+        hovi.FrameGoal("tool", position=[0, 0, 0]).check(ur5)

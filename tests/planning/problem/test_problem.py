@@ -1,0 +1,135 @@
+"""What can be planned, and the sentences for what cannot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.effects import Gravity
+from hovi.errors import InputError, ModelError, SchemeError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.scene import Scene
+from hovi.schemes import CLASSIC, by_name, galerkin
+from samples.manifold_robots import half_turning
+
+REST = State([0.0, 0.0])
+
+
+def problem(
+    robot: Robot, start: State = REST, goal: State = REST, scheme: str = "galerkin-1"
+) -> TrajectoryProblem:
+    grid = Grid.uniform(1.0, 4, by_name(scheme))
+    L = Scene(robot, [Gravity(9.8)]).effort_lagrangian()
+    return TrajectoryProblem(DiscreteLagrangian(L, grid), start, goal)
+
+
+def test_a_problem_knows_its_grid_scene_robot_and_ends(two_link: Robot) -> None:
+    found = problem(two_link, State([1, 2], [3, 4]), State(np.array([5.0, 6.0])))
+    assert found.robot is two_link
+    assert found.scene.robot is two_link
+    assert found.grid is found.ld.grid
+    expected = ([1.0, 2.0], [3.0, 4.0], [5.0, 6.0], [0.0, 0.0])
+    for end, numbers in zip(found.boundary, expected, strict=True):
+        assert end.dtype == np.float64
+        np.testing.assert_array_equal(end, numbers)
+
+
+def test_on_another_grid_it_is_the_problem_that_would_be_built_there(two_link: Robot) -> None:
+    first = problem(two_link, State([1, 2], free_velocity="all"), State([3.0, 1.0]))
+    assert first.structure.layout.size > 0
+    steps = np.array([0.3, 0.3, 0.4])
+    for grid in (Grid(steps, (galerkin(2),) * 3), Grid(2 * steps, (galerkin(2),) * 3)):
+        found = first.on(grid)
+        anew = TrajectoryProblem(found.ld, first.start, first.goal)
+        assert found.grid is grid
+        assert found.structure.layout.size == anew.structure.layout.size
+        np.testing.assert_array_equal(found.free_ends, anew.free_ends)
+        assert found.inertial_torque == anew.inertial_torque
+        assert found.finer.grid.inner_modes == 4
+    with pytest.raises(SchemeError, match="not regular"):
+        first.on(Grid(steps, (by_name("mean-difference"),) * 3))
+
+
+def test_the_ends_do_not_change_behind_ones_back(two_link: Robot) -> None:
+    q = np.array([1.0, 2.0])
+    found = problem(two_link, State(q))
+    q[:] = 9.0
+    np.testing.assert_array_equal(found.boundary[0], [1.0, 2.0])
+
+
+@pytest.mark.parametrize("end", ["start", "goal"])
+@pytest.mark.parametrize(
+    ("state", "sentence"),
+    [
+        (State([0.0]), r"{end}.* has shape \(1,\), expected \(2,\).*shoulder, elbow"),
+        (State([0.0, 0.0, 0.0]), r"{end}.* has shape \(3,\), expected \(2,\)"),
+        (State([[0.0, 0.0]]), r"{end}.* has shape \(1, 2\), expected \(2,\)"),
+        (State([0.0, np.nan]), "{end}.* is nan at joint 'elbow'"),
+        (State([-np.inf, 0.0]), "{end}.* is -inf at joint 'shoulder'"),
+        (State([0.0, 0.0], [np.nan, 0.0]), "{end}.* is nan at joint 'shoulder'"),
+        (State([0.0, 0.0], [0.0]), r"{end}.* has shape \(1,\), expected \(2,\)"),
+        (State(["up", "down"]), "{end}.* must be 2 numbers"),
+        (State(None), "{end}"),  # type: ignore[arg-type]
+    ],
+)
+def test_a_state_that_does_not_fit_is_refused_by_name(
+    two_link: Robot, end: str, state: State, sentence: str
+) -> None:
+    ends: dict[str, Any] = {end: state}
+    with pytest.raises(InputError, match=sentence.format(end=end)):
+        problem(two_link, **ends)
+
+
+@pytest.mark.parametrize("scheme", CLASSIC)
+def test_only_regular_schemes_make_a_problem(two_link: Robot, scheme: str) -> None:
+    if "difference" not in scheme:
+        problem(two_link, scheme=scheme)
+        return
+    with pytest.raises(SchemeError, match=f"scheme '{scheme}' is not regular"):
+        problem(two_link, scheme=scheme)
+
+
+def test_one_irregular_interval_is_enough_to_refuse(two_link: Robot) -> None:
+    schemes = (galerkin(1), by_name("mean-difference"), galerkin(1))
+    L = Scene(two_link).effort_lagrangian()
+    with pytest.raises(SchemeError, match="'mean-difference' is not regular"):
+        TrajectoryProblem(DiscreteLagrangian(L, Grid(np.ones(3), schemes)), REST, REST)
+
+
+def test_a_joint_that_follows_half_a_turn_is_named_with_the_cure() -> None:
+    robot = load_robot(half_turning())
+    start = State(robot.neutral())
+    with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimics.*lock one"):
+        problem(robot, start, start)
+
+
+def test_a_robot_without_joints_is_refused(two_link: Robot) -> None:
+    model = pin.Model()
+    model.name = "statue"
+    with pytest.raises(ModelError, match="'statue' has no joint that moves"):
+        problem(load_robot(model), State([]), State([]))
+
+
+def test_a_massless_link_is_refused(two_link: Robot) -> None:
+    model = two_link.model.copy()
+    model.inertias[2] = pin.Inertia.Zero()
+    with pytest.raises(ModelError, match=r"(?i)mass"):
+        problem(load_robot(model))
+
+
+def test_a_lagrangian_without_a_scene_makes_no_trajectory_problem() -> None:
+    q, v, a = (ca.SX.sym(name, 2) for name in "qva")
+    ld = DiscreteLagrangian(
+        CasadiLagrangian([q, v, a], ca.sumsqr(a)), Grid.uniform(1.0, 4, galerkin(1))
+    )
+    with pytest.raises(InputError, match="needs the effort Lagrangian of a Scene"):
+        TrajectoryProblem(ld, REST, REST)

@@ -1,0 +1,107 @@
+"""Tolerances in the units that a person has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.discrete.motion_error import MotionError
+from hovi.errors import InputError
+from hovi.planning.problem.tolerance import Accuracy, Quantity, Tolerance
+from hovi.robot.robot import Robot
+
+SAID = [
+    (1e-6, Quantity.COST, 1e-6, None),
+    ("1e-6", Quantity.COST, 1e-6, None),
+    (" 0.1 % ", Quantity.COST, 1e-3, None),
+    ("0.1 mm", Quantity.FRAME, 1e-4, None),
+    ("0.1mm at tool0", Quantity.FRAME, 1e-4, "tool0"),
+    ("2 um at tool0", Quantity.FRAME, 2e-6, "tool0"),
+    ("1.5E-3 m", Quantity.FRAME, 1.5e-3, None),
+    ("0.01 deg", Quantity.JOINTS, np.deg2rad(0.01), None),
+    ("1e-4 rad", Quantity.JOINTS, 1e-4, None),
+    ("3 mrad", Quantity.JOINTS, 3e-3, None),
+]
+REFUSED = [
+    ("1 mmm", "unit 'mmm': did you mean 'mm'"),
+    ("1 parsec", "unit 'parsec'"),
+    ("mm", "a tolerance is a number"),
+    ("1.2.3 mm", "a tolerance is a number"),
+    ("", "a tolerance is a number"),
+    ("-1e-3", "a tolerance is a number"),
+    ("1 deg at tool0", "only a length"),
+    ("1e-6 at tool0", "only a length"),
+    ("1 mm at tol0", "no such frame; did you mean 'tool0'"),
+    (0.0, "positive and finite"),
+    (-1e-6, "positive and finite"),
+    (float("nan"), "positive and finite"),
+    (float("inf"), "positive and finite"),
+    (True, "a tolerance is a number"),
+    (None, "a tolerance is a number"),
+    ([1e-6], "a tolerance is a number"),
+]
+
+
+@pytest.mark.parametrize(("said", "quantity", "size", "frame"), SAID)
+def test_what_a_person_says(
+    ur5: Robot, said: float | str, quantity: Quantity, size: float, frame: str | None
+) -> None:
+    understood = Tolerance.of(said, ur5)
+    assert (understood.quantity, understood.frame) == (quantity, frame)
+    assert understood.size == pytest.approx(size, rel=1e-14)
+    assert Tolerance.of(understood, ur5) == understood
+
+
+@pytest.mark.parametrize(("said", "sentence"), REFUSED)
+def test_what_makes_no_tolerance_is_refused_in_a_sentence(
+    ur5: Robot, said: object, sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        Tolerance.of(said, ur5)  # type: ignore[arg-type]
+
+
+def test_each_quantity_is_measured_by_its_own_number() -> None:
+    error = MotionError(
+        cost=1e-3,
+        q=np.array([[1e-4, 2e-4], [5e-5, 3e-4]]),
+        v=np.zeros((2, 2)),
+        tau=np.zeros((2, 2)),
+        tip=np.array([7e-5, 6e-5]),
+        q_at_nodes=np.zeros((3, 2)),
+        tip_at_nodes=np.zeros(3),
+        frame="tool0",
+        sliding=np.array([True, False]),
+    )
+    assert (error.slide, error.angle) == (1e-4, 3e-4)
+    measured = [Tolerance(1.0, each).measure(error) for each in Quantity]
+    assert measured == [1e-3, 3e-4, 7e-5]
+
+
+def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
+    wanted = Tolerance(1e-4, Quantity.FRAME, "tool0")
+    assert str(Accuracy(wanted, 2e-5, True, "")) == (
+        "estimated error 0.02 mm at tool0, 0.1 mm at tool0 asked for."
+    )
+    assert str(Accuracy(wanted, 2e-4, False, "the time limit was reached")) == (
+        "stopped early: the time limit was reached; estimated error 0.2 mm at tool0, 0.1 mm at "
+        "tool0 asked for."
+    )
+    assert "nothing was estimated" in str(Accuracy(wanted, np.nan, False, "no minimum was found"))
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (1e-6, "1e-06 of the cost"),
+        ("0.1 %", "0.1 % of the cost"),
+        ("0.01 deg", "0.01 deg in the joints"),
+        ("3 mrad", "3 mrad in the joints"),
+        ("0.1 m", "0.1 m at the tip"),
+        ("2 um at tool0", "2 um at tool0"),
+    ],
+)
+def test_errors_are_stated_in_the_unit_that_was_asked_for(
+    ur5: Robot, said: float | str, words: str
+) -> None:
+    understood = Tolerance.of(Tolerance.of(said, ur5), ur5)
+    assert understood.in_words(understood.size) == words

@@ -1,0 +1,286 @@
+"""Plans to a tolerance: the true error is below it and near its estimate, or the plan says why."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.motion_error import deviation
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.effects import Gravity
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
+from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tolerance
+from hovi.planning.refinement.candidate import ROUNDING
+from hovi.planning.refinement.error_estimate import finer_than
+from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
+from hovi.robot.bundled_models import example
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
+from samples.paper_arm import HANG, REACH_Q, REACH_V
+
+SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
+TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-9, "1 mm", "1e-3 mm", "0.1 deg", "1e-5 rad")
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def task(request: pytest.FixtureRequest) -> Task:
+    return load_task(example(f"{request.param}.toml"))
+
+
+def planned(task: Task, tolerance: float | str, **options: object) -> Solution:
+    ends = task.start, task.goal, task.duration
+    return plan(task.scene, *ends, tolerance=tolerance, limits="none", **options)  # type: ignore[arg-type]
+
+
+def accuracy_of(solution: Solution) -> Accuracy:
+    assert solution.accuracy is not None
+    return solution.accuracy
+
+
+def true_error(solution: Solution, frame: str | None = None) -> float:
+    """In the tolerance's unit, against a motion with half the steps and six modes more."""
+    problem, grid = solution.problem, solution.trajectory.grid
+    assert problem is not None
+    tables = tuple(galerkin(scheme.inner_modes + 6) for scheme in grid.schemes)
+    fine = Grid(grid.steps, tables).halved(np.ones(grid.intervals, dtype=bool))
+    reference = solve(problem.on(fine), solution.trajectory)
+    assert reference.success
+    costs = solution.cost, reference.cost
+    error = deviation(solution.trajectory, reference.trajectory, costs, frame)
+    return accuracy_of(solution).tolerance.measure(error)
+
+
+@pytest.mark.parametrize("tolerance", TOLERANCES)
+def test_the_true_error_is_below_the_tolerance_and_near_its_estimate(
+    task: Task, tolerance: float | str
+) -> None:
+    solution = planned(task, tolerance)
+    accuracy = accuracy_of(solution)
+    true = true_error(solution)
+    assert solution.success
+    assert accuracy.reached
+    assert true <= accuracy.tolerance.size
+    assert true <= 10 * accuracy.error
+    if accuracy.error > 1e-12:  # below, rounding has a part in both
+        assert true >= accuracy.error / 10
+
+
+def test_the_error_of_another_frame(task: Task) -> None:
+    frame = task.scene.robot.frame_names[-2]
+    solution = planned(task, f"0.01 mm at {frame}")
+    assert accuracy_of(solution).estimate is not None
+    assert true_error(solution, frame) <= 1e-5
+
+
+def test_less_is_done_for_less(task: Task) -> None:
+    rounds = [accuracy_of(planned(task, tolerance)).rounds for tolerance in (1e-2, 1e-5, 1e-11)]
+    points = [each[-1].points for each in rounds]
+    assert points == sorted(points)
+    assert points[0] < points[-1]
+
+
+def test_the_solution_knows_its_grid_and_its_error(task: Task) -> None:
+    solution = planned(task, 1e-7)
+    assert solution.problem is not None
+    assert solution.problem.grid is solution.trajectory.grid
+    assert solution.error_estimate == accuracy_of(solution).error
+    assert solution.cost == pytest.approx(
+        solution.problem.ld.action(solution.trajectory.path), rel=1e-13
+    )
+    assert "estimated error" in solution.message
+    assert solution.nit == sum(done.nit for done in accuracy_of(solution).rounds)
+
+
+def test_a_second_plan_is_the_same(task: Task) -> None:
+    one, other = (planned(task, 1e-6) for _ in range(2))
+    np.testing.assert_array_equal(one.trajectory.q, other.trajectory.q)
+    np.testing.assert_array_equal(one.trajectory.grid.steps, other.trajectory.grid.steps)
+
+
+# Where it ends early
+
+
+def test_rounding_is_not_passed_over(arm_scene: Scene) -> None:
+    found = plan(arm_scene, HANG, State(REACH_Q, REACH_V), 1.0, limits="none", tolerance=1e-16)
+    accuracy = accuracy_of(found)
+    assert found.success
+    assert not accuracy.reached
+    assert accuracy.error >= ROUNDING
+    assert "stopped early: rounding leaves no smaller error" in found.message
+
+
+def test_a_time_limit_is_named_with_what_was_reached(arm_scene: Scene) -> None:
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 4, galerkin(0)))
+    problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
+    first = solve(problem)
+    tolerance = Tolerance(1e-9)
+    ended = refine_to_tolerance(first, tolerance, time_limit=1e-9)
+    accuracy = accuracy_of(ended)
+    assert (ended.success, accuracy.reached) == (True, False)
+    assert accuracy.error > 1e-3
+    assert "stopped early: the time limit was reached" in ended.message
+
+
+@pytest.mark.parametrize("finished", [0, 1])
+def test_an_interrupt_returns_what_is_known(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch, finished: int
+) -> None:
+    estimates = 0
+
+    def interrupted(solution: Solution) -> FinerSolution | None:
+        nonlocal estimates
+        estimates += 1
+        if estimates > finished:
+            raise KeyboardInterrupt
+        return finer_than(solution)
+
+    monkeypatch.setattr("hovi.planning.refinement.candidate.finer_than", interrupted)
+    goal = State(REACH_Q, REACH_V)
+    found = plan(arm_scene, HANG, goal, 1.0, limits="none", tolerance=1e-10)
+    accuracy = accuracy_of(found)
+    assert (found.success, found.status) == (False, Status.INTERRUPTED)
+    assert not accuracy.reached
+    assert "it was interrupted" in found.message
+    assert np.isnan(accuracy.error) == (finished == 0)
+    assert (found.error_estimate is None) == (finished == 0)
+
+
+@pytest.mark.long
+def test_a_minimum_that_moves_away_is_not_given_its_small_estimate(arm_scene: Scene) -> None:
+    # fifty seconds: every finer grid leads further down a long valley
+    options = {"limits": "none", "intervals": 60, "tolerance": 1e-6}
+    found = plan(arm_scene, HANG, -HANG, 50.0, **options)  # type: ignore[arg-type]
+    accuracy = accuracy_of(found)
+    assert not accuracy.reached
+    assert "stopped early" in found.message
+    assert found.problem is not None
+    assert found.error_estimate is not None
+    every = np.ones(found.trajectory.grid.intervals, dtype=bool)
+    finer = solve(found.problem.on(found.trajectory.grid.halved(every)), found.trajectory)
+    assert abs(finer.cost / found.cost - 1) <= 10 * found.error_estimate
+
+
+def test_no_error_is_claimed_for_what_is_no_minimum(arm_scene: Scene) -> None:
+    goal = State(REACH_Q, REACH_V)
+    options = {"limits": "none", "max_iterations": 2, "continuation": False}
+    found = plan(arm_scene, HANG, goal, 1.0, tolerance=1e-6, **options)  # type: ignore[arg-type]
+    assert found.status is Status.ITERATION_LIMIT
+    assert found.error_estimate is None
+    assert not accuracy_of(found).reached
+    assert "nothing was estimated" in found.message
+
+
+def test_standing_still_is_exact(arm_scene: Scene) -> None:
+    weightless = Scene(arm_scene.robot)
+    found = plan(weightless, HANG, HANG, 1.0, limits="none", tolerance=1e-9)
+    assert (found.cost, found.error_estimate, accuracy_of(found).reached) == (0.0, 0.0, True)
+
+
+# Grids
+
+
+def test_a_sharp_turn_gets_the_short_intervals() -> None:
+    task = load_task(example("two_link_swing_up.toml"))
+    ends = task.start, task.goal, task.duration
+    options = {"limits": "none", "processes": 1}
+    guess = plan(task.scene, *ends, intervals=60, **options).trajectory  # type: ignore[arg-type]
+    found = planned(task, 1e-7, guess=guess, intervals=24, processes=1)
+    assert accuracy_of(found).rounds[0].error > 1e-2
+    assert accuracy_of(found).reached
+    assert true_error(found) <= 1e-7
+    grid = found.trajectory.grid
+    sharp = np.linalg.norm(found.trajectory.sample(grid.t[:-1] + grid.steps / 2).a, axis=1)
+    short = grid.steps < 0.6 * grid.steps.max()
+    assert grid.steps.max() > 3 * grid.steps.min()
+    assert short[np.argmax(sharp)]
+    assert np.median(sharp[short]) > 1.5 * np.median(sharp[~short])
+
+
+def test_every_grid_is_told(arm_scene: Scene) -> None:
+    told: list[Round] = []
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(1)))
+    problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
+    found = solve_to_tolerance(problem, Tolerance(1e-8), told=told.append)
+    assert tuple(told) == accuracy_of(found).rounds
+    assert len(told) >= 2
+
+
+def test_many_starts_are_ranked_with_their_errors(arm_scene: Scene) -> None:
+    found = plan(arm_scene, HANG, -HANG, 3.0, limits="none", starts=12, processes=1, tolerance=1e-6)
+    assert found.minima[0] == found.cost
+    assert list(found.minima) == sorted(found.minima)
+    assert accuracy_of(found).reached
+
+
+def test_a_motion_of_mixed_schemes_is_saved_and_loaded(
+    arm_scene: Scene, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    found = plan(arm_scene, HANG, State(REACH_Q, REACH_V), 1.0, limits="none", tolerance=1e-9)
+    file = tmp_path_factory.mktemp("saved") / "motion.npz"
+    found.trajectory.save(file)
+    loaded = Trajectory.load(file)
+    t = np.linspace(0.0, 1.0, 77)
+    np.testing.assert_array_equal(loaded.sample(t).tau, found.trajectory.sample(t).tau)
+    assert loaded.metadata["error_estimate"] == found.error_estimate
+
+
+# Other problems than between two states
+
+
+def test_ends_that_are_free(arm_scene: Scene) -> None:
+    free = plan(
+        arm_scene, HANG, State(REACH_Q, free_velocity="all"), 1.0, limits="none", tolerance=1e-7
+    )
+    assert accuracy_of(free).reached
+    true = true_error(free)
+    assert accuracy_of(free).error / 10 <= true <= 1e-7
+
+
+def test_joints_without_torque(two_link: Robot) -> None:
+    acrobot = Scene(two_link, effects=[Gravity(9.8)], passive=["shoulder"])
+    found = plan(
+        acrobot, HANG, State(np.add(HANG, [0.6, -1.0])), 1.5, limits="none", tolerance=1e-4
+    )
+    assert found.success
+    assert accuracy_of(found).reached
+    true = true_error(found)
+    assert accuracy_of(found).error / 10 <= true <= 1e-4
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+def test_motions_under_limits(arm_scene: Scene, tolerance: float) -> None:
+    limits = {"base": "none", "v": 5.0}
+    options = {"limits": limits, "intervals": 8, "tolerance": tolerance}
+    found = plan(arm_scene, HANG, State(REACH_Q, REACH_V), 1.0, **options)  # type: ignore[arg-type]
+    accuracy = accuracy_of(found)
+    assert found.problem is not None
+    assert accuracy.reached
+    every = np.ones(found.trajectory.grid.intervals, dtype=bool)
+    grid = found.trajectory.grid.halved(every)
+    grid = grid.halved(np.ones(grid.intervals, dtype=bool))
+    reference = solve(found.problem.on(grid), found.trajectory)
+    assert reference.success
+    true = abs(found.cost / reference.cost - 1)
+    assert accuracy.error / 10 <= true <= tolerance
+    t = np.linspace(0.0, 1.0, 1001)
+    assert np.abs(found.trajectory.sample(t).v).max() <= 5.0 * (1 + 1e-5)
+
+
+def test_the_tolerance_of_limits_is_not_passed_over(arm_scene: Scene) -> None:
+    limits = {"base": "none", "v": 5.0, "tolerance": 1e-4}
+    goal = State(REACH_Q, REACH_V)
+    found = plan(arm_scene, HANG, goal, 1.0, limits=limits, intervals=8, tolerance=1e-5)
+    accuracy = accuracy_of(found)
+    assert (found.success, accuracy.reached) == (True, False)
+    assert accuracy.error >= 1e-4
+    assert "stopped early" in found.message

@@ -1,0 +1,226 @@
+"""Certificates: every statement against an independent number, and reasons where there is none."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from hovi.discrete.state import State
+from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
+from hovi.errors import InputError
+from hovi.flows.dynamics_replay import replay_dynamics
+from hovi.planning.refinement.certificate import certify, cost_integral, momentum_jump
+from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.solver import Solution, solve
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
+from samples.manifold_robots import with_arm
+from samples.paper_arm import HANG, REACH_Q, REACH_V, effort
+
+GOAL = State(REACH_Q, REACH_V)
+HAMILTONIAN = 55.452
+"""Of the reach in one second, by other means."""
+
+
+def reach(scene: Scene, **options: object) -> Solution:
+    return plan(scene, HANG, GOAL, 1.0, **({"limits": "none"} | options))  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def fine(arm_scene: Scene) -> Solution:
+    return reach(arm_scene, intervals=32)
+
+
+# Energy
+
+
+def test_the_hamiltonian_at_the_nodes_is_constant(fine: Solution) -> None:
+    assert fine.problem is not None
+    found = nodal_hamiltonian(fine.problem, fine.trajectory)
+    assert found.values.shape == (33,)
+    assert found.mean == pytest.approx(HAMILTONIAN, abs=1e-3)
+    assert found.spread < 1e-8
+
+
+def test_its_spread_falls_with_the_order_of_the_nodes(arm_scene: Scene) -> None:
+    spreads = []
+    for intervals in (8, 16, 32):
+        solution = reach(arm_scene, scheme="galerkin-1", intervals=intervals)
+        assert solution.problem is not None
+        spreads.append(nodal_hamiltonian(solution.problem, solution.trajectory).spread)
+    orders = np.log2(np.divide(spreads[:-1], spreads[1:]))
+    assert orders[-1] == pytest.approx(6, abs=1.2)
+
+
+def test_no_hamiltonian_is_claimed_where_it_is_not_constant(two_link: Robot) -> None:
+    gust = Custom(torque_of={"shoulder": "sin(3*t)"})
+    scene = Scene(two_link, effects=[Gravity(9.8), gust])
+    solution = reach(scene)
+    assert solution.problem is not None
+    with pytest.raises(InputError, match="depend on time"):
+        nodal_hamiltonian(solution.problem, solution.trajectory)
+    certificate = certify(solution)
+    assert certificate.hamiltonian is None
+    assert "depend on time" in certificate.missing["hamiltonian"]
+
+
+# Replay
+
+
+@pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-0", "taylor-midpoint"])
+def test_the_planned_torques_lead_from_node_to_node(arm_scene: Scene, scheme: str) -> None:
+    replay = replay_dynamics(reach(arm_scene, scheme=scheme, intervals=16).trajectory)
+    assert replay.q.shape == (16, 2)
+    assert replay.angle < 1e-8
+    assert replay.largest_tip < 1e-8
+    assert np.max(replay.v) < 1e-6
+
+
+def test_a_replay_sees_torques_of_another_scene(fine: Solution, two_link: Robot) -> None:
+    # the same motion, claimed for an arm with armature: its own torques are right for it
+    heavy = Scene(two_link, effects=[Gravity(9.8), Armature([0.1, 0.1])])
+    moved = dataclasses.replace(fine.trajectory, scene=heavy)
+    assert replay_dynamics(moved).angle < 1e-9
+    # torques of the light arm do not move the heavy one
+    torques = fine.trajectory.sample_intervals
+
+    class Wrong:
+        def __getattr__(self, name: str) -> object:
+            return torques if name == "sample_intervals" else getattr(moved, name)
+
+    assert replay_dynamics(Wrong()).angle > 1e-4  # type: ignore[arg-type]
+
+
+def test_a_motion_that_is_not_optimal_is_replayed_just_as_well(arm_scene: Scene) -> None:
+    stopped = reach(arm_scene, max_iterations=1, continuation=False)
+    assert not stopped.success
+    assert replay_dynamics(stopped.trajectory).angle < 1e-8
+
+
+def test_what_effects_add_is_simulated_too(two_link: Robot) -> None:
+    effects = [Gravity(9.8), Armature([0.05, 0.02]), ViscousFriction([0.4, 0.3])]
+    scene = Scene(two_link, effects=effects)
+    assert replay_dynamics(reach(scene).trajectory).angle < 1e-8
+    frictionless = Scene(two_link, effects=effects[:2])
+    assert (
+        replay_dynamics(dataclasses.replace(reach(scene).trajectory, scene=frictionless)).angle
+        < 1e-8
+    )
+
+
+def test_torques_of_passive_joints_are_not_applied(two_link: Robot) -> None:
+    acrobot = Scene(two_link, effects=[Gravity(9.8)], passive=["shoulder"])
+    goal = State(np.add(HANG, [0.6, -1.0]))
+    coarse, fine = (
+        plan(acrobot, HANG, goal, 1.5, limits="none", intervals=N).trajectory for N in (16, 64)
+    )
+    misses = [replay_dynamics(motion).angle for motion in (coarse, fine)]
+    assert misses[0] > 1e-9  # between the points the passive joint is not free of torque
+    assert misses[1] < 0.01 * misses[0]
+
+
+# The rest
+
+
+def test_the_integral_is_that_of_the_torques_along_the_curve(arm_scene: Scene) -> None:
+    solution = reach(arm_scene, scheme="galerkin-0", intervals=8)
+    motion = solution.trajectory
+
+    def density(t: float) -> float:
+        at = motion.sample(t)
+        return effort(at.q[0], at.v[0], at.a[0])
+
+    pieces = [
+        quad(density, a, b, epsabs=1e-12)[0] for a, b in zip(motion.t, motion.t[1:], strict=False)
+    ]
+    assert solution.problem is not None
+    found = cost_integral(solution.problem, motion)
+    assert found == pytest.approx(sum(pieces), rel=1e-9)
+    assert abs(found - solution.cost) > 1e-4 * solution.cost
+
+
+def test_the_equations_hold_at_a_solution_and_not_elsewhere(
+    arm_scene: Scene, fine: Solution
+) -> None:
+    assert fine.problem is not None
+    assert momentum_jump(fine.problem, fine.trajectory) < 1e-10
+    stopped = reach(arm_scene, max_iterations=1, intervals=32, continuation=False)
+    assert stopped.problem is not None
+    assert momentum_jump(stopped.problem, stopped.trajectory) > 1e-3
+
+
+def test_peaks_lie_between_the_nodes_too(arm_scene: Scene) -> None:
+    solution = reach(arm_scene, intervals=4)
+    certificate = certify(solution)
+    t = np.linspace(0.0, 1.0, 4001)
+    dense = solution.trajectory.sample(t)
+    assert certificate.velocity.value == pytest.approx(np.abs(dense.v).max(), rel=1e-3)
+    assert certificate.torque.value == pytest.approx(np.abs(dense.tau).max(), rel=1e-2)
+    assert certificate.velocity.value > 1.05 * np.abs(solution.trajectory.v).max()
+    at = solution.trajectory.sample(certificate.velocity.t)
+    joint = arm_scene.robot.coordinate_names.index(certificate.velocity.joint)
+    assert abs(at.v[0, joint]) == pytest.approx(certificate.velocity.value, rel=1e-9)
+
+
+def test_a_plan_to_a_tolerance_brings_its_estimate_along(arm_scene: Scene) -> None:
+    solution = reach(arm_scene, tolerance=1e-8)
+    certificate = certify(solution)
+    assert certificate.errors is solution.accuracy.estimate  # type: ignore[union-attr]
+    assert certificate.errors is not None
+    assert certificate.errors.cost <= 1e-8
+    assert certificate.missing == {}
+    assert certificate.action == pytest.approx(solution.cost, rel=1e-14)
+
+
+def test_what_is_not_known_under_limits_is_not_claimed(arm_scene: Scene) -> None:
+    limited = reach(arm_scene, limits={"base": "none", "v": 6.0})
+    certificate = certify(limited, estimate=False)
+    assert (certificate.errors, certificate.hamiltonian, certificate.residual) == (None,) * 3
+    assert set(certificate.missing) == {"errors", "hamiltonian", "residual"}
+    assert certificate.replay is not None
+    assert certificate.replay.angle < 1e-8
+
+
+def test_a_motion_without_its_scene_and_an_unknown_frame_are_refused(fine: Solution) -> None:
+    with pytest.raises(InputError, match="has no frame 'tipp'"):
+        certify(fine, frame="tipp")
+    with pytest.raises(InputError, match="does not know its problem"):
+        certify(dataclasses.replace(fine, problem=None))
+
+
+def test_a_solve_can_be_certified(fine: Solution) -> None:
+    assert fine.problem is not None
+    certificate = certify(solve(fine.problem))
+    assert certificate.n_neg == 0
+    assert certificate.errors is not None
+    assert certificate.errors.cost < 1e-9
+
+
+def test_a_force_on_a_link_is_part_of_the_replay(two_link: Robot) -> None:
+    push = Wrench(frame="tip", force=[1.0, -2.0, 0.0])
+    assert (
+        replay_dynamics(reach(Scene(two_link, effects=[Gravity(9.8), push])).trajectory).angle
+        < 1e-8
+    )
+
+
+@pytest.mark.parametrize("base", ["free-flyer", "spherical", "continuous"])
+def test_joints_on_groups_are_certified_like_others(base: str) -> None:
+    robot = load_robot(with_arm(base))
+    scene = Scene(robot, effects=[Gravity()])
+    turn = 0.3 * np.random.default_rng(1).uniform(-1, 1, robot.nv)
+    goal = robot.integrate(robot.neutral(), turn)
+    found = plan(scene, robot.neutral(), goal, 1.0, limits="none", tolerance=1e-5)
+    certificate = certify(found)
+    assert found.accuracy is not None
+    assert found.accuracy.reached
+    assert certificate.missing == {}
+    assert certificate.hamiltonian is not None
+    assert certificate.hamiltonian.spread < 1e-7
+    assert certificate.replay is not None
+    assert certificate.replay.angle < 1e-9
+    assert certificate.replay.slide < 1e-9

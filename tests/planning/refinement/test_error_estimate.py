@@ -1,0 +1,229 @@
+"""Error estimates against solutions that are better by orders, and those against SciPy."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.finer_grid import MORE_MODES, finer_grid
+from hovi.discrete.grid import Grid
+from hovi.discrete.motion_error import (
+    MotionError,
+    deviation,
+    relative_difference,
+    sliding_coordinates,
+)
+from hovi.discrete.state import State
+from hovi.effects import Gravity
+from hovi.errors import InputError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.refinement.error_estimate import estimate_error, finer_than
+from hovi.planning.solver.solver import Solution, solve
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name, galerkin
+from samples.manifold_robots import BASES, with_arm
+from samples.paper_arm import HANG, REACH_Q, REACH_V, REST, extremal
+
+UR5_START = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1]
+UR5_GOAL = [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
+SCHEMES = [
+    ("galerkin-0", 16),
+    ("galerkin-1", 8),
+    ("galerkin-2", 8),
+    ("galerkin-2", 24),
+    ("galerkin-3", 12),
+    ("galerkin-4", 6),
+    ("hermite-simpson", 16),
+    ("taylor-midpoint", 32),
+    ("taylor-trapezoid", 32),
+]
+
+
+def ur5_problem(scene: Scene, grid: Grid) -> TrajectoryProblem:
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    return TrajectoryProblem(ld, State(UR5_START), State(UR5_GOAL))
+
+
+def reach_problem(scene: Scene, grid: Grid) -> TrajectoryProblem:
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    return TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
+
+
+@pytest.fixture(scope="module")
+def reach_reference(arm_scene: Scene) -> Solution:
+    return solve(reach_problem(arm_scene, Grid.uniform(1.0, 24, galerkin(6))))
+
+
+@pytest.fixture(scope="module")
+def ur5_scene() -> Scene:
+    return Scene(load_robot("ur5"), effects=[Gravity()])
+
+
+@pytest.fixture(scope="module")
+def ur5_reference(ur5_scene: Scene) -> Solution:
+    return solve(ur5_problem(ur5_scene, Grid.uniform(1.5, 32, galerkin(6))))
+
+
+def true_error(solution: Solution, reference: Solution) -> MotionError:
+    costs = solution.cost, reference.cost
+    return deviation(solution.trajectory, reference.trajectory, costs)
+
+
+def assert_close(estimate: MotionError, true: MotionError, factor: float) -> None:
+    assert estimate.cost / factor <= true.cost <= factor * estimate.cost
+    for name in ("angle", "largest_v", "largest_tau", "largest_tip"):
+        one, other = getattr(estimate, name), getattr(true, name)
+        assert one / factor <= other <= factor * one, name
+
+
+# The reference
+
+
+def test_the_reference_solves_pontryagins_equations(
+    arm_scene: Scene, reach_reference: Solution
+) -> None:
+    coarse = solve(reach_problem(arm_scene, Grid.uniform(1.0, 16, galerkin(1)))).trajectory
+    nodes = np.concatenate([coarse.q, coarse.v, coarse.momenta[:, 0], coarse.momenta[:, 1]], 1)
+    ends = HANG, REST, REACH_Q, REACH_V
+    exact = extremal(ends, 1.0, (coarse.t, nodes.T), 1e-9)
+    t = np.linspace(0.0, 1.0, 51)
+    motion, (q, v, _, _) = reach_reference.trajectory.sample(t), exact.at(t)
+    assert reach_reference.cost == pytest.approx(exact.cost, rel=1e-9)
+    np.testing.assert_allclose(motion.q, q, atol=1e-8)
+    np.testing.assert_allclose(motion.v, v, atol=1e-7)
+
+
+# The estimate
+
+
+@pytest.mark.parametrize(("scheme", "intervals"), SCHEMES)
+def test_the_estimate_is_the_error_within_a_factor_of_two(
+    arm_scene: Scene, reach_reference: Solution, scheme: str, intervals: int
+) -> None:
+    grid = Grid.uniform(1.0, intervals, by_name(scheme))
+    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    estimate = estimate_error(solution)
+    assert estimate is not None
+    assert_close(estimate, true_error(solution, reach_reference), 2.0)
+
+
+@pytest.mark.parametrize(("inner_modes", "intervals"), [(1, 16), (2, 12), (2, 24), (4, 12)])
+def test_the_estimate_is_the_error_of_six_joints(
+    ur5_scene: Scene, ur5_reference: Solution, inner_modes: int, intervals: int
+) -> None:
+    grid = Grid.uniform(1.5, intervals, galerkin(inner_modes))
+    solution = solve(ur5_problem(ur5_scene, grid), ur5_reference.trajectory)
+    estimate = estimate_error(solution)
+    assert estimate is not None
+    assert_close(estimate, true_error(solution, ur5_reference), 2.0)
+
+
+def test_one_more_mode_would_not_do(ur5_scene: Scene, ur5_reference: Solution) -> None:
+    # the costs of one and of two inner modes are off by the same: their difference says nothing
+    costs = [
+        solve(
+            ur5_problem(ur5_scene, Grid.uniform(1.5, 16, galerkin(r))), ur5_reference.trajectory
+        ).cost
+        for r in (1, 2)
+    ]
+    error = relative_difference(costs[0], ur5_reference.cost)
+    assert relative_difference(*costs) < 0.05 * error
+
+
+def test_unequal_intervals_of_unequal_degree_are_estimated_too(
+    arm_scene: Scene, reach_reference: Solution
+) -> None:
+    steps = np.array([0.05, 0.1, 0.15, 0.2, 0.1, 0.15, 0.1, 0.05, 0.1])
+    degrees = [1, 2, 3, 2, 4, 1, 2, 3, 2]
+    grid = Grid(steps, tuple(galerkin(r) for r in degrees))
+    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    estimate = estimate_error(solution)
+    assert estimate is not None
+    assert_close(estimate, true_error(solution, reach_reference), 2.0)
+    finer = finer_than(solution)
+    assert finer is not None
+    assert [s.inner_modes for s in finer.problem.grid.schemes] == [r + MORE_MODES for r in degrees]
+
+
+def test_what_the_intervals_contribute_sums_up_to_the_error_of_the_cost(
+    arm_scene: Scene, reach_reference: Solution
+) -> None:
+    grid = Grid.uniform(1.0, 12, galerkin(2))
+    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    finer = finer_than(solution)
+    assert finer is not None
+    assert np.sum(finer.gains) == pytest.approx(solution.cost - reach_reference.cost, rel=0.05)
+
+
+def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:
+    # at rest without gravity nothing has to be done
+    scene = Scene(arm_scene.robot)
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(0)))
+    still = solve(TrajectoryProblem(ld, State(HANG), State(HANG)))
+    estimate = estimate_error(still)
+    assert estimate is not None
+    assert (estimate.cost, estimate.angle, estimate.largest_tau) == (0.0, 0.0, 0.0)
+
+
+# What is measured
+
+
+def test_turning_and_sliding_joints_are_told_apart() -> None:
+    def joint(number: int, kind: str) -> str:
+        mass = '<mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+        return (
+            f'<link name="l{number}"><inertial>{mass}</inertial></link>'
+            f'<joint name="j{number}" type="{kind}"><parent link="l{number - 1}"/>'
+            f'<child link="l{number}"/><axis xyz="0 0 1"/>'
+            '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint>'
+        )
+
+    robot = cart(joint(1, "prismatic") + joint(2, "revolute"))
+    np.testing.assert_array_equal(sliding_coordinates(robot), [True, False])
+
+
+def test_lengths_of_bases_are_told_from_their_angles() -> None:
+    slides = {base: sliding_coordinates(load_robot(with_arm(base))) for base in BASES}
+    assert slides["free-flyer"].tolist() == [True] * 3 + [False] * 5 + [True]
+    assert slides["planar"].tolist() == [True] * 2 + [False] * 3 + [True]
+    assert slides["spherical"].tolist() == [False] * 5 + [True]
+
+
+def cart(body: str) -> Robot:
+    import pinocchio as pin
+
+    text = f'<robot name="cart"><link name="l0"/>{body}</robot>'
+    return load_robot(pin.buildModelFromXML(text))
+
+
+def test_the_distance_of_a_motion_from_itself_is_zero(reach_reference: Solution) -> None:
+    none = true_error(reach_reference, reach_reference)
+    assert none.cost == none.angle == none.slide == none.largest_tip == none.largest_tau == 0.0
+
+
+def test_an_unknown_frame_and_another_duration_are_refused(
+    arm_scene: Scene, reach_reference: Solution
+) -> None:
+    with pytest.raises(InputError, match="has no frame 'tol0'"):
+        estimate_error(reach_reference, frame="tol0")
+    longer = solve(reach_problem(arm_scene, Grid.uniform(2.0, 8, galerkin(2))))
+    with pytest.raises(InputError, match="same duration are compared, not 2 s with 1 s"):
+        true_error(longer, reach_reference)
+
+
+def test_what_is_not_a_minimum_has_no_estimate(reach_reference: Solution) -> None:
+    stopped = dataclasses.replace(reach_reference, success=False)
+    with pytest.raises(InputError, match="errors of minima are estimated"):
+        estimate_error(stopped)
+    unknown = dataclasses.replace(reach_reference, problem=None)
+    with pytest.raises(InputError, match="does not know its problem"):
+        estimate_error(unknown)
+
+
+def test_schemes_with_no_room_for_more_modes_are_refused() -> None:
+    with pytest.raises(InputError, match="up to 38 inner modes, not 40; use more intervals"):
+        finer_grid(Grid.uniform(1.0, 2, galerkin(40)))

@@ -1,0 +1,123 @@
+"""Where grids become finer, and by what."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.planning.refinement.hp_refinement import DECAY, Demand, decay, refined
+from hovi.schemes import galerkin
+from hovi.schemes.polynomials import interval_rows
+
+
+def projected(grid: Grid, singularity: float) -> DiscretePath:
+    """a(t) = 1 / (1 + ((t - 0.5)/singularity)^2) on a grid, as its Legendre coefficients."""
+    x, w = np.polynomial.legendre.leggauss(60)
+    s = (x + 1) / 2
+    t = grid.t[:-1, None] + grid.steps[:, None] * s
+    a = 1 / (1 + ((t - 0.5) / singularity) ** 2)
+    r = grid.inner_modes
+    rows = interval_rows(s, r)
+    inner = np.einsum("kq,qj,q->kj", a, rows[:, 2, 3:], w / 2)
+    z1 = a @ (w / 2)
+    z0 = (a * (1 - s)) @ (w / 2)
+    N = grid.intervals
+    zeros = np.zeros((N + 1, 1))
+    return DiscretePath(zeros, zeros, np.stack([z0, z1], 1)[..., None], inner[..., None])
+
+
+def test_the_decay_is_that_of_the_ellipse_of_analyticity() -> None:
+    # poles at 0.5 +- 0.3 i of one interval [0, 1]: y = 0.6 half lengths beside its middle
+    grid = Grid.uniform(1.0, 1, galerkin(14))
+    y = 0.3 / 0.5
+    assert decay(grid, projected(grid, 0.3))[0] == pytest.approx(np.sqrt(1 + y * y) - y, rel=0.05)
+
+
+def test_intervals_away_from_a_singularity_decay_faster() -> None:
+    grid = Grid.uniform(1.0, 9, galerkin(6))
+    rho = decay(grid, projected(grid, 0.02))
+    assert np.argmax(rho) == 4
+    assert rho[0] < 0.2 < rho[4]
+
+
+def test_a_scheme_without_enough_coefficients_is_not_believed_to_decay() -> None:
+    grid = Grid(np.full(2, 0.5), (galerkin(0), galerkin(4)))
+    path = DiscretePath(np.zeros((3, 1)), np.zeros((3, 1)), np.ones((2, 2, 1)), np.ones((2, 4, 1)))
+    assert decay(grid, path)[0] == DECAY[1]
+
+
+def test_smooth_intervals_get_modes_and_others_are_cut() -> None:
+    grid = Grid.uniform(1.0, 4, galerkin(2))
+    finer = refined(grid, np.array([0.1, 0.1, 0.9, 0.1]), [Demand(np.full(4, 1e-4), 2)])
+    np.testing.assert_allclose(finer.steps[:2], 0.25)
+    assert finer.intervals > 4
+    assert finer.duration == pytest.approx(1.0, rel=1e-14)
+    cut = (finer.t[:-1] >= 0.5 - 1e-12) & (finer.t[:-1] < 0.75 - 1e-12)
+    assert cut.sum() > 1
+    assert finer.inner_modes > 2
+
+
+def test_a_grid_that_meets_its_demands_stays_as_it_is() -> None:
+    grid = Grid(np.array([0.2, 0.3, 0.5]), (galerkin(2), galerkin(4), galerkin(4)))
+    same = refined(grid, np.full(3, 0.3), [Demand(np.full(3, 2.0), 2)])
+    np.testing.assert_array_equal(same.steps, grid.steps)
+    assert all(new.inner_modes >= old.inner_modes for new, old in pairs(same, grid))
+
+
+def test_what_is_foreseen_is_what_was_demanded() -> None:
+    # one interval of decay 0.3 that has to fall by 1e-6 in a quantity of twice the order
+    grid = Grid.uniform(1.0, 1, galerkin(2))
+    finer = refined(grid, np.array([0.3]), [Demand(np.array([1e-6]), 2)])
+    assert finer.intervals == 1
+    more = finer.inner_modes - 2
+    assert 0.3 ** (2 * more) <= 1e-6 * (1 + 1e-9) < 0.3 ** (2 * (more - 2))
+
+
+def test_the_curve_between_the_nodes_needs_more_than_the_nodes() -> None:
+    grid = Grid.uniform(1.0, 1, galerkin(2))
+    curve, nodes = (
+        refined(grid, np.array([0.3]), [Demand(np.array([1e-3]), power)]) for power in (1, 2)
+    )
+    assert curve.inner_modes > nodes.inner_modes
+
+
+def test_what_nothing_cures_is_cut_into_four() -> None:
+    grid = Grid.uniform(1.0, 2, galerkin(2))
+    finer = refined(grid, np.array([0.97, 0.05]), [Demand(np.array([1e-12, 1.0]), 2)])
+    np.testing.assert_allclose(finer.steps, [0.125, 0.125, 0.125, 0.125, 0.5])
+
+
+def pairs(one: Grid, other: Grid):  # type: ignore[no-untyped-def]
+    return zip(one.schemes, other.schemes, strict=True)
+
+
+def test_a_grid_has_one_scheme_or_two() -> None:
+    rng = np.random.default_rng(0)
+    grid = Grid.uniform(1.0, 24, galerkin(2))
+    for joints in (2, 6, 30):
+        demands = [Demand(10 ** rng.uniform(-9, 0, 24), 2)]
+        finer = refined(grid, rng.uniform(0.05, 0.8, 24), demands, joints)
+        assert len(finer.groups) <= 2
+
+
+def test_many_joints_are_worth_a_second_scheme_and_few_are_not() -> None:
+    grid = Grid.uniform(1.0, 64, galerkin(2))
+    factor = np.where(np.arange(64) < 60, 1.0, 1e-7)
+    rho = np.where(np.arange(64) < 60, 0.1, 0.3)
+    groups = [len(refined(grid, rho, [Demand(factor, 2)], n).groups) for n in (1, 20)]
+    assert groups == [1, 2]
+
+
+def test_what_is_left_sums_up_in_the_cost_and_is_the_largest_along_the_curve() -> None:
+    factor = np.array([1e-2, 1e-4])
+    change = np.array([0.1, 0.1])
+    assert Demand(factor, 2).left(change) == pytest.approx((1e-2 / 1e-2 + 1e-2 / 1e-4) / 2)
+    assert Demand(factor, 1).left(change) == pytest.approx(0.1 / 1e-4)
+
+
+def test_an_interval_that_nothing_helps_is_cut_into_four() -> None:
+    grid = Grid.uniform(1.0, 3, galerkin(2))
+    demand = Demand(np.array([1.0, 1e-12, 1.0]), 2)
+    finer = refined(grid, np.array([0.1, 0.97, 0.1]), [demand])
+    np.testing.assert_allclose(finer.steps, [1 / 3, *[1 / 12] * 4, 1 / 3])

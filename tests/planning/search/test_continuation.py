@@ -1,0 +1,149 @@
+"""The ladder: minima that the direct way does not find, and budgets that are kept."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.state import State
+from hovi.effects import Gravity
+from hovi.planning.problem.limits import as_limits, no_limits
+from hovi.planning.search.continuation import climb, may_help
+from hovi.planning.search.multistart import Job
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
+from samples.paper_arm import HANG, REACH_Q
+from samples.uneven_chain import uneven_chain
+
+STEPS = 300
+"""Too few for the direct way to a light hand, which takes some 500, and enough for every rung."""
+
+
+@pytest.fixture(scope="module")
+def light_hand(tmp_path_factory: pytest.TempPathFactory) -> Scene:
+    """Two rods of which the second has a millionth of the first one's mass."""
+    path = tmp_path_factory.mktemp("chain") / "chain.urdf"
+    return Scene(uneven_chain([1.0, 1e-6], path), [Gravity(9.8)])
+
+
+@pytest.fixture(scope="module")
+def job(light_hand: Scene) -> Job:
+    grid, limits = Grid.uniform(3.0, 16, galerkin(2)), no_limits(light_hand.robot)
+    return Job(light_hand, (1.0, 1.0), grid, State(HANG), State(-HANG), STEPS, limits)
+
+
+@pytest.fixture(scope="module")
+def failed(job: Job) -> Solution:
+    return solve(job.problem(), max_iterations=STEPS)
+
+
+def test_masses_of_a_million_to_one_are_reached_over_heavier_rotors(
+    light_hand: Scene, failed: Solution
+) -> None:
+    assert failed.status is Status.ITERATION_LIMIT
+    found = plan(light_hand, HANG, -HANG, 3.0, limits="none", max_iterations=STEPS)
+    assert found.status is Status.MINIMUM
+    assert found.n_neg == 0
+    assert found.minima == (found.cost,)
+    assert "The direct way ended in iteration_limit; continuation in inertia led" in found.message
+    assert found.problem is not None
+    assert not found.problem.scene.model.armature.any()
+    again = solve(found.problem, found.trajectory)
+    assert again.nit <= 2
+    assert again.cost == pytest.approx(found.cost, rel=1e-9)
+    assert again.n_neg == 0
+
+
+def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Solution) -> None:
+    found = plan(
+        light_hand, HANG, -HANG, 3.0, limits="none", continuation=False, max_iterations=STEPS
+    )
+    assert (found.status, found.cost, found.message) == (
+        failed.status,
+        failed.cost,
+        failed.message,
+    )
+
+
+def test_a_valley_of_positive_curvature_is_followed_on(arm_scene: Scene) -> None:
+    stopped = plan(
+        arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5, continuation=False
+    )
+    assert stopped.status is Status.ITERATION_LIMIT
+    assert stopped.n_neg == 0
+    found = plan(arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5)
+    assert found.status is Status.MINIMUM
+    assert "continuation in steps led here over 1 rung and" in found.message
+
+
+def test_every_rung_is_told_in_rising_shares(job: Job, failed: Solution) -> None:
+    told: list[tuple[str, float]] = []
+    found = climb(job, failed, progress=lambda text, share: told.append((text, share)))
+    assert found.success
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert 0 <= shares[0] <= shares[-1] <= 1
+    assert "continuation in inertia: rotors of" in told[0][0]
+    assert told[-1][0].endswith("the task itself")
+
+
+def test_a_deadline_ends_the_climb_with_the_best_so_far(job: Job, failed: Solution) -> None:
+    late = climb(job, failed, deadline=time.monotonic())
+    assert (late.success, late.status) == (False, Status.TIME_LIMIT)
+    assert late.cost == failed.cost
+    assert "Continuation in inertia was ended by time_limit" in late.message
+
+
+@pytest.mark.parametrize("where", ["within a rung", "between two"])
+def test_an_interrupt_ends_the_climb_with_the_best_so_far(
+    job: Job, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    value, calls = ActionObjective.value, 0
+
+    def interrupted(self: ActionObjective, x: DiscretePath) -> float:
+        nonlocal calls
+        calls += 1
+        if calls == 30:
+            raise KeyboardInterrupt
+        return value(self, x)
+
+    def interrupt(text: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ActionObjective, "value", interrupted)
+    found = climb(job, failed, progress=interrupt if where == "between two" else None)
+    assert (found.success, found.status) == (False, Status.INTERRUPTED)
+    assert found.cost == failed.cost
+    assert "was ended by interrupted" in found.message
+    assert calls <= 31
+
+
+def test_a_climb_that_leads_nowhere_names_the_ways(job: Job) -> None:
+    hurried = dataclasses.replace(job, max_iterations=2)
+    failed = solve(hurried.problem(), max_iterations=2)
+    found = climb(hurried, failed)
+    assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
+    assert found.cost <= failed.cost
+    assert found.nit == 2
+    ways = "inertia, the intervals, gravity, the duration, steps"
+    assert f"Continuation in {ways} found no minimum" in found.message
+
+
+def test_what_no_step_can_change_is_not_climbed_for(arm_scene: Scene) -> None:
+    limits = as_limits(arm_scene.robot, {"base": "none", "v": 0.1})
+    grid = Grid.uniform(1.0, 8, galerkin(2))
+    job = Job(arm_scene, (1.0, 1.0), grid, State(HANG), State(-HANG), 50, limits)
+    contradiction = solve(job.problem())
+    assert contradiction.status is Status.INFEASIBLE
+    assert not may_help(contradiction)
+    found = plan(arm_scene, HANG, -HANG, 1.0, limits=limits)
+    assert "ontinuation" not in found.message
+    assert np.isfinite(found.cost)

@@ -1,0 +1,173 @@
+"""The best duration and a tolerance at once: both hold, and the estimate is of what is returned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.motion_error import deviation
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Accuracy, Tolerance
+from hovi.planning.refinement.adaptive import refine_to_tolerance
+from hovi.planning.search.free_duration import FreeDuration, SolveFor
+from hovi.planning.search.free_to_tolerance import free_to_tolerance
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
+from hovi.robot.bundled_models import example
+from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
+from samples.paper_arm import HANG, REACH_Q, REACH_V
+
+BOUNDS = 0.5, 6.0
+WEIGHT = 50.0
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return load_task(example("ur5_reach.toml"))
+
+
+@pytest.fixture(scope="module")
+def reference(task: Task) -> Solution:
+    return freed(task, scheme="galerkin-6", intervals=48)
+
+
+def freed(task: Task, **options: object) -> Solution:
+    fixed = {"time_weight": WEIGHT, "limits": "none", "processes": 1}
+    return plan(task.scene, task.start, task.goal, BOUNDS, **(fixed | options))  # type: ignore[arg-type]
+
+
+def accuracy_of(solution: Solution) -> Accuracy:
+    assert solution.accuracy is not None
+    return solution.accuracy
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-8])
+def test_cost_and_duration_are_those_of_the_limit(
+    task: Task, reference: Solution, tolerance: float
+) -> None:
+    found = freed(task, tolerance=tolerance)
+    accuracy, T = accuracy_of(found), found.trajectory.duration
+    assert found.success
+    assert accuracy.reached
+    motion = reference.cost - WEIGHT * reference.trajectory.duration
+    true = abs(found.cost - reference.cost) / motion
+    assert true <= tolerance
+    assert accuracy.error / 10 <= true <= 10 * accuracy.error
+    # the cost is flat along the duration
+    assert reference.trajectory.duration == pytest.approx(T, rel=np.sqrt(accuracy.error))
+    assert found.minima == (found.cost,)
+
+
+def test_the_slope_of_the_cost_vanishes_on_the_final_grid(task: Task) -> None:
+    found = freed(task, tolerance=1e-7)
+    assert found.duration_derivative == pytest.approx(-WEIGHT, rel=1e-8)
+    assert found.problem is not None
+    assert found.problem.grid is found.trajectory.grid
+    motion = found.problem.ld.action(found.trajectory.path)
+    assert found.cost == pytest.approx(motion + WEIGHT * found.trajectory.duration, rel=1e-13)
+    assert "The best duration is" in found.message
+    assert "estimated error" in found.message
+
+
+def test_a_tip_is_where_it_should_be_in_the_duration_that_is_told(task: Task) -> None:
+    found = freed(task, tolerance="0.01 mm")
+    T = found.trajectory.duration
+    ends = task.scene, task.start, task.goal, T
+    fine = {"scheme": "galerkin-6", "intervals": 48, "guess": found.trajectory}
+    exact = plan(*ends, limits="none", processes=1, **fine)  # type: ignore[arg-type]
+    assert found.problem is not None
+    costs = found.problem.ld.action(found.trajectory.path), exact.cost
+    error = deviation(found.trajectory, exact.trajectory, costs)
+    assert accuracy_of(found).reached
+    assert error.largest_tip <= 1e-5
+    assert accuracy_of(found).error / 10 <= error.largest_tip <= 10 * accuracy_of(found).error
+
+
+def test_a_duration_at_its_bound_is_kept(arm_scene: Scene) -> None:
+    goal = State(REACH_Q, REACH_V)
+    options = {"limits": "none", "time_weight": 1e4, "tolerance": 1e-6, "processes": 1}
+    found = plan(arm_scene, HANG, goal, (0.8, 1.6), **options)  # type: ignore[arg-type]
+    assert found.trajectory.duration == pytest.approx(0.8, rel=1e-14)
+    assert accuracy_of(found).reached
+    assert "kept at its bound" in found.message
+    fixed = plan(arm_scene, HANG, goal, 0.8, limits="none", tolerance=1e-9)
+    assert found.cost - 1e4 * 0.8 == pytest.approx(fixed.cost, rel=1e-6)
+
+
+def test_nothing_is_claimed_where_no_minimum_was_found(arm_scene: Scene) -> None:
+    options = {"limits": "none", "max_iterations": 2, "continuation": False, "tolerance": 1e-6}
+    found = plan(arm_scene, HANG, -HANG, (2.0, 4.0), processes=1, **options)  # type: ignore[arg-type]
+    assert found.status is Status.ITERATION_LIMIT
+    assert found.accuracy is None
+    assert found.error_estimate is None
+
+
+def in_vain(solution: Solution) -> Solution:
+    """Refining that is out of time when it begins."""
+    return refine_to_tolerance(solution, Tolerance(1e-14), time_limit=0.0)
+
+
+@pytest.mark.parametrize(
+    ("later_steps", "later_refine", "reason"),
+    [
+        (0, None, "as the finer one gave none (iteration_limit): "),
+        (None, None, "as the finer one gave none (interrupted): "),
+        (500, in_vain, "as the finer one gave none (the tolerance was not reached again): "),
+    ],
+)
+def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
+    task: Task,
+    later_steps: int | None,
+    later_refine: Callable[[Solution], Solution] | None,
+    reason: str,
+) -> None:
+    coarse = Grid.uniform(task.duration, 12, galerkin(2))
+    refine = partial(refine_to_tolerance, tolerance=Tolerance(1e-7))
+    refined: list[Solution] = []
+
+    def on_grid(grid: Grid) -> SolveFor:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
+            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), stretched)
+            problem = TrajectoryProblem(ld, task.start, task.goal)
+            if refined and later_steps is None:
+                raise KeyboardInterrupt
+            most = later_steps if refined and later_steps is not None else 500
+            return solve(problem, guess, max_iterations=most)
+
+        return solve_for
+
+    def each_refine(solution: Solution) -> Solution:
+        refined.append((refine if not refined or later_refine is None else later_refine)(solution))
+        return refined[-1]
+
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), coarse)
+    first = solve(TrajectoryProblem(ld, task.start, task.goal))
+    found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
+    assert accuracy_of(refined[0]).reached
+    assert found.success == (later_steps is not None)
+    assert found.status is (Status.MINIMUM if found.success else Status.INTERRUPTED)
+    assert found.trajectory is refined[0].trajectory
+    assert accuracy_of(found).reached
+    assert reason in found.message
+
+
+def test_limits_hold_in_the_best_duration(arm_scene: Scene) -> None:
+    options = {"limits": {"base": "none", "v": 4.0}, "tolerance": 1e-3, "processes": 1}
+    goal = State(REACH_Q)
+    found = plan(arm_scene, HANG, goal, (0.5, 3.0), time_weight=200.0, **options)  # type: ignore[arg-type]
+    assert found.success
+    assert accuracy_of(found).reached
+    t = np.linspace(0.0, found.trajectory.duration, 1001)
+    assert np.abs(found.trajectory.sample(t).v).max() <= 4.0 * (1 + 1e-5)

@@ -1,0 +1,117 @@
+"""Easier versions of a job: what they change, against Pinocchio and the laws of mechanics."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.effects import Gravity
+from hovi.planning.problem.limits import as_limits, no_limits
+from hovi.planning.search.easing import HeavierRotors, WeakerGravity
+from hovi.planning.search.homotopies import (
+    finer_grids,
+    growing_gravity,
+    lighter_rotors,
+    narrowing_limits,
+    other_durations,
+)
+from hovi.planning.search.multistart import Job
+from hovi.planning.solver.solver import solve
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name, galerkin
+from samples.paper_arm import HANG, REACH_Q, REACH_V
+
+POINTS = np.random.default_rng(0).normal(size=(3, 5, 2))
+
+
+@pytest.fixture(scope="module")
+def job(arm_scene: Scene) -> Job:
+    grid = Grid.uniform(1.0, 50, by_name("taylor-midpoint"))
+    limits = no_limits(arm_scene.robot)
+    return Job(arm_scene, (1.0, 1.0), grid, State(HANG), State(REACH_Q, REACH_V), 200, limits)
+
+
+@pytest.fixture(scope="module")
+def limited(job: Job) -> Job:
+    limits = as_limits(job.scene.robot, {"base": "none", "v": 5.0, "tau": 20.0})
+    return dataclasses.replace(job, limits=limits)
+
+
+def test_heavier_rotors_add_the_same_inertia_to_every_joint(arm_scene: Scene) -> None:
+    eased = Scene(arm_scene.robot, [*arm_scene.effects, HeavierRotors(0.7)])
+    q, v, a = POINTS
+    more = eased.inverse_dynamics(q, v, a) - arm_scene.inverse_dynamics(q, v, a)
+    np.testing.assert_allclose(more, 0.7 * a, rtol=0, atol=1e-13)
+
+
+def test_weaker_gravity_is_a_share_of_gravity(two_link: Robot) -> None:
+    eased = Scene(two_link, [Gravity(9.8), WeakerGravity(0.25)])
+    model = two_link.model.copy()
+    model.gravity.linear = np.array([0, 0, -9.8 / 4])
+    expected = [pin.rnea(model, model.createData(), *point) for point in zip(*POINTS, strict=True)]
+    np.testing.assert_allclose(eased.inverse_dynamics(*POINTS), expected, rtol=0, atol=1e-13)
+
+
+def test_rotors_fall_from_more_than_every_link_to_less_than_any(job: Job, limited: Job) -> None:
+    q = np.array(job.start.q)
+    M = pin.crba(job.scene.model, job.scene.model.createData(), q)
+    M = np.triu(M) + np.triu(M, 1).T
+    rotors = [rung.job.scene.model.armature for rung in lighter_rotors(job)]
+    assert np.ptp(rotors, axis=1).max() == 0
+    sizes = np.array(rotors)[:, 0]
+    assert sizes[0] == pytest.approx(10 * M.diagonal().max())
+    assert 0.1 * np.linalg.eigvalsh(M)[0] < sizes[-1] <= np.linalg.eigvalsh(M)[0]
+    np.testing.assert_allclose(sizes[:-1] / sizes[1:], 10.0)
+    first = lighter_rotors(limited)[0].job.limits
+    assert not first.bounded[3].any()
+    np.testing.assert_array_equal(first.upper[:3], limited.limits.upper[:3])
+
+
+def test_gravity_grows_from_nothing_where_there_is_some(job: Job) -> None:
+    pulls = [-rung.job.scene.model.gravity.linear[2] for rung in growing_gravity(job)]
+    np.testing.assert_allclose(pulls, 9.8 * np.array([0, 0.25, 0.5, 0.75]))
+    floating = dataclasses.replace(job, scene=Scene(job.scene.robot))
+    assert growing_gravity(floating) == []
+
+
+def test_intervals_are_doubled_up_to_those_of_the_job(job: Job) -> None:
+    grids = [rung.job.grid for rung in finer_grids(job)]
+    assert [grid.intervals for grid in grids] == [7, 13, 25]
+    assert {scheme.name for grid in grids for scheme in grid.schemes} == {"galerkin-2"}
+    assert all(grid.duration == pytest.approx(1.0) for grid in grids)
+    few = dataclasses.replace(job, grid=Grid.uniform(1.0, 8, galerkin(2)))
+    assert finer_grids(few) == []
+
+
+def test_another_duration_without_gravity_is_the_same_motion(job: Job) -> None:
+    # tau scales like 1/T^2, so that the cost scales like 1/T^3
+    grid = Grid.uniform(1.0, 8, galerkin(2))
+    floating = dataclasses.replace(job, scene=Scene(job.scene.robot), grid=grid)
+    whole = solve(floating.problem())
+    for rung, share in zip(other_durations(floating), (0.125, 0.25, 0.5), strict=True):
+        other = solve(rung.job.problem(), whole.trajectory)
+        assert other.cost == pytest.approx(whole.cost / share**3, rel=1e-9)
+        np.testing.assert_allclose(other.trajectory.q, whole.trajectory.q, atol=1e-7)
+
+
+def test_durations_are_shorter_for_effort_alone_and_longer_within_limits(
+    job: Job, limited: Job
+) -> None:
+    assert [rung.job.grid.duration for rung in other_durations(job)] == [0.125, 0.25, 0.5]
+    longer = [rung.job.grid.duration for rung in other_durations(limited)]
+    np.testing.assert_allclose(longer, [2, 1.5, 1.25, 1.1])
+
+
+def test_limits_narrow_about_their_middle(job: Job, limited: Job) -> None:
+    assert narrowing_limits(job) == []
+    rungs = narrowing_limits(limited)
+    shares = np.array([8, 4, 2, 1.5, 1.25, 1.1])
+    np.testing.assert_allclose([rung.job.limits.upper[1, 0] for rung in rungs], 5 * shares)
+    np.testing.assert_allclose([rung.job.limits.lower[3, 1] for rung in rungs], -20 * shares)
+    assert all(np.array_equal(r.job.limits.bounded, limited.limits.bounded) for r in rungs)

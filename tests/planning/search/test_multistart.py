@@ -1,0 +1,225 @@
+"""Many starts: distinct minima, the same from any number of processes, whatever ends the search."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+import numpy as np
+import pytest
+
+from hovi.discrete.grid import Grid
+from hovi.discrete.guess import cubic, path_on_grid, with_bump
+from hovi.discrete.state import State
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.search.multistart import (
+    SAME_COST,
+    Job,
+    Pool,
+    default_processes,
+    distinct,
+    explore,
+)
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.status import Status
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name
+from samples.paper_arm import HANG
+
+
+@pytest.fixture(scope="module")
+def job(arm_scene: Scene) -> Job:
+    """A swing-up in three seconds: it has many minima."""
+    grid = Grid.uniform(3.0, 12, by_name("galerkin-1"))
+    ends = State(HANG), State(-HANG)
+    return Job(arm_scene, (1.0, 1.0), grid, *ends, 500, no_limits(arm_scene.robot))
+
+
+@pytest.fixture(scope="module")
+def guesses(job: Job) -> list:
+    problem = job.problem()
+    base = cubic(problem.robot, problem.boundary, 3.0)
+    curves = [base, *(with_bump(base, problem.robot, 3.0, seed) for seed in range(6))]
+    return [path_on_grid(c, job.grid, problem.boundary, problem.robot) for c in curves]
+
+
+def silent(text: str, fraction: float) -> None:
+    pass
+
+
+def search(
+    job: Job, guesses: list, starts: int, seed: int = 0, processes: int = 1
+) -> list[Solution]:
+    found = explore(Pool(job, processes), guesses[0], starts, seed, silent)
+    assert found.done == starts
+    assert not found.interrupted
+    return found.minima
+
+
+# The pool
+
+
+def test_a_job_is_the_problem_it_describes(job: Job, arm_scene: Scene) -> None:
+    weighted = dataclasses.replace(job, weight=(1.0, 5.0)).problem()
+    assert weighted.scene is arm_scene
+    assert weighted.grid is job.grid
+    np.testing.assert_array_equal(weighted.ld.lagrangian.weight, [1.0, 5.0])  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(weighted.boundary[2], -HANG)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_solutions_come_in_the_order_of_the_guesses(
+    job: Job, guesses: list, processes: int
+) -> None:
+    problem = job.problem()
+    found = Pool(job, processes).solve_all(guesses)
+    assert len(found) == len(guesses)
+    for guess, solution in zip(guesses, found, strict=True):
+        alone = solve(problem, guess)
+        assert solution.cost == alone.cost
+        assert solution.status == alone.status
+        assert solution.trajectory.q.tobytes() == alone.trajectory.q.tobytes()
+
+
+def test_no_guess_is_no_solution(job: Job) -> None:
+    assert Pool(job, 2).solve_all([]) == []
+
+
+def test_a_pool_past_its_deadline_gives_every_guess_back(job: Job, guesses: list) -> None:
+    found = Pool(job, 1, time.monotonic() - 1.0).solve_all(guesses)
+    assert [solution.status for solution in found] == [Status.TIME_LIMIT] * len(guesses)
+    for guess, solution in zip(guesses, found, strict=True):
+        np.testing.assert_array_equal(solution.trajectory.q, guess.q)
+
+
+def test_there_is_a_processor(job: Job) -> None:
+    assert default_processes() >= 1
+
+
+# Distinct minima
+
+
+def fake(solution: Solution, cost: float, status: Status = Status.MINIMUM) -> Solution:
+    return dataclasses.replace(solution, cost=cost, status=status, success=status is Status.MINIMUM)
+
+
+@pytest.fixture(scope="module")
+def any_solution(job: Job, guesses: list) -> Solution:
+    return solve(job.problem(), guesses[0])
+
+
+def test_minima_are_sorted_and_equal_ones_count_once(any_solution: Solution) -> None:
+    near = 1.0 + 0.1 * SAME_COST
+    costs = [3.0, 1.0, 2.0, near, 1.0, 3.0]
+    found = distinct([fake(any_solution, cost) for cost in costs])
+    assert [solution.cost for solution in found] == [1.0, 2.0, 3.0]
+
+
+def test_only_minima_count_where_there_is_one(any_solution: Solution) -> None:
+    others = [Status.SADDLE, Status.TIME_LIMIT, Status.DIVERGED, Status.ITERATION_LIMIT]
+    solutions = [fake(any_solution, 0.1, status) for status in others]
+    found = distinct([*solutions, fake(any_solution, 5.0)])
+    assert [solution.cost for solution in found] == [5.0]
+
+
+def test_without_a_minimum_the_best_of_the_rest_is_kept(any_solution: Solution) -> None:
+    diverged = fake(any_solution, np.nan, Status.DIVERGED)
+    rest = [fake(any_solution, cost, Status.TIME_LIMIT) for cost in (3.0, 2.0)]
+    assert [s.cost for s in distinct([diverged, *rest])] == [2.0]
+    assert distinct([diverged]) == [diverged]
+
+
+# The search
+
+
+def test_one_start_is_the_guess(job: Job, guesses: list) -> None:
+    (only,) = search(job, guesses, 1)
+    assert only.cost == solve(job.problem(), guesses[0]).cost
+
+
+def test_minima_of_a_search_are_minima_by_ascending_cost(job: Job, guesses: list) -> None:
+    minima = search(job, guesses, 20)
+    costs = [solution.cost for solution in minima]
+    assert len(costs) >= 3
+    assert costs == sorted(costs)
+    assert (np.diff(costs) > SAME_COST * np.array(costs[:-1])).all()
+    for solution in minima:
+        assert solution.status is Status.MINIMUM
+        assert solution.n_neg == 0
+        again = solve(job.problem(), solution.trajectory.path)
+        assert again.cost == pytest.approx(solution.cost, rel=1e-12)
+    assert any(cost == pytest.approx(solve(job.problem(), guesses[0]).cost) for cost in costs)
+
+
+def test_more_starts_are_never_worse(job: Job, guesses: list) -> None:
+    best = [search(job, guesses, starts)[0].cost for starts in (1, 5, 17, 24)]
+    assert best == sorted(best, reverse=True)
+
+
+def test_a_seed_is_a_search(job: Job, guesses: list) -> None:
+    one, again, other = (
+        [solution.cost for solution in search(job, guesses, 12, seed)] for seed in (3, 3, 4)
+    )
+    assert one == again
+    assert one != other
+
+
+def test_the_number_of_processes_changes_nothing(job: Job, guesses: list) -> None:
+    alone, shared = (search(job, guesses, 19, processes=count) for count in (1, 2))
+    assert len(alone) == len(shared)
+    for one, other in zip(alone, shared, strict=True):
+        assert one.cost == other.cost
+        for name in ("q", "v", "z", "inner"):
+            arrays = (getattr(solution.trajectory.path, name) for solution in (one, other))
+            assert len({array.tobytes() for array in arrays}) == 1
+
+
+def test_progress_rises_to_one(job: Job, guesses: list) -> None:
+    told: list[tuple[str, float]] = []
+    explore(Pool(job, 1), guesses[0], 20, 0, lambda text, share: told.append((text, share)))
+    shares = [share for _, share in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert "20 of 20 starts" in told[-1][0]
+
+
+# Ends before the last start
+
+
+def test_a_deadline_ends_the_search_with_what_was_found(job: Job, guesses: list) -> None:
+    late = Pool(job, 1, time.monotonic() - 1.0)
+    found = explore(late, guesses[0], 1000, 0, silent)
+    assert found.done == 1
+    assert not found.interrupted
+    assert [solution.status for solution in found.minima] == [Status.TIME_LIMIT]
+
+
+def test_an_interrupt_between_rounds_keeps_what_was_found(job: Job, guesses: list) -> None:
+    def interrupt(text: str, fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    found = explore(Pool(job, 1), guesses[0], 1000, 0, interrupt)
+    assert found.interrupted
+    assert 1 < found.done < 1000
+    assert found.minima[0].success
+
+
+def test_an_interrupt_within_a_solve_ends_the_search(
+    job: Job, guesses: list, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    value, calls = ActionObjective.value, 0
+
+    def interrupted_once(self: ActionObjective, x: object) -> float:
+        nonlocal calls
+        calls += 1
+        if calls == 100:
+            raise KeyboardInterrupt
+        return value(self, x)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ActionObjective, "value", interrupted_once)
+    found = explore(Pool(job, 1), guesses[0], 1000, 0, silent)
+    assert found.interrupted
+    assert 1 < found.done < 100
+    assert calls < 110
+    assert found.minima[0].success

@@ -1,0 +1,212 @@
+"""Motions under hard limits, against Ipopt, dense sampling and what cannot be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.trust_region import Options, Stop
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.solver import guess_path, solve
+from hovi.planning.solver.status import Status
+from hovi.schemes import galerkin
+from oracles.ipopt_oracle import least_action
+
+UR5 = {"v": 3.14, "tau": [150.0, 150.0, 150.0, 28.0, 28.0, 28.0]}
+PANDA = {"v": [2.175] * 4 + [2.61] * 3, "tau": [87.0] * 4 + [12.0] * 3}
+
+
+def reach(models: Path, name: str, limits: dict[str, object]) -> TrajectoryProblem:
+    """A shipped reach on 16 intervals with two inner modes, under limits."""
+    task = hovi.load_task(models / f"{name}.toml")
+    grid = Grid.uniform(task.duration, 16, galerkin(2))
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    return TrajectoryProblem(ld, task.start, task.goal, as_limits(task.scene.robot, limits))
+
+
+def largest_excess(trajectory: Trajectory, limits: Limits, samples: int = 10_000) -> float:
+    """By which share of its range a limit is exceeded, both sides of every node included."""
+    N = trajectory.grid.intervals
+    s = np.linspace(0.0, 1.0, max(samples // N, 2))
+    k = np.repeat(np.arange(N), len(s))
+    outputs = np.stack(trajectory.sample_intervals(k, np.tile(s, N)), axis=1)
+    return float(limits.excess(outputs).max())
+
+
+@pytest.mark.parametrize(
+    ("name", "limits", "known", "most_steps"),
+    [("ur5_reach", UR5, 694.1903, 42), ("panda_reach", PANDA, 343.08, 72)],
+)
+def test_at_the_points_the_least_cost_is_that_of_ipopt(
+    models: Path, name: str, limits: dict[str, object], known: float, most_steps: int
+) -> None:
+    problem = reach(models, name, limits)
+    assert problem.limits is not None
+    objective = LimitedAction(problem, problem.limits)
+    outcome = minimize_bounded(objective, guess_path(problem, "cubic"), Options())
+    assert outcome.stop is Stop.STATIONARY
+    assert outcome.feasible
+    assert outcome.iterations <= most_steps
+    assert outcome.outputs.value <= known * (1 + 1e-7)
+    cost, _ = least_action(problem, outcome.x, move=0.0)
+    assert outcome.outputs.value == pytest.approx(cost, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ur5_reach_limited",
+        "two_link_elbow_limited",
+        pytest.param("panda_reach_limited", marks=pytest.mark.long),
+    ],
+)
+def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
+    task = hovi.load_task(models / f"{name}.toml")
+    solution = plan(
+        task.scene,
+        task.start,
+        task.goal,
+        task.duration,
+        scheme=task.scheme,
+        intervals=task.intervals,
+        limits=task.limits,
+    )
+    assert solution.status is Status.MINIMUM, solution.message
+    assert solution.n_neg == 0
+    limits = as_limits(task.scene.robot, task.limits)
+    assert largest_excess(solution.trajectory, limits) <= limits.tolerance
+
+
+def test_limits_that_nothing_reaches_change_nothing(models: Path) -> None:
+    free = solve(reach(models, "two_link_reach", {"base": "none"}))
+    wide = solve(reach(models, "two_link_reach", {"base": "none", "q": 50.0, "tau": 1e4}))
+    assert wide.cost == pytest.approx(free.cost, rel=1e-9)
+    np.testing.assert_allclose(wide.trajectory.q, free.trajectory.q, atol=1e-6)
+
+
+def test_limits_that_bind_cost_something_and_are_reached(models: Path) -> None:
+    free = solve(reach(models, "two_link_reach", {"base": "none"}))
+    limits = {"base": "none", "v": [3.0, 6.0]}
+    bound = solve(reach(models, "two_link_reach", limits))
+    assert bound.success
+    assert bound.cost > 1.1 * free.cost
+    assert np.abs(bound.trajectory.v).max(axis=0) == pytest.approx([3.0, 6.0], rel=2e-2)
+
+
+def test_a_hard_range_is_the_limit_of_a_steeper_potential(models: Path) -> None:
+    """With the hard range, then, from that motion, with the paper's potential instead."""
+    task = hovi.load_task(models / "two_link_elbow.toml")
+    grid = Grid.uniform(task.duration, 200, hovi.schemes.by_name("taylor-midpoint"))
+    robot, ends = task.scene.robot, (task.start, task.goal)
+    upper = np.radians(170.0)
+    hard = as_limits(robot, {"base": "none", "q": {"elbow": [0.0, upper]}})
+    gravity = hovi.effects.Gravity(9.8)
+
+    def planned(effects: list[object], limits: Limits | None, guess: Trajectory | str) -> float:
+        scene = hovi.Scene(robot, effects)
+        ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
+        solution = solve(TrajectoryProblem(ld, *ends, limits), guess)
+        assert solution.success, solution.message
+        found.append(solution.trajectory)
+        return solution.cost
+
+    found: list[Trajectory] = []
+    soft = hovi.effects.JointLimitPotential({"elbow": (0.0, upper)}, 1000.0, 1e-3)
+    with_range = planned([gravity], hard, "cubic")
+    with_potential = planned([gravity, soft], None, found[0])
+    assert with_range == pytest.approx(with_potential, rel=5e-3)
+    assert np.abs(found[0].q - found[1].q).max() < 0.03
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "duration", "limits", "words"),
+    [
+        ([0.0, 3.0], [0.0, 0.0], 2.0, {"q": {"elbow": [0.0, 2.0]}}, ("start", "elbow", "3 rad")),
+        ([0.0, 0.0], [0.0, 3.0], 2.0, {"q": {"elbow": [0.0, 2.0]}}, ("goal", "elbow", "3 rad")),
+        ([0.0, 0.0], [2.0, 0.0], 0.5, {"v": 3.0}, ("shoulder", "3 rad/s", "0.5 s")),
+        (
+            [0.0, 0.0],
+            [0.0, 0.0],
+            2.0,
+            {"tau": 2.0, "q": [[-0.05, 0.05], [-0.05, 0.05]]},
+            ("torque", "shoulder", "7.656 N m"),
+        ),
+    ],
+)
+def test_what_cannot_be_is_infeasible_for_the_right_reason(
+    arm_scene: hovi.Scene,
+    start: list[float],
+    goal: list[float],
+    duration: float,
+    limits: dict[str, object],
+    words: tuple[str, ...],
+) -> None:
+    """Held horizontal within 0.05 rad the arm needs 7.656 N m at the shoulder."""
+    solution = plan(arm_scene, start, goal, duration, limits={"base": "none", **limits})
+    assert solution.status is Status.INFEASIBLE
+    assert not solution.success
+    for word in words:
+        assert word in solution.message
+
+
+@pytest.mark.parametrize("intervals", [16, 24, 32, 48])
+def test_a_way_around_a_weak_motor_is_found_on_every_grid(
+    arm_scene: hovi.Scene, intervals: int
+) -> None:
+    """With 2 N m the arm cannot hold the pose, but falls, swings and comes back."""
+    limits = {"base": "none", "tau": 2.0}
+    solution = plan(arm_scene, [0.0, 0.0], [0.0, 0.0], 5.0, intervals=intervals, limits=limits)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(arm_scene.robot, limits)) <= 1e-6
+
+
+def test_budgets_have_their_own_statuses(models: Path) -> None:
+    problem = reach(models, "ur5_reach", UR5)
+    assert solve(problem, max_iterations=3).status is Status.ITERATION_LIMIT
+    assert solve(problem, time_limit=1e-4).status is Status.TIME_LIMIT
+
+
+def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
+    """The last joint of a Z1 weighs so little that it would start and stop within milliseconds."""
+    robot = hovi.load_robot("z1", locked=["jointGripper"])
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    start = State([1.0, 1.5, -1.5, 0.5, -0.5, 2.0])
+    solution = plan(scene, start, [-1.0, 0.5, -0.5, -0.5, 0.5, -2.0], 3.0)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
+
+
+@pytest.mark.parametrize("intervals", [16, 32])
+def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: int) -> None:
+    """The straight way asks for 1.22 times the shoulder's torque, held still."""
+    robot = hovi.load_robot("talos_arm", locked=["gripper_left_joint"])
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    start = [0.499, 0.422, -0.098, 1.096, 1.342, 0.104]
+    goal = [2.832, 1.647, -0.522, 1.966, 0.367, -0.201]
+    options = {"intervals": intervals, "continuation": False}
+    solution = plan(scene, start, goal, 1.9125, **options)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6
+
+
+@pytest.mark.long
+def test_a_light_wrist_that_needs_many_steps_goes_on_with_finer_intervals() -> None:
+    """The last joint weighs next to nothing, and coarse intervals leave it free to whirl."""
+    robot = hovi.load_robot("xarm7")
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    start = [-2.028, -0.447, -2.746, 2.798, -2.59, 0.217, 2.347]
+    goal = [-0.174, 1.731, 1.671, 3.578, -2.341, -1.337, -2.7]
+    solution = plan(scene, start, goal, 4.822, continuation=False)
+    assert solution.success, solution.message
+    assert largest_excess(solution.trajectory, as_limits(robot, "urdf")) <= 1e-6

@@ -1,0 +1,102 @@
+"""An interrupt that any part of a call caught ends the whole call, and nothing after it."""
+
+from __future__ import annotations
+
+import contextlib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.state import State
+from hovi.planning.clearance.obstacles import Sphere
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
+from hovi.planning.search.planner import plan
+from hovi.planning.solver.status import Status
+from hovi.scene.scene import Scene
+from hovi.system.interruption import go_on, interrupted, interruptible, remember
+
+HANG = np.array([-np.pi / 2, 0.0])
+REACH = np.array([0.3, 0.7])
+FEW = 25
+"""Evaluations that putting the answer together may take."""
+
+SEARCHES: dict[str, dict[str, Any]] = {
+    "between limits": {"limits": {"base": "none", "tau": 12.0}},
+    "among obstacles": {"obstacles": [Sphere([0.7, 0.0, -1.65], 0.15)]},
+    "through a via point": {
+        "via": [Via(0.5, State([-0.5, 0.2]))],
+        "goal": FrameGoal("tip", position=[1.2, 0.0, 1.0]),
+    },
+    "to a tolerance": {"tolerance": 1e-10, "starts": 3, "processes": 1},
+    "for the best duration": {"duration": (0.5, 20.0), "time_weight": 3.0},
+    "on a fine grid": {"intervals": 200},
+}
+
+
+@interruptible
+def swallowing() -> bool:
+    with contextlib.suppress(KeyboardInterrupt):
+        remember()
+        raise KeyboardInterrupt
+    return interrupted()
+
+
+def test_an_interrupt_is_remembered_until_the_outermost_call_returns() -> None:
+    @interruptible
+    def outer() -> bool:
+        swallowing()
+        return interrupted()
+
+    assert outer()
+    assert not interrupted()
+
+
+def test_a_call_that_raises_leaves_no_interrupt_to_the_next() -> None:
+    @interruptible
+    def ended() -> None:
+        swallowing()
+        go_on()
+
+    with pytest.raises(KeyboardInterrupt):
+        ended()
+    assert not interruptible(interrupted)()
+
+
+def test_outside_of_calls_nothing_is_remembered() -> None:
+    remember()
+    assert not interrupted()
+    go_on()
+
+
+@pytest.mark.parametrize("dropped", [False, True])
+@pytest.mark.parametrize("evaluations", [2, 8])
+@pytest.mark.parametrize("search", SEARCHES)
+def test_an_interrupt_anywhere_ends_every_search(
+    search: str,
+    evaluations: int,
+    dropped: bool,
+    arm_scene: Scene,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also one that Python drops, as in a destructor, of which only the handler tells."""
+    jets, calls = DiscreteLagrangian.jets, 0
+
+    def interrupting(self: DiscreteLagrangian, path: DiscretePath) -> Any:
+        nonlocal calls
+        calls += 1
+        if calls == evaluations:
+            remember()
+            if not dropped:
+                raise KeyboardInterrupt
+        return jets(self, path)
+
+    monkeypatch.setattr(DiscreteLagrangian, "jets", interrupting)
+    asked = {"goal": REACH, "duration": 1.0, "limits": "none", "intervals": 12} | SEARCHES[search]
+    found = plan(arm_scene, HANG, **asked)
+    assert (found.success, found.status) == (False, Status.INTERRUPTED)
+    assert "interrupted" in found.message
+    assert evaluations <= calls <= evaluations + FEW

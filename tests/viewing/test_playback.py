@@ -1,0 +1,525 @@
+from __future__ import annotations
+
+import base64
+import contextlib
+import dataclasses
+import http.client
+import itertools
+import json
+import math
+import re
+import socket
+import threading
+import time
+import webbrowser
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+import pytest
+import umsgpack
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import DisplayError
+from hovi.planning.problem.limits import as_limits
+from hovi.robot.robot import Robot, load_robot
+from hovi.robot.urdf.planar_chain import chain
+from hovi.scene.scene import Scene
+from hovi.viewing import playback
+from hovi.viewing.highlights import _bridged
+from hovi.viewing.playback import Replay, replay
+from hovi.viewing.skeleton import skeleton
+from oracles.headless_browser import CHROMIUM, Tab, headless_browser
+from samples.cubic_motion import cubic_motion
+
+Array = npt.NDArray[np.float64]
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+
+
+@pytest.fixture(scope="module")
+def motion(two_link: Robot) -> Trajectory:
+    return cubic_motion(Scene(two_link), seed=4)[0]
+
+
+def _speed_limit(motion: Trajectory, bound: float) -> dict[str, Any]:
+    assert motion.robot is not None
+    return as_limits(motion.robot, {"base": "none", "v": {"elbow": bound}}).to_dict()
+
+
+@pytest.fixture(scope="module")
+def limited_motion(motion: Trajectory) -> Trajectory:
+    """The same motion, under a limit of the elbow's velocity that it reaches after 1.3 s."""
+    return dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 5.0)})
+
+
+@pytest.fixture(scope="module")
+def bare_motion(two_link: Robot) -> Trajectory:
+    """The same arm as a Pinocchio model without shapes."""
+    return cubic_motion(Scene(load_robot(two_link.model)), seed=4)[0]
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+def quiet(text: str) -> None:
+    """Nothing is printed."""
+
+
+def messages(page: Path) -> list[dict[str, Any]]:
+    """What a written page draws."""
+    found = re.search(r"for \(const message of (\[.*\])\)", page.read_text())
+    assert found is not None
+    return [umsgpack.unpackb(base64.b64decode(m)) for m in json.loads(found[1])]
+
+
+def seek(tab: Tab, t: float) -> Array:
+    """The page at a time of its animation."""
+    tab.value(
+        "viewer.animator.pause();"
+        "for (const a of viewer.animator.actions) { a.play(); a.paused = false; }"
+        f"viewer.animator.seek({t}); viewer.gui.close(); viewer.render(); 1"
+    )
+    return tab.screenshot().astype(float)
+
+
+def colored(picture: Array) -> npt.NDArray[np.bool_]:
+    """Pixels that are neither background nor grid nor the path of the tip."""
+    blue_or_orange = np.abs(picture[..., 0] - picture[..., 2]) > 60
+    return blue_or_orange
+
+
+def yellow(picture: Array) -> npt.NDArray[np.bool_]:
+    """Pixels in the color of links whose joint is at a limit."""
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    found: npt.NDArray[np.bool_] = (red > 120) & (green > 0.75 * red) & (blue < 0.4 * red)
+    return found
+
+
+# The page in a file
+
+
+def test_the_same_motion_gives_the_same_page(motion: Trajectory, tmp_path: Path) -> None:
+    for name in ("1.html", "2.html"):
+        replay(motion, html=tmp_path / name)
+    assert (tmp_path / "1.html").read_bytes() == (tmp_path / "2.html").read_bytes()
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_page_refers_to_nothing_outside_itself(motion: Trajectory, tmp_path: Path) -> None:
+    replay(motion, html=tmp_path / "motion.html")
+    text = (tmp_path / "motion.html").read_text()
+    assert not re.search(r"<(script|img|link|iframe)[^>]+(src|href)=\"(?!data:)", text)
+    assert "default-src 'none'" in text
+
+
+def test_the_animation_is_the_motion(motion: Trajectory, tmp_path: Path) -> None:
+    shown = replay(motion, html=tmp_path / "motion.html")
+    (animation,) = (m for m in messages(tmp_path / "motion.html") if m["type"] == "set_animation")
+    assert animation["options"] == {"play": True, "repetitions": 1}
+    visual = motion.robot.visual  # type: ignore[union-attr]
+    assert len(animation["animations"]) == visual.ngeoms
+    model, data, shapes = motion.robot.model, motion.robot.model.createData(), visual.createData()  # type: ignore[union-attr]
+    tracks = {
+        a["path"]: {t["name"]: t["keys"] for t in a["clip"]["tracks"]}
+        for a in animation["animations"]
+    }
+    for item in visual.geometryObjects:
+        name = shown.visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL)
+        keys = tracks["/meshcat/" + name]
+        times = [key["time"] for key in keys[".position"]]
+        assert (times[0], times[-1]) == (0.0, motion.duration)
+        for i in (0, len(times) // 2, -1):
+            q = motion.configurations(times[i])[0]
+            pin.updateGeometryPlacements(model, data, visual, shapes, q)
+            place = shapes.oMg[visual.getGeometryId(item.name)]
+            turn = pin.Quaternion(*np.roll(keys[".quaternion"][i]["value"], 1)).matrix()
+            np.testing.assert_allclose(keys[".position"][i]["value"], place.translation, atol=1e-12)
+            np.testing.assert_allclose(turn, place.rotation, atol=1e-12)
+
+
+def test_loop_repeats_for_ever(motion: Trajectory, tmp_path: Path) -> None:
+    replay(motion, html=tmp_path / "motion.html", loop=True, speed=0.5)
+    (animation,) = (m for m in messages(tmp_path / "motion.html") if m["type"] == "set_animation")
+    assert math.isinf(animation["options"]["repetitions"])
+    assert "timeScale = 0.5;" in (tmp_path / "motion.html").read_text()
+
+
+def visibility(page: Path) -> dict[str, list[dict[str, Any]]]:
+    """Keys of the tracks that show and hide, by the node's path."""
+    (animation,) = (m for m in messages(page) if m["type"] == "set_animation")
+    return {
+        a["path"]: track["keys"]
+        for a in animation["animations"]
+        for track in a["clip"]["tracks"]
+        if track["name"] == ".visible"
+    }
+
+
+def test_links_stand_out_while_their_joint_is_at_a_limit(
+    limited_motion: Trajectory, tmp_path: Path
+) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert "at a limit" in (tmp_path / "motion.html").read_text()
+    robot, highlights = limited_motion.robot, shown.highlights
+    assert robot is not None
+    assert highlights is not None
+    elbow = robot.model.getJointId("elbow")
+    assert set(np.flatnonzero(highlights.flags.any(axis=0))) == {elbow}
+    tracks = visibility(tmp_path / "motion.html")
+    carried = [item for item in robot.visual.geometryObjects if item.parentJoint == elbow]  # type: ignore[union-attr]
+    assert len(tracks) == 2 * len(carried)
+    motion = limited_motion.sample(highlights.times)
+    at_bound = np.abs(motion.v[:, 1]) >= 5.0 - 1e-3 * 10.0
+    at_bound[-1] = False
+    np.testing.assert_array_equal(highlights.flags[:, elbow], at_bound)
+    for path, keys in tracks.items():
+        bright = path.endswith("at its limit")
+        assert [key["value"] for key in keys] == [not bright, bright, not bright]
+
+
+def test_links_look_as_before_at_the_end(limited_motion: Trajectory, tmp_path: Path) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert shown.highlights is not None
+    assert not shown.highlights.at(limited_motion.duration).any()
+
+
+def test_short_gaps_do_not_flicker() -> None:
+    flags = np.zeros((60, 1), dtype=bool)
+    flags[[10, 14, 15, 19, 40]] = True
+    bridged = _bridged(flags)[:, 0]
+    np.testing.assert_array_equal(np.flatnonzero(bridged), [*range(10, 20), 40])
+    edges = np.ones((5, 1), dtype=bool)
+    np.testing.assert_array_equal(_bridged(edges), edges)
+
+
+def test_a_motion_that_is_never_at_a_limit_is_drawn_once(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    far = dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 1e3)})
+    for name, trajectory in (("1.html", motion), ("2.html", far)):
+        assert replay(trajectory, html=tmp_path / name).highlights is None
+    assert (tmp_path / "1.html").read_bytes() == (tmp_path / "2.html").read_bytes()
+
+
+def test_the_trace_is_the_path_of_the_tip(motion: Trajectory, tmp_path: Path) -> None:
+    replay(motion, html=tmp_path / "with.html")
+    replay(motion, html=tmp_path / "without.html", trace=False)
+    (drawn,) = (m for m in messages(tmp_path / "with.html") if m["path"] == "/meshcat/trace")
+    (geometry,) = drawn["object"]["geometries"]
+    points = geometry["data"]["attributes"]["position"]["array"]
+    points = np.frombuffer(points.data, np.float32).reshape(-1, 3)
+    ends = motion.robot.frame_position("tip", motion.q[[0, -1]])  # type: ignore[union-attr]
+    np.testing.assert_allclose(points[[0, -1]], ends, atol=1e-6)
+    assert not [m for m in messages(tmp_path / "without.html") if "trace" in m["path"]]
+
+
+def test_a_page_is_written_whole_or_not_at_all(
+    motion: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = tmp_path / "motion.html"
+    page.write_text("before")
+    with pytest.raises(DisplayError, match="No such file or directory"):
+        replay(motion, html=tmp_path / "no" / "motion.html")
+
+    def fail(self: Path, target: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(DisplayError, match="No space left on device"):
+        replay(motion, html=page)
+    assert page.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [page]
+
+
+def test_a_robot_without_shapes_is_drawn_as_a_skeleton(two_link: Robot) -> None:
+    names = [item.name for item in skeleton(two_link.model).geometryObjects]
+    assert [name.split("_")[0] for name in names] == ["sphere", "sphere", "cylinder", "cylinder"]
+    bars = skeleton(two_link.model).geometryObjects[2:]
+    np.testing.assert_allclose([2 * bar.geometry.halfLength for bar in bars], [1.5, 1.0])
+
+
+@pytest.mark.parametrize("links", [1, 5])
+def test_the_skeleton_of_a_chain_reaches_its_tip(links: int, tmp_path: Path) -> None:
+    (tmp_path / "chain.urdf").write_text(chain(links))
+    robot = load_robot(tmp_path / "chain.urdf")
+    geometry = skeleton(robot.model)
+    data, shapes = robot.model.createData(), geometry.createData()
+    q = np.linspace(0.3, 0.9, links)
+    pin.updateGeometryPlacements(robot.model, data, geometry, shapes, q)
+    last = geometry.geometryObjects[-1].geometry
+    ends = [shapes.oMg[-1].act(np.array([0, 0, z * last.halfLength])) for z in (-1, 1)]
+    tip = robot.frame_position(robot.tip_frame, q[None])[0]
+    assert min(np.linalg.norm(end - tip) for end in ends) < 1e-12
+
+
+def test_the_page_says_which_meshes_are_missing(tmp_path: Path) -> None:
+    mesh = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'
+    (tmp_path / "arm.urdf").write_text(chain(1).replace("<inertial>", f"{mesh}<inertial>", 1))
+    trajectory, _ = cubic_motion(Scene(load_robot(tmp_path / "arm.urdf")))
+    replay(trajectory, html=tmp_path / "motion.html")
+    assert "gone.stl" in (tmp_path / "motion.html").read_text()
+
+
+def test_a_motion_without_its_robot_cannot_be_shown(
+    bare_motion: Trajectory, tmp_path: Path
+) -> None:
+    bare_motion.save(tmp_path / "motion.npz")
+    with pytest.raises(DisplayError, match="without its robot"):
+        replay(Trajectory.load(tmp_path / "motion.npz"))
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
+def test_speeds_that_mean_nothing_are_refused(motion: Trajectory, speed: float) -> None:
+    with pytest.raises(DisplayError, match="speed"):
+        replay(motion, speed=speed)
+
+
+# The live page
+
+
+class Clock:
+    """Time that passes only while somebody sleeps, and a little with every look."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def monotonic(self) -> float:
+        self.now += 1e-4
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+@pytest.mark.parametrize("speed", [0.25, 1.0, 4.0])
+def test_playing_keeps_pace_and_ends_at_the_goal(
+    motion: Trajectory, monkeypatch: pytest.MonkeyPatch, speed: float
+) -> None:
+    clock, shown = Clock(), []
+
+    class Display:
+        def display(self, q: Array) -> None:
+            shown.append((clock.now - 100.0, q))
+
+    monkeypatch.setattr(playback, "time", clock)
+    player = Replay(motion, Display(), "", None)  # type: ignore[arg-type]
+    player.play(speed=speed)
+    assert len(shown) == pytest.approx(60 * motion.duration / speed, abs=3)
+    for elapsed, q in shown[:-1]:
+        t = min(elapsed * speed, motion.duration)
+        np.testing.assert_allclose(q, motion.configurations(t)[0], atol=2e-3 * speed)
+    np.testing.assert_array_equal(shown[-1][1], motion.configurations(motion.duration)[0])
+    assert shown[-1][0] == pytest.approx(motion.duration / speed, abs=0.02)
+
+
+def test_playing_shows_and_hides_links(limited_motion: Trajectory, tmp_path: Path) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html")
+    assert shown.highlights is not None
+    during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
+
+    def hidden() -> int:
+        drawn = [umsgpack.unpackb(message) for message in shown.page.messages]
+        flags = [
+            m["value"] for m in drawn if m.get("property") == "visible" and "/visuals/" in m["path"]
+        ]
+        assert len(flags) == 2 * flags.count(False)
+        bright = [m["value"] for m in drawn if m["path"].endswith("at its limit") and "value" in m]
+        return bright.count(False)
+
+    shown.highlights.show(shown.visualizer, during)
+    assert hidden() == 0
+    shown.highlights.show(shown.visualizer, limited_motion.duration)
+    assert hidden() > 0
+
+
+def test_loop_plays_until_interrupted(motion: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    starts = []
+
+    class Display:
+        def display(self, q: Array) -> None:
+            starts.extend([q] if (q == motion.q[0]).all() else [])
+            if len(starts) == 3:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(playback, "time", Clock())
+    Replay(motion, Display(), "", None).play(loop=True)  # type: ignore[arg-type]
+    assert len(starts) == 3
+
+
+def test_a_live_page_is_served_to_this_machine_alone(motion: Trajectory) -> None:
+    said: list[str] = []
+    with replay(motion, speed=100, announce=said.append) as shown:
+        assert said == [shown.url]
+        found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/view/", shown.url)
+        assert found is not None
+        with socket.socket() as other:  # free unless the server listens everywhere
+            other.bind(("127.0.0.2", int(found[1])))
+    assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]
+    shown.close()
+
+
+def test_pages_of_other_sites_are_not_served(motion: Trajectory) -> None:
+    def status(address: str, origin: str) -> int:
+        headers = {"Upgrade": "websocket", "Connection": "Upgrade", "Origin": origin}
+        headers |= {"Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Version": "13"}
+        with contextlib.closing(http.client.HTTPConnection(address)) as connection:
+            connection.request("GET", "/", headers=headers)
+            with connection.getresponse() as response:
+                return response.status
+
+    with replay(motion, speed=100, announce=quiet) as shown:
+        address = shown.url.removeprefix("http://").removesuffix("/view/")
+        assert status(address, f"http://{address}") == 101
+        assert status(address, "http://example.org") == 403
+
+
+def test_a_busy_port_is_named(motion: Trajectory) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(DisplayError, match=f"port {port}"):
+            replay(motion, port=port)
+    with pytest.raises(DisplayError, match="not 99999"):
+        replay(motion, port=99999)
+
+
+def test_no_browser_is_an_error_that_leaves_no_server(
+    motion: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(webbrowser, "open", lambda url, new: False)
+    with pytest.raises(DisplayError, match="no browser could be started; open http"):
+        replay(motion, open_browser=True, announce=quiet)
+    monkeypatch.setattr(webbrowser, "open", lambda url, new: True)
+    monkeypatch.setattr(playback, "_BROWSER_SECONDS", 0.1)
+    with pytest.raises(DisplayError, match="no browser showed the page"):
+        replay(motion, open_browser=True, announce=quiet)
+    assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]
+
+
+def test_a_notebook_shows_the_page(motion: Trajectory, tmp_path: Path) -> None:
+    with replay(motion, speed=100, announce=quiet) as shown:
+        assert f'<iframe src="{shown.url}"' in shown._repr_html_()
+    written = replay(motion, html=tmp_path / "motion.html")
+    assert written.url == (tmp_path / "motion.html").as_uri()
+    assert '<iframe srcdoc="&lt;!DOCTYPE' in written._repr_html_()
+
+
+# In a browser
+
+
+@needs_chromium
+def test_a_page_plays_offline(motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
+    replay(motion, html=tmp_path / "motion.html", trace=False)
+    tab.requests.clear()
+    tab.open((tmp_path / "motion.html").as_uri())
+    first, last = seek(tab, 0.0), seek(tab, motion.duration)
+    for picture in (first, last):
+        assert 0.002 < colored(picture).mean() < 0.3
+    assert (colored(first) != colored(last)).mean() > 0.002
+    assert all(url.startswith(("file:", "data:")) for url in tab.requests), tab.requests
+    assert not tab.errors
+
+
+@needs_chromium
+def test_a_link_at_its_limit_is_yellow_on_the_page(
+    limited_motion: Trajectory, tmp_path: Path, tab: Tab
+) -> None:
+    shown = replay(limited_motion, html=tmp_path / "motion.html", trace=False)
+    assert shown.highlights is not None
+    during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
+    tab.open((tmp_path / "motion.html").as_uri())
+    shares = [yellow(seek(tab, t)).mean() for t in (0.0, during, limited_motion.duration)]
+    assert shares[1] > 1e-3
+    assert max(shares[0], shares[2]) < 1e-4
+    assert not tab.errors
+
+
+@needs_chromium
+def test_a_page_starts_by_itself_and_stops_at_the_goal(
+    motion: Trajectory, tmp_path: Path, tab: Tab
+) -> None:
+    replay(motion, html=tmp_path / "motion.html", speed=4.0)
+    tab.open((tmp_path / "motion.html").as_uri())
+    tab.until("!viewer.animator.playing")
+    node = "viewer.scene_tree.find(['meshcat', 'robot', 'visuals', 'tip_0']).object.position"
+    tip = motion.robot.frame_position("tip", motion.q[-1:])[0]  # type: ignore[union-attr]
+    np.testing.assert_allclose(tab.value(f"{node}.toArray()"), tip, atol=1e-6)
+
+
+@needs_chromium
+def test_a_skeleton_is_seen(bare_motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
+    replay(bare_motion, html=tmp_path / "motion.html", trace=False)
+    tab.open((tmp_path / "motion.html").as_uri())
+    assert colored(seek(tab, 1.0)).mean() > 0.002
+    assert not tab.errors
+
+
+@needs_chromium
+def test_meshes_with_several_materials_are_drawn(tmp_path: Path, tab: Tab) -> None:
+    """UR5's shoulder has two parts, one of two materials: meshcat alone hides that part."""
+    robot = load_robot("ur5")
+    replay(cubic_motion(Scene(robot))[0], html=tmp_path / "ur5.html")
+    tab.open((tmp_path / "ur5.html").as_uri())
+    meshes = tab.value(
+        "Object.values(viewer.scene_tree.find(['meshcat', 'robot', 'visuals']).children)"
+        ".map(n => n.children['<object>'].object).map(o => [o.geometry.attributes.position.count,"
+        "[o.material].flat().every(m => m.isMaterial)])"
+    )
+    assert len(meshes) == robot.visual.ngeoms  # type: ignore[union-attr]
+    assert all(count > 1000 and whole for count, whole in meshes)
+    assert np.abs(seek(tab, 0.0) - seek(tab, 2.0)).max(axis=2).mean() > 1.0
+
+
+@needs_chromium
+def test_a_live_replay_moves_in_the_browser(motion: Trajectory, tab: Tab) -> None:
+    page: list[str] = []
+    shown: list[Replay] = []
+
+    def play() -> None:
+        shown.append(replay(motion, speed=0.4, trace=False, announce=page.append))
+
+    player = threading.Thread(target=play)
+    player.start()
+    while not page:
+        time.sleep(0.01)
+    tab.open(page[0])
+    pictures = [tab.screenshot().astype(float)]
+    time.sleep(1.0)
+    pictures.append(tab.screenshot().astype(float))
+    player.join()
+    with shown[0]:
+        pictures.append(tab.screenshot().astype(float))
+        for before, after in itertools.pairwise(pictures):
+            assert colored(before).mean() > 0.002
+            assert (colored(before) != colored(after)).mean() > 0.001
+        assert tab.value("viewer.animator.actions.length") == 0
+        tab.open(page[0])  # who comes later gets the motion with its controls
+        tab.until("viewer.animator.actions.length > 0")
+    assert not tab.errors
+
+
+@needs_chromium
+@pytest.mark.parametrize("size", [0.01, 1.0, 30.0])
+def test_robots_of_any_size_fill_the_picture(
+    two_link: Robot, tmp_path: Path, tab: Tab, size: float
+) -> None:
+    text = Path(two_link.source.folder, two_link.source.reference).read_text()
+
+    def scaled(match: re.Match[str]) -> str:
+        numbers = " ".join(repr(size * float(x)) for x in match[2].split())
+        return f'{match[1]}="{numbers}"'
+
+    text = re.sub(r"(?<!axis )\b(xyz|radius|length)=\"([^\"]+)\"", scaled, text)
+    (tmp_path / "arm.urdf").write_text(text)
+    trajectory, _ = cubic_motion(Scene(load_robot(tmp_path / "arm.urdf")), seed=4)
+    replay(trajectory, html=tmp_path / "arm.html", trace=False)
+    tab.open((tmp_path / "arm.html").as_uri())
+    rows, columns = np.nonzero(colored(seek(tab, 0.0)))
+    assert np.ptp(rows) > 60 or np.ptp(columns) > 60
+    assert 0.002 < len(rows) / (800 * 457) < 0.3

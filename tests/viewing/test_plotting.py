@@ -1,0 +1,242 @@
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from PIL import Image
+
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.trajectory import Trajectory
+from hovi.effects import Gravity
+from hovi.errors import DisplayError
+from hovi.planning.problem.limits import as_limits
+from hovi.robot.robot import Robot, load_robot
+from hovi.scene.scene import Scene
+from hovi.viewing import plotting
+from hovi.viewing.aligned_axes import align_zeros
+from samples.cubic_motion import cubic_motion
+
+Picture = Callable[[Trajectory, Path], None]
+
+PICTURES = [plotting.plot, plotting.plot_angles, plotting.plot_swept_surface]
+MAGIC = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
+
+
+@pytest.fixture(scope="module")
+def motion(two_link: Robot) -> Trajectory:
+    trajectory, _ = cubic_motion(Scene(two_link, [Gravity(9.8)]))
+    path = trajectory.path
+    inner = np.random.default_rng(3).normal(size=path.inner.shape)
+    return dataclasses.replace(trajectory, path=DiscretePath(path.q, path.v, path.z, inner))
+
+
+def within(motion: Trajectory, **limits: object) -> Trajectory:
+    """The motion as if it had been planned under these limits."""
+    assert motion.robot is not None
+    imposed = as_limits(motion.robot, {"base": "none", **limits})
+    return dataclasses.replace(motion, metadata={"limits": imposed.to_dict()})
+
+
+def lines(figure: Figure, panel: int, gid: str) -> list[Line2D]:
+    return [line for line in figure.axes[panel].lines if line.get_gid() == gid]
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+@pytest.mark.parametrize("suffix", MAGIC)
+def test_the_suffix_says_what_picture_is_written(
+    motion: Trajectory, tmp_path: Path, picture: Picture, suffix: str
+) -> None:
+    path = tmp_path / f"motion{suffix}"
+    picture(motion, path)
+    assert path.read_bytes().startswith(MAGIC[suffix])
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("picture", PICTURES)
+def test_pictures_are_not_blank_and_always_the_same(
+    motion: Trajectory, tmp_path: Path, picture: Picture
+) -> None:
+    first, second = tmp_path / "1.png", tmp_path / "2.png"
+    picture(motion, first)
+    picture(motion, second)
+    assert first.read_bytes() == second.read_bytes()
+    pixels = np.asarray(Image.open(first).convert("RGB"), dtype=np.int16)
+    colored = np.ptp(pixels, axis=2) > 60
+    assert colored.mean() > 1e-3
+
+
+def test_lines_are_the_motion_in_degrees(motion: Trajectory) -> None:
+    axes = plotting.motion_figure(motion).axes
+    assert [ax.get_ylabel() for ax in axes] == [
+        "angle [deg]",
+        "velocity [deg/s]",
+        "torque [N m]",
+    ]
+    t, q = axes[0].lines[0].get_xdata(), axes[0].lines[0].get_ydata()
+    drawn = np.isfinite(t)
+    wanted = np.degrees(motion.configurations(t[drawn])[:, 0])
+    np.testing.assert_allclose(q[drawn], wanted, atol=1e-9)
+    np.testing.assert_array_equal(axes[0].lines[1].get_xdata()[::2], motion.t[:-1])
+
+
+def test_torques_are_drawn_with_their_jumps(motion: Trajectory) -> None:
+    line = plotting.motion_figure(motion).axes[2].lines[0]
+    t, tau = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+    breaks = np.flatnonzero(np.isnan(t))
+    np.testing.assert_allclose(t[breaks - 1], motion.t[1:], atol=1e-15)
+    right = motion.sample(motion.t[1:-1]).tau[:, 0]
+    np.testing.assert_allclose(tau[breaks[:-1] + 1], right, atol=1e-12)
+    assert np.abs(tau[breaks[:-1] - 1] - right).max() > 0.1
+
+
+def test_the_legend_names_the_joints(motion: Trajectory) -> None:
+    for figure in (plotting.motion_figure(motion), plotting.angles_figure(motion)):
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert texts == ["shoulder", "elbow"]
+
+
+def test_limits_that_curves_come_near_are_bands(motion: Trajectory) -> None:
+    speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
+    low, high = float(speed.min()), float(speed.max())
+    figure = plotting.motion_figure(within(motion, v={"elbow": [low - 50.0, 1.01 * high]}))
+    (line,) = lines(figure, 1, "limit")  # the lower bound is far
+    np.testing.assert_allclose(line.get_ydata(), np.degrees(1.01 * high))
+    assert figure.axes[1].patches
+    assert not lines(figure, 0, "limit") + lines(figure, 2, "limit")
+    assert [text.get_text() for text in figure.legends[0].get_texts()][2:] == ["limit"]
+    assert figure.axes[1].get_title(loc="right") == ""
+
+
+def test_a_curve_is_marked_where_it_leans_on_a_limit(motion: Trajectory) -> None:
+    speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
+    figure = plotting.motion_figure(within(motion, v={"elbow": [-100.0, float(speed.max())]}))
+    (mark,) = lines(figure, 1, "at a limit")
+    marked = np.asarray(mark.get_ydata())
+    marked = marked[np.isfinite(marked)]
+    assert 0 < len(marked) < 1000
+    assert marked.min() >= np.degrees(speed.max()) - 1e-3 * np.degrees(speed.max() + 100.0)
+    assert "at a limit" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_far_limits_do_not_squash_the_curves(motion: Trajectory) -> None:
+    free = plotting.motion_figure(motion)
+    figure = plotting.motion_figure(within(motion, q=1000.0, v=1000.0, tau={"elbow": 1e5}))
+    for k, sentence in enumerate(
+        ["far from all limits", "far from all limits", "far from the limits of elbow"]
+    ):
+        assert not lines(figure, k, "limit")
+        assert figure.axes[k].get_ylim() == free.axes[k].get_ylim()
+        assert figure.axes[k].get_title(loc="right") == sentence
+
+
+def test_joints_that_share_a_limit_share_its_line(motion: Trajectory) -> None:
+    speed = np.abs(motion.sample(np.linspace(0.0, motion.duration, 4001)).v)
+    bound = 1.001 * float(speed.max(axis=0).min())
+    figure = plotting.motion_figure(within(motion, v=bound))
+    drawn = {(line.get_ydata()[0], line.get_color()) for line in lines(figure, 1, "limit")}
+    assert len({color for _, color in drawn}) == 2
+    np.testing.assert_allclose({abs(y) for y, _ in drawn}.pop(), np.degrees(bound))
+
+
+@pytest.mark.parametrize("limits", [3, {}, {"lower": [[0]], "upper": [[1]], "tolerance": 1e-6}])
+def test_metadata_that_is_no_limits_is_left_aside(motion: Trajectory, limits: object) -> None:
+    strange = dataclasses.replace(motion, metadata={"limits": limits})
+    assert len(plotting.motion_figure(strange).legends[0].get_texts()) == 2
+
+
+def test_sliding_joints_get_an_axis_in_meters() -> None:
+    robot = load_robot("panda")
+    figure = plotting.motion_figure(cubic_motion(Scene(robot))[0])
+    labels = {ax.get_ylabel() for ax in figure.axes}
+    assert labels >= {"angle [deg]", "position [m]", "force [N]", "torque [N m]"}
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    fingers = [f"{name} (right)" for name in robot.joint_names[7:]]
+    assert texts == [*robot.joint_names[:7], *fingers]
+
+
+def zero_height(ax: Axes) -> float:
+    low, high = ax.get_ylim()
+    return -low / (high - low)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [((0, 3), (-1, 1)), ((-4, 1), (-1, 4)), ((1, 3), (-2, -1)), ((-1, 2), (0, 9))]
+)
+def test_zeros_of_two_axes_are_aligned(one: tuple[int, int], other: tuple[int, int]) -> None:
+    left = Figure().subplots()
+    right = left.twinx()
+    for ax, limits in ((left, one), (right, other)):
+        ax.set_ylim(*limits)
+    align_zeros(left, right)
+    assert zero_height(left) == pytest.approx(zero_height(right), abs=1e-12)
+    for ax, (low, high) in ((left, one), (right, other)):
+        assert ax.get_ylim()[0] <= low
+        assert ax.get_ylim()[1] >= high
+
+
+def test_a_range_far_from_zero_is_not_squashed() -> None:
+    left = Figure().subplots()
+    right = left.twinx()
+    left.set_ylim(-1, 2)
+    right.set_ylim(100, 101)
+    align_zeros(left, right)
+    assert (left.get_ylim(), right.get_ylim()) == ((-1, 2), (100, 101))
+
+
+def test_sections_of_the_surface_are_the_links(motion: Trajectory, two_link: Robot) -> None:
+    q = motion.configurations([1.0])
+    shoulder, elbow, tip = plotting._chain(two_link, q)[:, 0]
+    theta1, theta2 = q[0]
+    np.testing.assert_allclose(shoulder, 0.0)
+    np.testing.assert_allclose(elbow, [1.5 * np.cos(theta1), 0, 1.5 * np.sin(theta1)])
+    forearm = [np.cos(theta1 + theta2), 0, np.sin(theta1 + theta2)]
+    np.testing.assert_allclose(tip, elbow + forearm, atol=1e-15)
+
+
+def test_the_surface_is_drawn_over_the_plane_of_the_motion(motion: Trajectory) -> None:
+    (ax,) = plotting.surface_figure(motion, (0.5, 1.5)).axes
+    labels = ax.get_xlabel(), ax.get_ylabel(), ax.get_zlabel()  # type: ignore[attr-defined]
+    assert labels == ("time [s]", "x [m]", "z [m]")
+
+
+@pytest.mark.parametrize("window", [(1.0, 1.0), (-1.0, 1.0), (0.0, 2.1), (float("nan"), 1.0)])
+def test_windows_outside_the_motion_are_refused(
+    motion: Trajectory, window: tuple[float, float]
+) -> None:
+    with pytest.raises(DisplayError, match="window"):
+        plotting.surface_figure(motion, window)
+
+
+def test_a_two_link_arm_gets_the_papers_pictures_and_others_do_not(
+    motion: Trajectory, panda: Robot, tmp_path: Path
+) -> None:
+    names = [path.name for path in plotting.plot_all(motion, tmp_path / "arm.png")]
+    assert names == ["arm.png", "arm_angles.png", "arm_surface.png"]
+    other, _ = cubic_motion(Scene(panda))
+    assert plotting.plot_all(other, tmp_path / "panda.png") == (tmp_path / "panda.png",)
+    assert len(list(tmp_path.iterdir())) == 4
+
+
+def test_a_motion_without_its_robot_is_drawn_in_si_units(two_link: Robot, tmp_path: Path) -> None:
+    cubic_motion(Scene(load_robot(two_link.model)))[0].save(tmp_path / "motion.npz")
+    loaded = Trajectory.load(tmp_path / "motion.npz")
+    figure = plotting.motion_figure(loaded)
+    assert [ax.get_ylabel().split(" ")[1] for ax in figure.axes] == ["[SI]"] * 3
+    with pytest.raises(DisplayError, match="without its robot"):
+        plotting.surface_figure(loaded)
+
+
+def test_what_cannot_be_written_is_refused_in_a_sentence(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    with pytest.raises(DisplayError, match=r"\.png, \.pdf, \.svg"):
+        plotting.plot(motion, tmp_path / "motion.bmp")
+    with pytest.raises(DisplayError, match="No such file or directory"):
+        plotting.plot(motion, tmp_path / "no" / "motion.png")
+    assert not list(tmp_path.iterdir())

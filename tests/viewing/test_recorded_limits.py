@@ -1,0 +1,73 @@
+"""What a motion kept away from comes back with it, is drawn and is measured."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.cli.reports.nearest_approach import least_distance
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.obstacles import Box, Capsule, Sphere
+from hovi.viewing.imposed_clearance import imposed_clearance, with_obstacles
+from hovi.viewing.plotting import motion_figure
+
+BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
+OBSTACLES = [
+    BALL,
+    Box([0.2, 0.2, 0.2], [9, 0, 0]),
+    Capsule([[8, 0, 0], [9, 0, 0]], 0.1),
+]
+
+
+@pytest.fixture(scope="module")
+def motion(arm_scene: hovi.Scene) -> Trajectory:
+    """A free reach that says of itself that it kept away from three obstacles."""
+    solution = hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.5, limits="none")
+    clearance = Clearance(OBSTACLES, 0.05)
+    metadata = {**solution.trajectory.metadata, "clearance": clearance.to_dict()}
+    return dataclasses.replace(solution.trajectory, metadata=metadata)
+
+
+def test_the_clearance_comes_back_from_a_file(motion: Trajectory, tmp_path: Path) -> None:
+    motion.save(tmp_path / "motion.npz")
+    again = imposed_clearance(Trajectory.load(tmp_path / "motion.npz"))
+    assert again is not None
+    assert again.to_dict() == motion.metadata["clearance"]
+
+
+@pytest.mark.parametrize("data", [None, 3, {}, {"obstacles": [1]}, {"obstacles": [{"kind": 2}]}])
+def test_metadata_that_describes_no_clearance_counts_as_none(motion: Trajectory, data: Any) -> None:
+    metadata = {**motion.metadata, "clearance": data}
+    assert imposed_clearance(dataclasses.replace(motion, metadata=metadata)) is None
+
+
+def test_obstacles_are_drawn_where_they_stand(motion: Trajectory) -> None:
+    drawn = list(with_obstacles(pin.GeometryModel(), motion).geometryObjects)
+    assert len(drawn) == 3
+    np.testing.assert_allclose(drawn[0].placement.translation, BALL.position)
+
+
+def test_the_least_distance_is_the_one_of_the_tip_and_the_ball(
+    motion: Trajectory, arm_scene: hovi.Scene
+) -> None:
+    q = motion.configurations(np.linspace(0.0, 1.5, 50_001))
+    tip = arm_scene.robot.frame_position("tip", q)
+    nearest = np.linalg.norm(tip - np.asarray(BALL.position), axis=1).min() - 0.15 - 0.06
+    assert least_distance(motion) == pytest.approx(nearest, abs=1e-6)
+    assert least_distance(dataclasses.replace(motion, metadata={})) is None
+
+
+def test_distances_get_a_panel_of_their_own(motion: Trajectory) -> None:
+    figure = motion_figure(motion)
+    assert [ax.get_ylabel() for ax in figure.axes][-1] == "distance [m]"
+    labels = [line.get_label() for line in figure.axes[-1].lines]
+    assert "tip to ball" in labels
+    assert "margin" in labels
+    assert len(motion_figure(dataclasses.replace(motion, metadata={})).axes) == 3
