@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from hovi.effects import Gravity
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 MODELS = Path(__file__).resolve().parents[1] / "models"

@@ -60,10 +60,10 @@ if TYPE_CHECKING:
     from hovi.planning.task_file.task import Task as Task
     from hovi.planning.task_file.task_plan import plan_task as plan_task
     from hovi.robot.bundled_models import example as example
+    from hovi.robot.loading import load_robot as load_robot
     from hovi.robot.robot import Robot as Robot
-    from hovi.robot.robot import load_robot as load_robot
     from hovi.robot.urdf.planar_chain import chain as chain
-    from hovi.scene.lagrangian import CasadiLagrangian as CasadiLagrangian
+    from hovi.scene.casadi_lagrangian import CasadiLagrangian as CasadiLagrangian
     from hovi.scene.scene import Scene as Scene
     from hovi.scene.standard_lagrangians import mechanics as mechanics
     from hovi.scene.standard_lagrangians import riemannian_cubic as riemannian_cubic
@@ -78,7 +78,7 @@ _PLACES = {
     "Accuracy": "hovi.planning.problem.tolerance",
     "Box": "hovi.planning.clearance.obstacles",
     "Capsule": "hovi.planning.clearance.obstacles",
-    "CasadiLagrangian": "hovi.scene.lagrangian",
+    "CasadiLagrangian": "hovi.scene.casadi_lagrangian",
     "Certificate": "hovi.planning.refinement.certificate",
     "Clearance": "hovi.planning.clearance.clearance",
     "DiscreteLagrangian": "hovi.discrete.discrete_lagrangian",
@@ -122,7 +122,7 @@ _PLACES = {
     "legendre": "hovi.flows.legendre_transforms",
     "legendre_minus": "hovi.flows.legendre_transforms",
     "legendre_plus": "hovi.flows.legendre_transforms",
-    "load_robot": "hovi.robot.robot",
+    "load_robot": "hovi.robot.loading",
     "load_task": "hovi.planning.task_file.reading",
     "mechanics": "hovi.scene.standard_lagrangians",
     "plan": "hovi.planning.search.planner",

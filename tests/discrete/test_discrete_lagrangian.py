@@ -14,7 +14,8 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import CHUNK
 from hovi.effects import Gravity, JointLimitPotential
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import CLASSIC, by_name
 from oracles.finite_differences import derivative

@@ -27,7 +27,8 @@ from hovi.effects import Gravity
 from hovi.errors import InputError, TrajectoryFileError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
 from samples.cubic_motion import cubic_motion

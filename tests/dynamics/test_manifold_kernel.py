@@ -16,7 +16,8 @@ from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel, joints_
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import CasadiTorque
 from hovi.errors import InputError, ModelError
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from samples.manifold_robots import BASES, chain, configurations, mimicking, with_arm
 
 Array = npt.NDArray[np.float64]

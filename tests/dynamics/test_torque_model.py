@@ -14,8 +14,9 @@ from hovi.dynamics.moving_base_torque import inverse_dynamics
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 from hovi.effects import Gravity, MovingBase
-from hovi.robot.robot import Robot, load_robot
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from oracles.finite_differences import derivative_per_point
 

@@ -35,7 +35,8 @@ from hovi.effects import (
 from hovi.flows.simulator import simulate
 from hovi.flows.tracking import play
 from hovi.planning.search.planner import plan
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]

@@ -28,7 +28,8 @@ from hovi.effects import (
 from hovi.effects.expressions.formula import LONGEST
 from hovi.errors import SceneError
 from hovi.planning.task_file.reading import load_task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 TIP = "panda_hand_tcp"

@@ -13,8 +13,9 @@ import pytest
 from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
 from hovi.effects.joint_limit_potential import smooth_ramp
 from hovi.errors import SceneError
-from hovi.robot.robot import Robot, load_robot
-from hovi.scene.lagrangian import PotentialTerm
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
+from hovi.scene.cost_terms import PotentialTerm
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]

@@ -13,7 +13,8 @@ from hovi.flows.euler_lagrange import regularity
 from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian, conjugate_time
 from hovi.flows.legendre_transforms import legendre
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]

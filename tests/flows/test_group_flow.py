@@ -28,11 +28,13 @@ from hovi.flows.simulator import simulate
 from hovi.flows.stepper import flow
 from hovi.flows.tracking import play
 from hovi.planning.search.planner import plan
+from hovi.robot.loading import load_robot
 from hovi.robot.mimic_model import Coupling, coupled
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_space import bracket
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
-from hovi.scene.standard_lagrangians import bracket, mechanics
+from hovi.scene.standard_lagrangians import mechanics
 from hovi.schemes import galerkin
 from oracles.finite_differences import derivative, derivative_per_point
 from samples.manifold_robots import BASES, chain, configurations, rigid_body, with_arm

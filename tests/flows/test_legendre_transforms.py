@@ -28,7 +28,8 @@ from hovi.flows.legendre_transforms import (
     legendre_plus,
 )
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian
-from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import mechanics, spline
 from hovi.schemes import by_name

@@ -17,7 +17,8 @@ from hovi.flows.order_of_accuracy import variational_order
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import by_name, galerkin

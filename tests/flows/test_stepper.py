@@ -20,7 +20,9 @@ from hovi.flows.stepper import compensated, flow
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian, Lagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import by_name, galerkin

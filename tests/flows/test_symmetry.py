@@ -15,8 +15,10 @@ from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
 from hovi.flows.symmetry import Symmetry, base_rotation, base_translation
-from hovi.robot.robot import Robot, load_robot
-from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import mechanics, riemannian_cubic
 from hovi.schemes import galerkin

@@ -23,7 +23,8 @@ from hovi.planning.refinement.certificate import certify
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]

@@ -23,7 +23,8 @@ from hard.verdict import Mutant, Verdict, judge
 from hovi.errors import HoviError
 from hovi.robot.bundled_models import example
 from hovi.robot.example_robots import example_robot
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 
 STRANGE_NUMBERS = (
     *("NaN", "-nan", "inf", "-inf", "1,5", "1abc", "0x10", "1_0", "1e308", "-1e308", "1e999"),

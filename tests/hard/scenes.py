@@ -17,7 +17,7 @@ from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.robot.urdf.planar_chain import write_chain
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name

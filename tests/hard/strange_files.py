@@ -15,7 +15,8 @@ import pinocchio as pin
 from hard.case import Outcome
 from hovi.errors import HoviError
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 
 ARM = example("two_link.urdf").read_text()
 MASS = 'mass value="0.375"'

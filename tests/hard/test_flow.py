@@ -19,8 +19,9 @@ from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import load_robot
-from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.robot.loading import load_robot
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
 from samples.long_flows import JET, arm_energy, costless, quarters, quartic, quartic_energy

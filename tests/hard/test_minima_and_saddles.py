@@ -37,7 +37,7 @@ from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from samples.paper_arm import HANG, REACH_COST

@@ -133,7 +133,7 @@ def naive_meshes() -> str:
 
 def contained_meshes() -> Outcome:
     from hovi.errors import ModelError
-    from hovi.robot.robot import load_robot
+    from hovi.robot.loading import load_robot
 
     kept = 0
     with tempfile.TemporaryDirectory() as name:

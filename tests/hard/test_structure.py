@@ -25,7 +25,8 @@ from hovi.optimize.trust_region import Options, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 

@@ -34,7 +34,8 @@ from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from samples.sample_effects import powerless_effects, sample_effects
 

@@ -29,7 +29,8 @@ from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, guess_path, solve
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from hovi.viewing.csv_table import write_csv

@@ -11,7 +11,8 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import regularized
 from hovi.effects import Gravity
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from oracles.finite_differences import derivative

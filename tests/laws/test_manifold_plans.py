@@ -21,7 +21,8 @@ from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
 from samples.manifold_robots import configurations, revolute, rigid_body, with_arm

@@ -21,7 +21,7 @@ from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution, solve
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from samples.paper_arm import HANG, REACH_Q, REACH_V

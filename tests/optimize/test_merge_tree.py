@@ -12,7 +12,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.banded_model import BandLayout, BandModel
 from hovi.optimize.merge_tree import MergeTree, MergeTreeModel, merge_levels
 from hovi.optimize.quadratic_model import IntervalSum
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.schemes import galerkin
 from samples.interval_problems import SIZES, IntervalProblem, random_problem
 

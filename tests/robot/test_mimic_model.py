@@ -27,10 +27,11 @@ from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task
+from hovi.robot.loading import load_robot
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.mimic_model import Coupling, Pull, coupled, uncoupled
 from hovi.robot.mimic_tags import read_couplings
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing.highlights import Highlights
 from oracles.finite_differences import derivative_per_point

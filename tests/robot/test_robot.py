@@ -12,7 +12,8 @@ import pytest
 
 from hovi.errors import InputError, ModelError
 from hovi.robot.example_robots import BUILT_IN_CODE, example_names, example_robot
-from hovi.robot.robot import Robot, RobotSource, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot, RobotSource
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,8 @@ import pytest
 import hovi
 from hovi.errors import HoviError, InputError, ModelError
 from hovi.robot.example_robots import example_robot
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.robot.srdf import checked_pairs, parse_srdf
 
 ARM = """<robot name="two_link">

@@ -10,7 +10,7 @@ from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow
 from hovi.flows.symmetry import base_rotation
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import mechanics, spline
 from hovi.schemes import by_name, galerkin

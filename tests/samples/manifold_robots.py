@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from itertools import chain as joined
 from pathlib import Path
 
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.robot.urdf.planar_chain import chain
 
 

@@ -13,7 +13,8 @@ from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.evaluation_cost import account
 from hovi.scene.scene import Scene
 from samples.sample_effects import sample_effects

@@ -11,7 +11,9 @@ import pytest
 
 from hovi.effects import Effect, Gravity, JointLimitPotential
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import CasadiLagrangian, EffortLagrangian, Lagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from oracles.finite_differences import derivative_per_point
 from samples.paper_arm import effort

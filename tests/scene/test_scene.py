@@ -14,7 +14,8 @@ import pytest
 
 from hovi.effects import Effect, Gravity, JointLimitPotential
 from hovi.errors import ModelError, SceneError
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from samples.manifold_robots import chain, half_turning
 

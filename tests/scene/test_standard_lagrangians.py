@@ -11,8 +11,8 @@ import pytest
 
 from hovi.effects import Gravity
 from hovi.errors import InputError, ModelError
-from hovi.robot.robot import load_robot
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.robot.loading import load_robot
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import mechanics, riemannian_cubic, spline
 from oracles.finite_differences import derivative, derivative_per_point

@@ -11,7 +11,7 @@ import pytest
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.task_file.reading import load_task
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.robot.srdf import read_srdf_file
 from hovi.system.bounded_file import require_file
 

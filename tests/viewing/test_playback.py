@@ -25,7 +25,8 @@ import umsgpack
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError
 from hovi.planning.problem.limits import as_limits
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.robot.urdf.planar_chain import chain
 from hovi.scene.scene import Scene
 from hovi.viewing import playback

@@ -16,7 +16,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import DisplayError
 from hovi.planning.problem.limits import as_limits
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing import plotting
 from hovi.viewing.aligned_axes import align_zeros

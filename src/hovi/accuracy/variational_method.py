@@ -13,7 +13,7 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.schemes import by_name
 
 SCHEMES = (

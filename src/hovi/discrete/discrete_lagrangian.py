@@ -18,7 +18,8 @@ from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interv
 from hovi.discrete.interval_charts import IntervalCharts
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.scene.lagrangian import EffortLagrangian, Lagrangian, PointTerms
+from hovi.scene.effort_lagrangian import EffortLagrangian
+from hovi.scene.lagrangian import Lagrangian, PointTerms
 from hovi.scene.squared_effort import predict
 from hovi.schemes.scheme import regular_from_nodal
 

@@ -104,8 +104,7 @@ class Trajectory:
     def space(self) -> ConfigurationSpace | None:
         """The configuration space; None where configurations are vectors."""
         if self.scene is not None:
-            robot = self.scene.robot
-            return None if robot.vector_joints else robot.space
+            return self.scene.robot.curved_space
         parts = self.metadata.get("space")
         return None if parts is None else ConfigurationSpace(tuple(parts))
 

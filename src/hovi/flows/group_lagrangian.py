@@ -25,9 +25,8 @@ from hovi.errors import InputError, SchemeError
 from hovi.flows.regularized import Regularized, regularized
 from hovi.optimize.batched_newton import newton
 from hovi.robot.space.chart import Chart
-from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.configuration_space import ConfigurationSpace, bracket
 from hovi.scene.lagrangian import Lagrangian
-from hovi.scene.standard_lagrangians import bracket
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]

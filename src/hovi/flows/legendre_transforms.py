@@ -17,7 +17,8 @@ import numpy.typing as npt
 from hovi.errors import InputError
 from hovi.flows.scheme_lagrangian import SegmentLagrangian
 from hovi.optimize.batched_newton import newton
-from hovi.scene.lagrangian import CasadiLagrangian, Lagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.lagrangian import Lagrangian
 
 Array = npt.NDArray[np.float64]
 

@@ -20,16 +20,10 @@ from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import hamiltonian, highest_derivative, legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
+from hovi.scene.forces import Drive, ForcedLagrangian, Prescribed, Torque, scene_force
 from hovi.scene.scene import Scene
-from hovi.scene.standard_lagrangians import (
-    Drive,
-    ForcedLagrangian,
-    Prescribed,
-    Torque,
-    mechanics,
-    scene_force,
-)
+from hovi.scene.standard_lagrangians import mechanics
 from hovi.schemes import galerkin
 from hovi.system.blas_threads import one_blas_thread
 

@@ -26,7 +26,7 @@ from hovi.flows.legendre_transforms import hamiltonian
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian, uniform_grid
 from hovi.flows.segment import Segment
 from hovi.flows.symmetry import Symmetry
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
 from hovi.schemes.galerkin_table import MAX_INNER_MODES

@@ -1,4 +1,4 @@
-"""From what the user names (a file or an example) to a source."""
+"""load_robot: from a file, the name of an example or a Pinocchio model to a `Robot`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hovi.robot.example_robots import example_robot, rotor_armature
-from hovi.robot.model import build_full_model
+import pinocchio as pin
+
+from hovi.errors import ModelError, expect
+from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.robot.model import build_full_model, build_model, locked_model
+from hovi.robot.robot import Robot
 from hovi.robot.source import RobotSource, text_hash
 from hovi.robot.srdf import read_srdf_file
-from hovi.robot.urdf.check import read_urdf
+from hovi.robot.urdf.check import MAXIMUM_FREEDOM, read_urdf
 
 
 def is_path(text: str) -> bool:
@@ -74,3 +78,69 @@ def example_source(
     if example.srdf is None or not example.rotors:
         return source
     return replace(source, armature=rotor_armature(build_full_model(source), example.srdf))
+
+
+def load_robot(
+    x: str | Path | pin.Model,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    free_flyer: bool | None = None,
+    locked: Iterable[str] = (),
+    visual: pin.GeometryModel | None = None,
+    collision: pin.GeometryModel | None = None,
+    srdf: str | Path | None = None,
+    mimic: bool = False,
+) -> Robot:
+    """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
+
+    x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
+        pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
+    package_dirs: folders in which `package://` meshes are looked up.
+    free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
+    locked: joints held at the neutral configuration; a single name may come without brackets.
+    visual, collision: geometry that goes with a pinocchio.Model.
+    srdf: path of an SRDF with named poses; an example robot's own is found without it.
+    mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
+        take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
+    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock;
+    InputError for a mimic or free_flyer that is neither True nor False.
+    """
+    expect(mimic, bool, "mimic=True or mimic=False")
+    expect(free_flyer or False, bool, "free_flyer=True or free_flyer=False")
+    names = as_names(locked)
+    folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
+    semantics = None if srdf is None else Path(srdf)
+    if isinstance(x, pin.Model):
+        return _from_model(x, x.name, names, (visual, collision), semantics)
+    if not isinstance(x, str | Path):
+        raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
+    if isinstance(x, Path) or is_path(x):
+        source = file_source(Path(x), folders, names, bool(free_flyer), semantics, mimic)
+    elif x in BUILT_IN_CODE:
+        model, *shapes = build_in_code(x)
+        return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
+    else:
+        source = example_source(x, folders, names, free_flyer, semantics, mimic)
+    model = build_model(source)
+    return Robot(source.reference if source.kind == "example" else model.name, model, source)
+
+
+def _from_model(
+    model: pin.Model,
+    name: str,
+    locked: tuple[str, ...],
+    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
+    srdf: Path | None = None,
+) -> Robot:
+    if model.nv > MAXIMUM_FREEDOM:
+        raise ModelError(
+            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_FREEDOM} are "
+            "accepted: lock joints with pinocchio.buildReducedModel first."
+        )
+    shapes = [shape.copy() for shape in given if shape is not None]
+    reduced, shapes = locked_model(model.copy(), shapes, locked)
+    queue = iter(shapes)
+    kept = [None if shape is None else next(queue) for shape in given]
+    text = None if srdf is None else read_srdf_file(srdf)
+    source = RobotSource(kind="model", reference=name, locked=locked, srdf=text)
+    return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -18,21 +18,16 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import InputError, ModelError, expect, nearest
+from hovi.errors import InputError, ModelError, nearest
 from hovi.robot import model as robot_model
 from hovi.robot.description import describe
-from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code
 from hovi.robot.geometry import Shapes, load_shapes
-from hovi.robot.loading import as_names, example_source, file_source, is_path
 from hovi.robot.mimic_model import Coupling, PortableModel, couplings_of
 from hovi.robot.source import RobotSource
 from hovi.robot.space import pinocchio_configurations as configuration
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
-from hovi.robot.srdf import Srdf, parse_srdf, read_srdf_file
-from hovi.robot.urdf.check import MAXIMUM_FREEDOM
-
-__all__ = ["Robot", "RobotSource", "load_robot"]
+from hovi.robot.srdf import Srdf, parse_srdf
 
 Array = npt.NDArray[np.float64]
 
@@ -131,6 +126,11 @@ class Robot:
     def vector_joints(self) -> bool:
         """Whether every joint has nq = nv, so that configurations add like vectors."""
         return not self.manifold_joints
+
+    @property
+    def curved_space(self) -> ConfigurationSpace | None:
+        """The configuration space; None where configurations are vectors."""
+        return None if self.vector_joints else self.space
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
@@ -331,69 +331,3 @@ class Robot:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """The robot of what `__getstate__` gave."""
         self.__dict__.update({**state, "model": state["model"].model()})
-
-
-def load_robot(
-    x: str | Path | pin.Model,
-    *,
-    package_dirs: Iterable[str | Path] = (),
-    free_flyer: bool | None = None,
-    locked: Iterable[str] = (),
-    visual: pin.GeometryModel | None = None,
-    collision: pin.GeometryModel | None = None,
-    srdf: str | Path | None = None,
-    mimic: bool = False,
-) -> Robot:
-    """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
-
-    x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
-        pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
-    package_dirs: folders in which `package://` meshes are looked up.
-    free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
-    locked: joints held at the neutral configuration; a single name may come without brackets.
-    visual, collision: geometry that goes with a pinocchio.Model.
-    srdf: path of an SRDF with named poses; an example robot's own is found without it.
-    mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
-        take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
-    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock;
-    InputError for a mimic or free_flyer that is neither True nor False.
-    """
-    expect(mimic, bool, "mimic=True or mimic=False")
-    expect(free_flyer or False, bool, "free_flyer=True or free_flyer=False")
-    names = as_names(locked)
-    folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
-    semantics = None if srdf is None else Path(srdf)
-    if isinstance(x, pin.Model):
-        return _from_model(x, x.name, names, (visual, collision), semantics)
-    if not isinstance(x, str | Path):
-        raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
-    if isinstance(x, Path) or is_path(x):
-        source = file_source(Path(x), folders, names, bool(free_flyer), semantics, mimic)
-    elif x in BUILT_IN_CODE:
-        model, *shapes = build_in_code(x)
-        return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
-    else:
-        source = example_source(x, folders, names, free_flyer, semantics, mimic)
-    model = robot_model.build_model(source)
-    return Robot(source.reference if source.kind == "example" else model.name, model, source)
-
-
-def _from_model(
-    model: pin.Model,
-    name: str,
-    locked: tuple[str, ...],
-    given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
-    srdf: Path | None = None,
-) -> Robot:
-    if model.nv > MAXIMUM_FREEDOM:
-        raise ModelError(
-            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_FREEDOM} are "
-            "accepted: lock joints with pinocchio.buildReducedModel first."
-        )
-    shapes = [shape.copy() for shape in given if shape is not None]
-    reduced, shapes = robot_model.locked_model(model.copy(), shapes, locked)
-    queue = iter(shapes)
-    kept = [None if shape is None else next(queue) for shape in given]
-    text = None if srdf is None else read_srdf_file(srdf)
-    source = RobotSource(kind="model", reference=name, locked=locked, srdf=text)
-    return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -1,4 +1,4 @@
-"""A term of the cost that depends on torque and velocity together, such as mechanical power."""
+"""Terms of the cost beside the squared torque, from CasADi expressions."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.point_function import PointFunction
+from hovi.dynamics.torque_model import times
+from hovi.robot.space import tangent
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.tangent import Symbols
 
 Array = npt.NDArray[np.float64]
 
@@ -47,3 +51,33 @@ class EffortTerm:
         K[:, n:, n : 2 * n] = np.eye(n)
         gradient = np.matmul(slope[:, None], K)[:, 0]
         return value, gradient, np.matmul(K.transpose(0, 2, 1), np.matmul(bend, K))
+
+
+class PotentialTerm:
+    """A term V(q, v, a, t) of the cost from a CasADi expression.
+
+    compile: whether its functions become machine code: see PointFunction.
+    space: the configuration space; None where configurations are vectors.
+    """
+
+    def __init__(
+        self,
+        symbols: Symbols,
+        expression: ca.SX,
+        compile: bool = False,
+        space: ConfigurationSpace | None = None,
+    ) -> None:
+        q, v, a, t = symbols
+        hessian, gradient = tangent.hessian(expression, symbols, space)
+        expand = ca.Function("V_expand", [q, v, a, t], [expression, gradient, hessian])
+        self._value = PointFunction(ca.Function("V", [q, v, a, t], [expression]), compile)
+        self._expand = PointFunction(expand, compile)
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """V at P points, shape (P,)."""
+        return self._value(*jet, times(t, len(jet[0])))[0]
+
+    def expand(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """V (P,), its gradient (P, 3 nv) and its Hessian (P, 3 nv, 3 nv)."""
+        value, gradient, hessian = self._expand(*jet, times(t, len(jet[0])))
+        return value, gradient, hessian

@@ -20,10 +20,9 @@ from hovi.effects import REGISTRY, Effect
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
-from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.scene.cost_terms import EffortTerm
+from hovi.scene.cost_terms import EffortTerm, PotentialTerm
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.evaluation_cost import SceneAccount, account
-from hovi.scene.lagrangian import EffortLagrangian, PotentialTerm
 from hovi.scene.terms import SceneTerms
 
 Array = npt.NDArray[np.float64]
@@ -73,7 +72,7 @@ class Scene:
         Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
         """
         symbols, added = self.terms.symbols, self.terms.torque
-        space = self._space
+        space = self.robot.curved_space
         if not self.analytic:
             tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
             total = tau if added is None else tau + added
@@ -193,10 +192,6 @@ class Scene:
         robot = Robot.from_dict(data["robot"])
         return cls(robot, effects, passive=tuple(data.get("passive", ())))
 
-    @property
-    def _space(self) -> ConfigurationSpace | None:
-        return None if self.robot.vector_joints else self.robot.space
-
     @cached_property
     def _without_kernel(self) -> tuple[str, ...]:
         moves = self.terms.symbols.base is not None
@@ -209,7 +204,9 @@ class Scene:
     @cached_property
     def _potential(self) -> PotentialTerm | None:
         V, columns = self.terms.potential, self.terms.symbols.columns()
-        return None if V is None else PotentialTerm(columns, V, self.compile, self._space)
+        return (
+            None if V is None else PotentialTerm(columns, V, self.compile, self.robot.curved_space)
+        )
 
     @cached_property
     def _effort_term(self) -> EffortTerm | None:

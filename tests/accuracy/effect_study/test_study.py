@@ -20,7 +20,8 @@ from hovi.errors import SceneError
 from hovi.flows.tracking import play
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from samples.manifold_robots import with_arm
 

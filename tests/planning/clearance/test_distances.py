@@ -14,7 +14,8 @@ from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from oracles.finite_differences import derivative_per_point
 
 Array = npt.NDArray[np.float64]

@@ -15,7 +15,8 @@ from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_distances
 from hovi.planning.solver.status import Status
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 
 OBSTACLES: list[Obstacle] = [
     Sphere([0.45, 0.25, 0.30], 0.1, name="ball"),

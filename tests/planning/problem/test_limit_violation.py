@@ -9,7 +9,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import closeness, excess_along, worst_sentence
 from hovi.planning.problem.limits import as_limits, unit_of
 from hovi.planning.search.planner import plan
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 

@@ -15,8 +15,9 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError, ModelError, SchemeError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.robot.robot import Robot, load_robot
-from hovi.scene.lagrangian import CasadiLagrangian
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
+from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import CLASSIC, by_name, galerkin
 from samples.manifold_robots import half_turning

@@ -16,7 +16,8 @@ from hovi.planning.refinement.certificate import certify, cost_integral, momentu
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from samples.manifold_robots import with_arm
 from samples.paper_arm import HANG, REACH_Q, REACH_V, effort

@@ -22,7 +22,8 @@ from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
 from hovi.planning.solver.solver import Solution, solve
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
 from samples.manifold_robots import BASES, with_arm

@@ -20,7 +20,7 @@ from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from samples.paper_arm import HANG, REACH_Q, REACH_V

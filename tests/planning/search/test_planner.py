@@ -21,7 +21,8 @@ from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
 from samples.manifold_robots import half_turning

@@ -23,7 +23,8 @@ from hovi.planning.solver.status import Status
 from hovi.planning.solver.warm_start import follow
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from oracles.finite_differences import derivative

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from hovi.errors import InputError
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
 from samples.manifold_robots import configurations, with_arm
 

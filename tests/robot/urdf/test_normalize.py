@@ -10,7 +10,7 @@ import pytest
 
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_names, example_robot
-from hovi.robot.robot import load_robot
+from hovi.robot.loading import load_robot
 from hovi.robot.urdf.normalize import plain_urdf
 
 ARM_FILE = Path(__file__).parents[3] / "models" / "two_link.urdf"

@@ -49,6 +49,6 @@ def _scene(scene: str) -> str:
 
 
 def _robot(robot: str, mimic: bool, free_flyer: bool) -> str:
-    from hovi.robot.robot import load_robot
+    from hovi.robot.loading import load_robot
 
     return load_robot(robot, mimic=mimic, free_flyer=free_flyer or None).describe()

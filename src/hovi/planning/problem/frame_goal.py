@@ -16,7 +16,6 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
-from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
 
 Array = npt.NDArray[np.float64]
@@ -155,10 +154,6 @@ class FrameCondition(Condition):
         q, v, a, t = (ca.SX.sym(name, size) for name, size in sizes.items())
         return (q, v, a, t), self._equations(q)
 
-    @property
-    def _space(self) -> ConfigurationSpace | None:
-        return None if self.robot.vector_joints else self.robot.space
-
     def _equations(self, q: ca.SX) -> ca.SX:
         R, p = self._placement(q)
         rows = []
@@ -177,14 +172,14 @@ class FrameCondition(Condition):
     @cached_property
     def _linear(self) -> ca.Function:
         symbols, c = self._symbols
-        J = jacobian(c, symbols, self._space)[:, : self.robot.nv]
+        J = jacobian(c, symbols, self.robot.curved_space)[:, : self.robot.nv]
         return ca.Function("c", [symbols[0]], [c, J])
 
     @cached_property
     def _curvature(self) -> ca.Function:
         symbols, c = self._symbols
         n, weights = self.robot.nv, ca.SX.sym("weights", c.shape[0])
-        H = hessian(ca.dot(weights, c), symbols, self._space)[0][:n, :n]
+        H = hessian(ca.dot(weights, c), symbols, self.robot.curved_space)[0][:n, :n]
         return ca.Function("ddc", [symbols[0], weights], [H])
 
 

@@ -27,7 +27,7 @@ from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.model import check_mass_matrix
 from hovi.robot.robot import Robot
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene, require_known_joints
 from hovi.schemes import require_regular
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.schemes.polynomials import legendre
 
 Array = npt.NDArray[np.float64]

@@ -25,7 +25,8 @@ from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
-from hovi.scene.lagrangian import EffortLagrangian, PointTerms
+from hovi.scene.effort_lagrangian import EffortLagrangian
+from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]
 LinearAlgebra = Literal["band", "tree"]

@@ -13,7 +13,7 @@ from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 
 TORQUE_PENALTY = 10.0
 """First penalty of a passive joint's torque, relative to the mean weight of the others."""

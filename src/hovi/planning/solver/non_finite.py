@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.scene.lagrangian import EffortLagrangian
+from hovi.scene.effort_lagrangian import EffortLagrangian
 
 Array = npt.NDArray[np.float64]
 

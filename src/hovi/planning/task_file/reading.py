@@ -19,7 +19,8 @@ from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.obstacle_tables import read_clearance
 from hovi.planning.task_file.schema import TaskTable
 from hovi.planning.task_file.task import Task
-from hovi.robot.robot import Robot, load_robot
+from hovi.robot.loading import load_robot
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.bounded_file import require_file

@@ -241,3 +241,16 @@ def _merged(parts: Sequence[int | str]) -> list[int | str]:
 
 def _sizes(group: Group) -> tuple[int, int]:
     return group.nq, group.nv
+
+
+def bracket(space: ConfigurationSpace, x: Array, y: Array) -> Array:
+    """[x, y] of tangent vectors in the bodies' axes, (M, nv) each: zero where they add."""
+    result = np.zeros_like(x)
+    for factor in space.curved:
+        i, places = factor.v, list(factor.group.places)
+        a, b, c = np.zeros((3, len(x), 6))
+        a[:, places], b[:, places] = x[:, i], y[:, i]
+        c[:, :3] = np.cross(a[:, 3:], b[:, :3]) + np.cross(a[:, :3], b[:, 3:])
+        c[:, 3:] = np.cross(a[:, 3:], b[:, 3:])
+        result[:, i] = c[:, places]
+    return result

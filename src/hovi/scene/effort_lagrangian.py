@@ -1,0 +1,155 @@
+"""The effort 1/2 |tau|^2 of a scene as a Lagrangian on T^(2)Q."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.dynamics.torque_model import TorqueModel
+from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.scene.cost_terms import EffortTerm, PotentialTerm
+from hovi.scene.lagrangian import Lagrangian, PointTerms
+from hovi.scene.squared_effort import expand_squares, weighted_square
+
+Array = npt.NDArray[np.float64]
+
+
+class EffortScene(Protocol):
+    """Where an effort Lagrangian comes from: the robot whose torques it squares."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+
+@dataclass(frozen=True, eq=False)
+class EffortLagrangian(Lagrangian):
+    """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v): the cost of control as a Lagrangian on T^(2)Q.
+
+    [ColomboFerraroMartin2016, section 5]
+
+    torques: tau(q, v, a, t).
+    scene: the scene that it belongs to.
+    potential: (q, v, a, t) -> V, gradient (3 nv), Hessian (3 nv, 3 nv), or None where V = 0.
+    weight: R, shape (nv,).
+    effort_term: phi, or None where it is zero.
+    """
+
+    torques: TorqueModel
+    scene: EffortScene
+    weight: Array
+    potential: PotentialTerm | None = None
+    effort_term: EffortTerm | None = None
+    order: int = 2
+
+    @property
+    def nq(self) -> int:
+        """Numbers in a configuration."""
+        return self.scene.robot.nq
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self.scene.robot.nv
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The robot's configuration space; None where configurations are vectors."""
+        return self.scene.robot.curved_space
+
+    def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> tuple[Array, Array]:
+        """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
+        return self.torques.linearize(q, v, a, t)
+
+    def hessian(
+        self, q: Array, v: Array, a: Array, t: Array | None, R: Array, curvature: Array
+    ) -> Array:
+        """J^T diag(R) J + sum_i curvature_i d2 tau_i, shape (P, 3 nv, 3 nv)."""
+        return self.torques.expand(q, v, a, t, R, curvature)[2]
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """1/2 tau^T diag(R) tau + V + phi, shape (P,)."""
+        tau = self.torques.torque(jet[0], jet[1], jet[2], t)
+        value = 0.5 * np.vecdot(tau, self.weight * tau)
+        if self.potential is not None:
+            value = value + self.potential.value(*jet, t=t)
+        if self.effort_term is not None:
+            value = value + self.effort_term.value(tau, jet[1])
+        return np.asarray(value)
+
+    def integral(
+        self, tau: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
+    ) -> float:
+        """sum_p w_p L at points where the torque is known; weights: w, shape (P,)."""
+        total = weighted_square(tau, self.weight, weights)
+        if self.potential is not None:
+            total += float(weights @ self.potential.value(*jet, t=t))
+        if self.effort_term is not None:
+            total += float(weights @ self.effort_term.value(tau, jet[1]))
+        return total
+
+    def gradient(
+        self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
+    ) -> Array:
+        """The gradient J^T R tau + dV + dphi, shape (P, 3, nv).
+
+        terms: what limits and multipliers add.
+        """
+        q, v, a = jet
+        tau, J = self.torques.linearize(q, v, a, t)
+        force = None if terms is None else terms.effort_gradient
+        _, gradient = expand_squares(tau, self.weight, J, force)
+        if self.effort_term is not None:
+            gradient = gradient + self.effort_term.expand(tau, v, J)[1]
+        if terms is not None:
+            gradient += terms.jet_gradient
+        if self.potential is not None:
+            gradient = gradient + self.potential.expand(q, v, a, t=t)[1]
+        return np.asarray(gradient.reshape(len(tau), 3, self.nv))
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """Value, gradient and Hessian: see Lagrangian.evaluate."""
+        value, gradient, hessian, _, _ = self.expand(*jet, t=t)
+        points, n = len(value), self.nv
+        return value, gradient.reshape(points, 3, n), hessian.reshape(points, 3, n, 3, n)
+
+    def expand(
+        self,
+        *jet: Array,
+        t: Array | None = None,
+        multiplier: Array | None = None,
+        terms: PointTerms | None = None,
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """As evaluate, with the curvature of tau weighted by `multiplier` instead of R tau.
+
+        multiplier: shape (P, nv). Weighted with the torque that the last step predicted
+            (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
+        terms: what limits add.
+        Returns value (P,), gradient (P, 3 nv), hessian (P, 3 nv, 3 nv), tau, J.
+        """
+        q, v, a = jet
+        R = self.weight if terms is None else self.weight + terms.effort_weight
+        if self.effort_term is not None:
+            tau = self.torques.torque(q, v, a, t)
+            given = self.weight * tau if multiplier is None else multiplier
+            multiplier = given + self.effort_term.slope(tau, v)
+        tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
+        force = None if terms is None else terms.effort_gradient
+        value, gradient = expand_squares(tau, self.weight, J, force)
+        if terms is not None:
+            gradient += terms.jet_gradient
+            diagonal = np.arange(hessian.shape[1])
+            hessian[:, diagonal, diagonal] += terms.jet_weight
+            if terms.configuration_weight is not None:
+                hessian[:, : self.nv, : self.nv] += terms.configuration_weight
+        if self.potential is not None:
+            V, dV, ddV = self.potential.expand(q, v, a, t=t)
+            value, gradient, hessian = value + V, gradient + dV, hessian + ddV
+        if self.effort_term is not None:
+            phi, dphi, ddphi = self.effort_term.expand(tau, v, J)
+            value, gradient, hessian = value + phi, gradient + dphi, hessian + ddphi
+        return value, gradient, hessian, tau, J
