@@ -20,9 +20,9 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Armature, Gravity
 from hovi.errors import ChartError, InputError, SceneError
-from hovi.planning.problem.joint_condition import JointCondition
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.certificate import certify
 from hovi.planning.search.planner import plan

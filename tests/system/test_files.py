@@ -13,7 +13,7 @@ from hovi.errors import HoviError
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.loading import load_robot
 from hovi.robot.srdf import read_srdf_file
-from hovi.system.bounded_file import require_file
+from hovi.system.files import require_file
 
 READERS: tuple[Callable[[Path], object], ...] = (
     load_robot,

@@ -20,7 +20,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing import plotting
-from hovi.viewing.aligned_axes import align_zeros
+from hovi.viewing.figures import align_zeros
 from samples.cubic_motion import cubic_motion
 
 Picture = Callable[[Trajectory, Path], None]

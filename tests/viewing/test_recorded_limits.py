@@ -11,12 +11,12 @@ import pinocchio as pin
 import pytest
 
 import hovi
-from hovi.cli.reports.nearest_approach import least_distance
+from hovi.cli.reports.limit_margins import least_distance
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.obstacles import Box, Capsule, Sphere
-from hovi.viewing.imposed_clearance import imposed_clearance, with_obstacles
 from hovi.viewing.plotting import motion_figure
+from hovi.viewing.recorded_limits import imposed_clearance, with_obstacles
 
 BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
 OBSTACLES = [

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.run import Run
-from hovi.system.json_numbers import finite
+from hovi.system.files import finite
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 COLUMNS = (

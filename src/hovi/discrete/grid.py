@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError
-from hovi.schemes import Scheme
+from hovi.schemes import Scheme, galerkin
+from hovi.schemes.galerkin_table import MAX_INNER_MODES
 
 Array = npt.NDArray[np.float64]
 
@@ -70,6 +71,19 @@ class Grid:
         parts = np.where(chosen, 2, 1)
         schemes = [s for s, count in zip(self.schemes, parts, strict=True) for _ in range(count)]
         return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
+
+    def enriched(self, modes: int) -> Grid:
+        """The same intervals, each with so many inner modes more than its scheme has.
+
+        Raises InputError where an interval has too many already.
+        """
+        if self.inner_modes + modes > MAX_INNER_MODES:
+            raise InputError(
+                f"errors are estimated for schemes of up to {MAX_INNER_MODES - modes} inner "
+                f"modes, not {self.inner_modes}; use more intervals instead."
+            )
+        tables = {id(s): galerkin(s.inner_modes + modes) for s in set(self.schemes)}
+        return Grid(self.steps, tuple(tables[id(s)] for s in self.schemes))
 
     @property
     def intervals(self) -> int:

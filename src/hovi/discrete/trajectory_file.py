@@ -21,8 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import TrajectoryFileError
-from hovi.system.bounded_file import require_file
-from hovi.system.files import reason, whole_file
+from hovi.system.files import reason, require_file, whole_file
 
 Array = npt.NDArray[np.float64]
 

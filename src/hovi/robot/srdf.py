@@ -20,8 +20,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError
-from hovi.system.bounded_file import require_file
-from hovi.system.files import reason
+from hovi.system.files import reason, require_file
 
 Array = npt.NDArray[np.float64]
 

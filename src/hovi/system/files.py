@@ -1,13 +1,19 @@
-"""Files written whole or not at all: bytes without a name first, then one atomic rename."""
+"""Files read and written safely.
+
+Written whole or not at all: bytes without a name first, then one atomic rename. Read only if they
+are regular files of a sane size: a pipe would never end, nor would /dev/zero.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import secrets
+import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 _DESCRIPTORS = Path("/proc/self/fd")
 
@@ -62,3 +68,33 @@ def _give_name(stream: BinaryIO, name: Path) -> None:
 def reason(error: OSError) -> str:
     """Why the operating system refused, without its number and without the path."""
     return error.strerror or str(error)
+
+
+def require_file(path: str | os.PathLike[str], most_bytes: int) -> None:
+    """Raise OSError, its reason in words, unless `path` is a regular file that is not too large.
+
+    most_bytes: size up to which a file is read.
+    """
+    try:
+        found = Path(path).stat()
+    except ValueError as error:  # a NUL in the name
+        raise FileNotFoundError("no such file") from error
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError("that is a folder")
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError("it is not a regular file")
+    if found.st_size > most_bytes:
+        raise OSError(
+            f"it has {found.st_size / 1e6:.1f} MB, and at most {most_bytes / 1e6:.1f} MB are read"
+        )
+
+
+def finite(value: Any) -> Any:
+    """The value, with null for every number in it that is not finite."""
+    if isinstance(value, dict):
+        return {key: finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -12,7 +12,7 @@ from hovi.errors import HoviError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.clearance.violation import distances_over_time
-from hovi.viewing.imposed_clearance import imposed_clearance
+from hovi.viewing.recorded_limits import imposed_clearance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,14 +1,19 @@
-"""Figures as files: whole or not at all, and the same bytes for the same figure."""
+"""Figures: their files, whole or not at all and with the same bytes each time, and their axes."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
 from hovi.errors import DisplayError
 from hovi.system.files import reason, whole_file
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 _DPI = 150
 _METADATA: dict[str, dict[str, str | None]] = {
@@ -31,3 +36,19 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
             figure.savefig(stream, format=suffix[1:], dpi=_DPI, metadata=_METADATA[suffix])
     except OSError as error:
         raise DisplayError(f"cannot write the picture {str(path)!r}: {reason(error)}.") from error
+
+
+def align_zeros(one: Axes, other: Axes) -> None:
+    """Extend the limits of both until zero has the same height in both.
+
+    With limits -d <= 0 <= u of each, in shares of their extent d + u, both get the larger d and the
+    larger u. Left alone where a range is farther from zero than it is wide: zero would squash it.
+    """
+    limits = [ax.get_ylim() for ax in (one, other)]
+    if any(max(low, -high) > high - low for low, high in limits):
+        return
+    spans = [(max(-low, 0.0), max(high, 0.0)) for low, high in limits]
+    below = max(d / (d + u) for d, u in spans)
+    above = max(u / (d + u) for d, u in spans)
+    for ax, (d, u) in zip((one, other), spans, strict=True):
+        ax.set_ylim(-below * (d + u), above * (d + u))

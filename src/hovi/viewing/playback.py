@@ -23,9 +23,9 @@ from hovi.errors import DisplayError, expect
 from hovi.robot.robot import Robot
 from hovi.system.files import reason, whole_file
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights, node_name
-from hovi.viewing.imposed_clearance import with_obstacles
 from hovi.viewing.meshcat_page import Page
 from hovi.viewing.meshcat_server import ServedPage
+from hovi.viewing.recorded_limits import with_obstacles
 from hovi.viewing.skeleton import skeleton
 
 with warnings.catch_warnings():

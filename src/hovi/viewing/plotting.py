@@ -29,9 +29,8 @@ from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
-from hovi.viewing.aligned_axes import align_zeros
 from hovi.viewing.distance_panel import draw_distances, kept_distances
-from hovi.viewing.figures import write_figure
+from hovi.viewing.figures import align_zeros, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
 from hovi.viewing.recorded_limits import at_limit, imposed_limits
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped

@@ -1,18 +1,21 @@
-"""Which limits a motion was planned under, and when it stands at one of them."""
+"""The limits and obstacles that a motion file records, and when a motion stands at a limit."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import InputError
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.limits import Limits
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+_OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: no robot's, dark on the gray
 AT_LIMIT = 1e-3
 """Share of its range within which an output counts as standing at its bound."""
 
@@ -41,3 +44,31 @@ def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> Mask:
         q = robot.space.coordinates(q)
     outputs = np.stack([q, motion.v, motion.a, motion.tau], axis=1)
     return np.asarray(limits.excess(outputs) >= -AT_LIMIT)
+
+
+def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
+    """The clearance that the metadata of a motion remembers; None where there is none.
+
+    Metadata may come from a file: what does not describe a clearance counts as none.
+    """
+    data = trajectory.metadata.get("clearance")
+    if not isinstance(data, dict):
+        return None
+    try:
+        return Clearance.from_dict(data)
+    except (InputError, AttributeError, KeyError, TypeError, ValueError):
+        return None
+
+
+def with_obstacles(visual: pin.GeometryModel, trajectory: Trajectory) -> pin.GeometryModel:
+    """The drawn objects of a robot, and the obstacles of its motion."""
+    clearance = imposed_clearance(trajectory)
+    if clearance is None or not clearance.obstacles:
+        return visual
+    both = visual.copy()
+    for number, each in enumerate(clearance.obstacles):
+        name = f"obstacle {number}"
+        item = pin.GeometryObject(name, 0, 0, each.placement(), each.shape())
+        item.meshColor = _OBSTACLE_COLOR
+        both.addGeometryObject(item)
+    return both

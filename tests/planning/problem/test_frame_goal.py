@@ -10,8 +10,7 @@ import hovi
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import inverse_kinematics
-from hovi.planning.problem.joint_condition import JointCondition
-from hovi.planning.problem.node_conditions import Condition
+from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.robot.robot import Robot
 from oracles.finite_differences import derivative
 

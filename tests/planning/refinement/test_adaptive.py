@@ -15,8 +15,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tolerance
 from hovi.planning.refinement.candidate import ROUNDING
-from hovi.planning.refinement.error_estimate import finer_than
-from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status

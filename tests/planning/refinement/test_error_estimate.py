@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.finer_grid import MORE_MODES, finer_grid
 from hovi.discrete.grid import Grid
 from hovi.discrete.motion_error import (
     MotionError,
@@ -19,7 +18,7 @@ from hovi.discrete.motion_error import (
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError
-from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
 from hovi.planning.solver.solver import Solution, solve
 from hovi.robot.loading import load_robot
@@ -227,4 +226,4 @@ def test_what_is_not_a_minimum_has_no_estimate(reach_reference: Solution) -> Non
 
 def test_schemes_with_no_room_for_more_modes_are_refused() -> None:
     with pytest.raises(InputError, match="up to 38 inner modes, not 40; use more intervals"):
-        finer_grid(Grid.uniform(1.0, 2, galerkin(40)))
+        Grid.uniform(1.0, 2, galerkin(40)).enriched(2)

@@ -12,7 +12,7 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.certificate import momentum_jump
-from hovi.planning.refinement.finer_solution import prolonged
+from hovi.planning.refinement.error_estimate import prolonged
 from hovi.planning.refinement.interpolated_efforts import carried_efforts
 from hovi.planning.refinement.nearby_minimum import NearbyMinimum, nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective

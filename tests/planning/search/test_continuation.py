@@ -13,7 +13,7 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits, no_limits
 from hovi.planning.search.continuation import climb, may_help
-from hovi.planning.search.multistart import Job
+from hovi.planning.search.job import Job
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve

@@ -16,8 +16,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
-from hovi.planning.search.free_duration import FreeDuration, SolveFor
-from hovi.planning.search.free_to_tolerance import free_to_tolerance
+from hovi.planning.search.free_duration import FreeDuration, SolveFor, free_to_tolerance
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status

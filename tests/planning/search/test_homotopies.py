@@ -12,15 +12,16 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits, no_limits
-from hovi.planning.search.easing import HeavierRotors, WeakerGravity
 from hovi.planning.search.homotopies import (
+    HeavierRotors,
+    WeakerGravity,
     finer_grids,
     growing_gravity,
     lighter_rotors,
     narrowing_limits,
     other_durations,
 )
-from hovi.planning.search.multistart import Job
+from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import solve
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

@@ -12,14 +12,8 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import no_limits
-from hovi.planning.search.multistart import (
-    SAME_COST,
-    Job,
-    Pool,
-    default_processes,
-    distinct,
-    explore,
-)
+from hovi.planning.search.job import Job
+from hovi.planning.search.multistart import SAME_COST, Pool, default_processes, distinct, explore
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status

@@ -1,4 +1,4 @@
-"""How close each joint of a motion comes to each of its limits."""
+"""How close a motion comes to its limits and to what it was planned to keep away from."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.violation import approach_along
 from hovi.planning.problem.limit_violation import closeness as closeness_along
 from hovi.planning.problem.limits import KINDS, Limits
+from hovi.viewing.distance_panel import kept_distances
 from hovi.viewing.recorded_limits import AT_LIMIT, imposed_limits
 
 Array = npt.NDArray[np.float64]
@@ -66,3 +68,12 @@ def closeness(trajectory: Trajectory) -> Closeness | None:
     if limits is None:
         return None
     return Closeness(trajectory.coordinate_names, closeness_along(trajectory, limits), limits)
+
+
+def least_distance(trajectory: Trajectory) -> float | None:
+    """The least distance of any pair, in [m]; None where nothing was to be kept away from."""
+    kept = kept_distances(trajectory)
+    if kept is None:
+        return None
+    clearance, distances = kept
+    return float(approach_along(trajectory, distances, clearance.margin).distance.min())

@@ -14,14 +14,13 @@ from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_in_words, steps_in_words
 from hovi.cli.reports.certificate import certificate_json, certificate_lines, coarse_grid
-from hovi.cli.reports.limit_margins import Closeness, closeness
-from hovi.cli.reports.nearest_approach import least_distance
+from hovi.cli.reports.limit_margins import Closeness, closeness, least_distance
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
-from hovi.system.json_numbers import finite
+from hovi.system.files import finite
 
 
 def as_json(

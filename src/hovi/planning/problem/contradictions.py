@@ -8,8 +8,8 @@ import numpy.typing as npt
 from hovi.planning.clearance.violation import in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
-from hovi.planning.problem.joint_condition import JointCondition
 from hovi.planning.problem.limits import KINDS, NAMES, Limits, unit_of
+from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.robot import Robot
 

@@ -12,9 +12,8 @@ from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import Reached, inverse_kinematics
-from hovi.planning.problem.joint_condition import JointCondition
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.node_conditions import Condition
+from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
@@ -48,3 +51,46 @@ class NodeCondition:
 
     node: int
     condition: Condition
+
+
+@dataclass(frozen=True, eq=False)
+class JointCondition(Condition):
+    """q (-) target = 0 and v = velocity, in the components that are held.
+
+    target: configuration, shape (nq,). velocity: shape (nv,). held: which components of (q, v)
+    count, shape (2, nv).
+    """
+
+    robot: Robot
+    target: Array
+    velocity: Array
+    held: npt.NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """Number of held components."""
+        return int(self.held.sum())
+
+    def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """The held components of (q (-) target, v - velocity), and rows of its Jacobian."""
+        n = self.robot.nv
+        J = np.eye(2 * n).reshape(2, n, 2, n)
+        if not self.robot.vector_joints:
+            J[0, :, 0] = pin.dDifference(self.robot.model, self.target, q, pin.ARG1)
+        return self._missed(q, v)[self.held], J[self.held]
+
+    def curvature(self, q: Array, v: Array, weights: Array) -> Array:
+        """Zero: the condition is linear, or its curvature vanishes where it is met."""
+        n = len(v)
+        return np.zeros((2, n, 2, n))
+
+    def describe(self, q: Array, v: Array) -> str:
+        """The joint that misses most."""
+        missed = np.abs(self._missed(q, v)) * self.held
+        row, i = np.unravel_index(int(np.argmax(missed)), missed.shape)
+        kind = ("position", "velocity")[row]
+        joint = self.robot.coordinate_names[i]
+        return f"the {kind} of joint {joint!r} misses it by {missed[row, i]:.3g}"
+
+    def _missed(self, q: Array, v: Array) -> Array:
+        return np.stack([self.robot.difference(self.target, q), v - self.velocity])

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.finer_grid import finer_grid
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, path_on_grid
 from hovi.discrete.state import State
@@ -33,6 +32,10 @@ from hovi.schemes import require_regular
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
+
+MORE_MODES = 2
+"""Inner modes that the problem by which errors are estimated has more: with one more the costs of
+both may be off by as much to the same side, and their difference would say nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +122,7 @@ class TrajectoryProblem:
     @cached_property
     def finer(self) -> TrajectoryProblem:
         """The same problem with more inner modes, by which errors are estimated."""
-        return self.on(finer_grid(self.grid))
+        return self.on(self.grid.enriched(MORE_MODES))
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
         """The same problem between other states, with everything that was built for this one."""

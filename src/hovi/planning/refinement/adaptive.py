@@ -15,8 +15,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate, least_error
-from hovi.planning.refinement.error_estimate import estimate_against
-from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.interpolated_efforts import carried_efforts
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import moved_to, next_grid

@@ -14,8 +14,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import TOLERANCE
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity, Tolerance
-from hovi.planning.refinement.error_estimate import estimate_against, finer_than
-from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against, finer_than
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.solver.solver import Solution
 

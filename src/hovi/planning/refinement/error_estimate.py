@@ -1,11 +1,34 @@
-"""The error of a solution, from a finer solution next to it."""
+"""The error of a solution, from a finer solution next to it.
+
+The finer solution is on the same grid with two more inner modes per interval. Under limits it is on
+the grid with every interval halved: where a limit begins to bind the motion has a kink, and more
+inner modes alone would show little of the error that it makes.
+
+Prolonged to the finer grid a solution is already near: one or two Newton steps lead to the finer
+one. On the way the Hessian of the first step tells what each interval would gain alone.
+"""
 
 from __future__ import annotations
 
-from hovi.discrete.motion_error import MotionError, deviation
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import Expansion
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import stretched
+from hovi.discrete.motion_error import MotionError, deviation, places
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.refinement.finer_solution import FinerSolution, finer_solution
-from hovi.planning.solver.solver import Solution
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.refinement.interpolated_efforts import carried_efforts
+from hovi.planning.refinement.nearby_minimum import nearby_minimum
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import Solution, solve
+
+Array = npt.NDArray[np.float64]
 
 
 def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
@@ -37,3 +60,100 @@ def finer_than(solution: Solution) -> FinerSolution | None:
     if not solution.success:
         raise InputError(f"errors of minima are estimated, and this ended in {solution.status}.")
     return finer_solution(problem, solution.trajectory.path)
+
+
+@dataclass(frozen=True, eq=False)
+class FinerSolution:
+    """A solution of a problem on a finer grid.
+
+    problem: on the finer grid; its intervals may be fewer or more where limits split them.
+    path: its solution, up to a small share of its distance from the coarser one. cost: its
+        discrete action. known: that of the coarser solution.
+    gains: L_d of every interval of the coarser solution less what it would be with the finer
+        interval's modes between the same end data, shape (N,). Their sum is the difference of
+        costs to first order: what an interval contributes to the error.
+    finish: gives the finer solution in full; None where that fails.
+    """
+
+    problem: TrajectoryProblem
+    path: DiscretePath
+    cost: float
+    known: float
+    gains: Array
+    finish: Callable[[], Solution | None]
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion, for sampling: without its momenta."""
+        return motion(self.problem, self.path)
+
+
+def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
+    """The finer solution next to a solution of a problem; None where none was found nearby."""
+    if problem.limited:
+        halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
+        curve = stretched(motion(problem, path), problem.grid.duration)
+        return _solved(halves, halves.path(curve), problem, path)
+    fine = problem.finer
+    start = prolonged(path, fine.grid)
+    if problem.constrained:
+        return _solved(fine, start, problem, path)
+    values = problem.ld.values(path)
+    objective, known = ActionObjective(fine), float(np.sum(values))
+    efforts = carried_efforts(problem.ld, path, fine.ld)
+    model = objective.model_with(start, efforts, None)
+    gains = _gains(objective.expansion, values)
+    found = nearby_minimum(objective, start, model, known)
+    if found is not None:
+        return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
+    solution = solve(fine, start)
+    if not solution.success:
+        return None
+    path, cost = solution.trajectory.path, solution.cost
+    return FinerSolution(fine, path, cost, known, gains, lambda: solution)
+
+
+def _solved(
+    fine: TrajectoryProblem, start: DiscretePath, problem: TrajectoryProblem, path: DiscretePath
+) -> FinerSolution | None:
+    """By the optimiser, which may split intervals for limits.
+
+    Gains are then half the integral of the squared difference of the torques.
+    """
+    solution = solve(fine, start)
+    if not solution.success or solution.problem is None:
+        return None
+    coarse, finer = motion(problem, path), solution.trajectory
+    k, s = places(coarse)
+    t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, finer.duration)
+    squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
+    gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
+    known, cost = problem.ld.action(path), solution.cost
+    return FinerSolution(solution.problem, finer.path, cost, known, gains, lambda: solution)
+
+
+def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
+    """A path as a trajectory, without its momenta, for sampling."""
+    momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+    return Trajectory(problem.grid, path, momenta, problem.scene)
+
+
+def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
+    """The same curve on a grid of the same intervals with at least as many inner modes."""
+    N, r, n = path.inner.shape
+    inner = np.zeros((N, fine.inner_modes, n))
+    inner[:, :r] = path.inner
+    return DiscretePath(path.q, path.v, path.z, inner)
+
+
+def _gains(expansion: Expansion, values: Array) -> Array:
+    """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
+    N, m, n = expansion.gradient.shape
+    size = (m - 4) * n
+    g = expansion.gradient[:, 4:].reshape(N, size, 1)
+    H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, size, size)
+    # modes that an interval does not have are rows of zeros
+    absent = np.asarray(~H.any(axis=2))
+    H = H + absent[:, :, None] * np.eye(size)
+    fall = 0.5 * np.sum(g * np.linalg.solve(H, g), axis=(1, 2))
+    return np.asarray(values - expansion.values + fall)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.finer_grid import MORE_MODES, finer_grid
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
-from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
-from hovi.planning.refinement.error_estimate import estimate_against
-from hovi.planning.refinement.finer_solution import FinerSolution
+from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import Demand, decay, refined
 
 Array = npt.NDArray[np.float64]
@@ -36,7 +34,7 @@ def next_grid(candidate: Candidate) -> Grid:
     if same_steps and all(demand.left(rho**MORE_MODES) <= HOPED for demand in demands):
         return finer.problem.grid
     grid = refined(problem.grid, rho, demands, problem.robot.nv)
-    return finer_grid(grid) if _same(grid, problem.grid) else grid
+    return grid.enriched(MORE_MODES) if _same(grid, problem.grid) else grid
 
 
 def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:

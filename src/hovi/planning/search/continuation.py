@@ -17,7 +17,7 @@ from hovi.planning.search.homotopies import (
     narrowing_limits,
     other_durations,
 )
-from hovi.planning.search.multistart import Job, Progress
+from hovi.planning.search.job import Job, Progress
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.system.interruption import remember

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,11 +20,16 @@ from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits
-from hovi.planning.search.easing import HeavierRotors, WeakerGravity
-from hovi.planning.search.multistart import Job
+from hovi.planning.search.job import Job
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+    from hovi.robot.robot import Robot
+
 
 HEAVIEST = 10.0
 """First rotors, over the largest inertia that a joint of the robot moves."""
@@ -156,3 +161,43 @@ def _passed(state: Goal, share: float) -> Goal:
     if isinstance(state, FrameGoal) or state.v is None:
         return state
     return dataclasses.replace(state, v=np.asarray(state.v) / share)
+
+
+@dataclass(frozen=True)
+class HeavierRotors(Effect):
+    """The same inertia on every joint, beside what the joints have: M(q) + inertia * 1.
+
+    With much of it the least effort is nearly that of a cubic spline, which has one minimum.
+
+    inertia: in [kg m^2], or [kg] at sliding joints.
+    """
+
+    inertia: float
+    key: ClassVar[str] = "heavier_rotors"
+
+    def configure(self, model: pin.Model, robot: Robot) -> None:
+        """Rotors are simulated by Pinocchio itself."""
+        model.armature = model.armature + self.inertia
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return f"{self.inertia:.3g} kg m^2 or kg on every joint, to make planning easier"
+
+
+@dataclass(frozen=True)
+class WeakerGravity(Effect):
+    """A share of the scene's gravity.
+
+    share: from 0 to 1.
+    """
+
+    share: float
+    key: ClassVar[str] = "weaker_gravity"
+
+    def configure(self, model: pin.Model, robot: Robot) -> None:
+        """Gravity is simulated by Pinocchio itself."""
+        model.gravity.linear = self.share * model.gravity.linear
+
+    def describe(self) -> str:
+        """One line for the account of a scene."""
+        return f"{100 * self.share:.0f} % of gravity, to make planning easier"

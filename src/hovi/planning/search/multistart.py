@@ -11,30 +11,22 @@ import dataclasses
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from multiprocessing.resource_tracker import ensure_running
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched, with_bump, with_turns
-from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
-from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via
-from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.job import Job, Progress
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
-from hovi.scene.scene import Scene
 from hovi.system.interruption import remember
 
 Array = npt.NDArray[np.float64]
@@ -45,41 +37,6 @@ ELITE = 4
 """Minima that a round perturbs."""
 SAME_COST = 1e-6
 """Relative difference in cost below which two minima count as one."""
-
-Progress = Callable[[str, float], None]
-"""What is told how far a search is: a line of text and the fraction done."""
-
-
-@dataclass(frozen=True, eq=False)
-class Job:
-    """What a worker process needs to solve a problem: it builds its own functions.
-
-    weight: R of the effort, one number per joint. max_iterations: of one solve.
-    """
-
-    scene: Scene
-    weight: tuple[float, ...]
-    grid: Grid
-    start: State
-    goal: State | FrameGoal
-    max_iterations: int
-    limits: Limits
-    via: tuple[Via, ...] = ()
-    clearance: Clearance | None = None
-
-    def problem(self) -> TrajectoryProblem:
-        """The trajectory problem, built once."""
-        return self._problem
-
-    @cached_property
-    def _problem(self) -> TrajectoryProblem:
-        lagrangian = self.scene.effort_lagrangian(self.weight)
-        ld = DiscreteLagrangian(lagrangian, self.grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, self.clearance)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Without the problem, so that worker processes build their own."""
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
 
 @dataclass(eq=False)

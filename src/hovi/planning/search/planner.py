@@ -30,16 +30,14 @@ from hovi.planning.refinement.inactive_limits import (
     without_limits,
 )
 from hovi.planning.search.continuation import climb, may_help
-from hovi.planning.search.free_duration import FreeDuration, SolveFor, solve_duration
-from hovi.planning.search.free_to_tolerance import free_to_tolerance
-from hovi.planning.search.multistart import (
-    Job,
-    Pool,
-    Progress,
-    default_processes,
-    distinct,
-    explore,
+from hovi.planning.search.free_duration import (
+    FreeDuration,
+    SolveFor,
+    free_to_tolerance,
+    solve_duration,
 )
+from hovi.planning.search.job import Job, Progress
+from hovi.planning.search.multistart import Pool, default_processes, distinct, explore
 from hovi.planning.solver.solver import Solution, guess_path, solve
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene

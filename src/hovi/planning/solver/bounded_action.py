@@ -16,8 +16,8 @@ from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.clearance_outputs import PointOutputs
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.point_outputs import PointOutputs
 from hovi.scene.lagrangian import PointTerms
 
 Array = npt.NDArray[np.float64]

@@ -1,13 +1,14 @@
-"""Distances as outputs that have to be 0 or more."""
+"""Outputs of q that have to be 0 or more at the quadrature points: distances, for instance."""
 
 from __future__ import annotations
+
+from abc import ABC, abstractmethod
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.clearance.clearance import SCALE
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.solver.point_outputs import PointOutputs
 
 Array = npt.NDArray[np.float64]
 
@@ -18,6 +19,27 @@ LEVELS = 1.0, 3.0
 """Excess over the margin at which distances begin to count less, and from which not at all."""
 NEGLIGIBLE = 1e-2
 """Share of the largest force below which the curvature of an output is left out."""
+
+
+class PointOutputs(ABC):
+    """y(q) >= 0 in units of its own scale, with its derivatives in the tangent space."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """K, the number of outputs at a point."""
+
+    @abstractmethod
+    def values(self, q: Array) -> Array:
+        """y at configurations (P, nq), shape (P, K)."""
+
+    @abstractmethod
+    def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
+        """Derivatives of y in q along `integrate`.
+
+        force: weights of the outputs' curvature, shape (P, K).
+        Returns y' (P, K, nv) and sum_k force_k y''_k (P, nv, nv).
+        """
 
 
 class ClearanceOutputs(PointOutputs):

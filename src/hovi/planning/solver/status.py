@@ -5,12 +5,15 @@ from __future__ import annotations
 from enum import StrEnum
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Outcome, Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limited_outcome import LimitedOutcome
 from hovi.planning.solver.non_finite import non_finite_sentence
+
+Array = npt.NDArray[np.float64]
 
 
 class Status(StrEnum):

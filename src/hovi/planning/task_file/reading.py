@@ -23,8 +23,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
-from hovi.system.bounded_file import require_file
-from hovi.system.files import reason
+from hovi.system.files import reason, require_file
 
 MAXIMUM_BYTES = 2_000_000
 MAXIMUM_DOTS = 1_000

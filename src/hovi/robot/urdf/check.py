@@ -16,8 +16,7 @@ from xml.parsers import expat
 
 from hovi.errors import ModelError
 from hovi.robot.urdf.rules import RULES
-from hovi.system.bounded_file import require_file
-from hovi.system.files import reason
+from hovi.system.files import reason, require_file
 
 MAXIMUM_BYTES = 32_000_000
 MAXIMUM_LINKS = 1_000
