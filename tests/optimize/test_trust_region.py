@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.optimize import trust_region
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective, Options, Outcome, Stop, minimize, solve_subproblem
 
@@ -269,7 +268,7 @@ def test_the_time_limit_returns_the_best_so_far(monkeypatch: pytest.MonkeyPatch)
             self.now += 1.0
             return self.now
 
-    monkeypatch.setattr(trust_region, "time", Clock())
+    monkeypatch.setattr("hovi.system.deadline.time", Clock())
     problem = objective(2, rosenbrock)
     outcome = minimize(problem, np.array([-1.2, 1.0]), Options(time_limit=4.5))
     assert outcome.stop is Stop.TIME_LIMIT

@@ -14,7 +14,6 @@ chapter 19]
 
 from __future__ import annotations
 
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -35,6 +34,7 @@ from hovi.optimize.trust_region import (
     next_shift,
     solve_subproblem,
 )
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import go_on, remember
 
 Array = npt.NDArray[np.float64]
@@ -191,12 +191,11 @@ class _Iteration(Generic[X]):
     def run(self) -> None:
         """Until stationary, or a budget ends it."""
         go_on()
-        started = time.monotonic()
-        limit = self.options.time_limit
+        deadline = Deadline(self.options.time_limit)
         model = self._model()
         while self.outcome.iterations < self.options.max_iterations:
             go_on()
-            if limit is not None and time.monotonic() - started > limit:
+            if deadline.passed:
                 self.outcome.stop = Stop.TIME_LIMIT
                 return
             step = self._step(model)

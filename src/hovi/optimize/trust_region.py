@@ -8,7 +8,6 @@ step, relative to the data. [ConnGouldToint2000, chapter 7; MoreSorensen1983]
 from __future__ import annotations
 
 import math
-import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import go_on, remember
 
 Array = npt.NDArray[np.float64]
@@ -169,12 +169,12 @@ def _iterate(
     report: Callable[[int, float], None] | None,
 ) -> None:
     go_on()
-    started = time.monotonic()
+    deadline = Deadline(options.time_limit)
     radius, shift = options.radius, 0.0
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
         go_on()
-        if options.time_limit is not None and time.monotonic() - started > options.time_limit:
+        if deadline.passed:
             outcome.stop = Stop.TIME_LIMIT
             return
         trial = solve_subproblem(model, radius, shift)

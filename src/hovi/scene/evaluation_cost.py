@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from hovi.effects import Effect
 from hovi.robot.robot import Robot
+from hovi.system.deadline import Deadline
 
 Array = npt.NDArray[np.float64]
 
@@ -122,14 +123,14 @@ def seconds_per_point(scenes: Sequence[AccountedScene]) -> list[float]:
     evaluations = [scene.evaluation() for scene in scenes]
     batches = [_points(scene.robot) for scene in scenes]
     shortest = [np.inf] * len(scenes)
-    ends = time.perf_counter() + SECONDS * len(scenes)
+    deadline = Deadline(SECONDS * len(scenes))
     for turn in itertools.count():
         for i, (evaluate, points) in enumerate(zip(evaluations, batches, strict=True)):
             evaluate(*points)  # what the one before it left in the caches does not count
             began = time.perf_counter()
             evaluate(*points)
             shortest[i] = min(shortest[i], time.perf_counter() - began)
-        if turn >= LEAST_TURNS and time.perf_counter() > ends:
+        if turn >= LEAST_TURNS and deadline.passed:
             break
     return [float(each) / POINTS for each in shortest]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
@@ -19,6 +18,7 @@ from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from hovi.system.deadline import Deadline
 from samples.paper_arm import HANG
 
 
@@ -81,7 +81,7 @@ def test_no_guess_is_no_solution(job: Job) -> None:
 
 
 def test_a_pool_past_its_deadline_gives_every_guess_back(job: Job, guesses: list) -> None:
-    found = Pool(job, 1, time.monotonic() - 1.0).solve_all(guesses)
+    found = Pool(job, 1, Deadline(-1.0)).solve_all(guesses)
     assert [solution.status for solution in found] == [Status.TIME_LIMIT] * len(guesses)
     for guess, solution in zip(guesses, found, strict=True):
         np.testing.assert_array_equal(solution.trajectory.q, guess.q)
@@ -182,7 +182,7 @@ def test_progress_rises_to_one(job: Job, guesses: list) -> None:
 
 
 def test_a_deadline_ends_the_search_with_what_was_found(job: Job, guesses: list) -> None:
-    late = Pool(job, 1, time.monotonic() - 1.0)
+    late = Pool(job, 1, Deadline(-1.0))
     found = explore(late, guesses[0], 1000, 0, silent)
     assert found.done == 1
     assert not found.interrupted

@@ -20,7 +20,7 @@ from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
-from hovi.system.deadline import TimeLeft
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import go_on, interruptible, remember
 
 Array = npt.NDArray[np.float64]
@@ -109,9 +109,9 @@ def study_effects(
     Raises SceneError when the task itself has no motion to compare with.
     """
     tell = progress or (lambda text, share: None)
-    left, began = TimeLeft(time_limit), time.perf_counter()
+    deadline, began = Deadline(time_limit), time.perf_counter()
     tell("planning the scene as it is", 0.0)
-    solution = _plan(task, task.scene, "cubic", task.starts, left())
+    solution = _plan(task, task.scene, "cubic", task.starts, deadline.seconds_left)
     if not solution.success:
         raise SceneError(
             f"the effects of {task.name!r} cannot be compared, as no motion was found to compare "
@@ -131,7 +131,7 @@ def study_effects(
     try:
         for i, (effect, changed, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
             tell(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
-            rest = left()
+            rest = deadline.seconds_left
             limit = patience if rest is None else rest / (len(tried) - i)
             if limit <= 0:
                 break

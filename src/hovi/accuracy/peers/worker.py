@@ -6,11 +6,11 @@ import json
 import os
 import selectors
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
 from hovi.errors import InputError, UnmeasurableError
+from hovi.system.deadline import Deadline
 
 _HERE = Path(__file__).parent
 _LAST_WORDS = 300
@@ -57,7 +57,7 @@ class Worker:
     def _line(self) -> bytes:
         """The next line that is an answer; tools print other things too."""
         assert self._process.stdout is not None
-        pipe, ends = self._process.stdout.fileno(), time.monotonic() + self._patience
+        pipe, deadline = self._process.stdout.fileno(), Deadline(self._patience)
         with selectors.DefaultSelector() as selector:
             selector.register(pipe, selectors.EVENT_READ)
             while True:
@@ -65,7 +65,7 @@ class Worker:
                 answers = [line for line in lines if line.startswith(b"{")]
                 if answers:
                     return answers[-1]
-                if not selector.select(max(ends - time.monotonic(), 0.0)):
+                if not selector.select(deadline.seconds_left):
                     break
                 piece = os.read(pipe, 1 << 20)
                 if not piece:

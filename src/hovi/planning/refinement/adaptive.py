@@ -23,6 +23,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import go_on, interrupted, interruptible, remember
 
 Told = Callable[[Round], None]
@@ -69,11 +70,14 @@ def solve_to_tolerance(
     time_limit: of everything, in [s]. told: called with every grid that was solved on.
     The solution's `accuracy` says what was reached, and why not more where it was not.
     """
-    began = time.monotonic()
+    deadline = Deadline(time_limit)
     first = solve(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
-    left = None if time_limit is None else max(time_limit - (time.monotonic() - began), 0.0)
     return refine_to_tolerance(
-        first, tolerance, max_iterations=max_iterations, time_limit=left, told=told
+        first,
+        tolerance,
+        max_iterations=max_iterations,
+        time_limit=deadline.seconds_left,
+        told=told,
     )
 
 
@@ -87,8 +91,7 @@ def refine_to_tolerance(
     told: Told | None = None,
 ) -> Solution:
     """The same motion within a tolerance; arguments as for `solve_to_tolerance`."""
-    deadline = None if time_limit is None else time.monotonic() + time_limit
-    return _Search(tolerance, max_iterations, deadline, told).run(solution)
+    return _Search(tolerance, max_iterations, Deadline(time_limit), told).run(solution)
 
 
 @dataclass(eq=False)
@@ -97,7 +100,7 @@ class _Search:
 
     tolerance: Tolerance
     max_iterations: int
-    deadline: float | None
+    deadline: Deadline
     told: Told | None
     rounds: list[Round] = field(default_factory=list)
     best: Candidate = field(init=False)
@@ -151,7 +154,7 @@ class _Search:
         solution = candidate.solution
         if not solution.success:
             return f"the last solve ended in {solution.status}"
-        if self.deadline is not None and time.monotonic() > self.deadline:
+        if self.deadline.passed:
             return "the time limit was reached"
         cost = self.tolerance.quantity is Quantity.COST
         assert solution.problem is not None
@@ -185,7 +188,7 @@ class _Search:
     def _solved(self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath) -> Solution:
         """By the optimiser."""
         steps = self.max_iterations
-        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        left = self.deadline.seconds_left
         return solve(problem, guess, max_iterations=steps, time_limit=left)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from dataclasses import dataclass, field
 
 from hovi.discrete.trajectory import Trajectory
@@ -20,6 +19,7 @@ from hovi.planning.search.homotopies import (
 from hovi.planning.search.job import Job, Progress
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import remember
 
 WAYS: dict[str, Way] = {
@@ -59,18 +59,18 @@ def climb(
     job: Job,
     failed: Solution,
     guess: str | Trajectory = "cubic",
-    deadline: float | None = None,
+    deadline: Deadline | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """A minimum that the direct way did not find, by the first continuation that leads to it.
 
     failed: what the direct way ended in. guess: for the first rung of every way.
-    deadline: by the monotonic clock, in [s]; none when None.
+    deadline: for all ways together; none when None.
     progress: told of every rung.
     Returns the minimum, or the best that there is; the message says which way was taken. nit
     counts the steps of the last solve alone.
     """
-    ladder = _Ladder(job, guess, deadline, progress)
+    ladder = _Ladder(job, guess, deadline or Deadline(), progress)
     best, tried = failed, []
     names = _order(job, failed)
     for i, name in enumerate(names):
@@ -109,7 +109,7 @@ class _Ladder:
 
     job: Job
     guess: str | Trajectory
-    deadline: float | None
+    deadline: Deadline
     progress: Progress | None
     name: str = field(default="", init=False)
     steps: int = field(default=0, init=False)
@@ -157,7 +157,7 @@ class _Ladder:
             first, last = self.shares
             text = f"continuation in {self.name}: {rung.name}"
             self.progress(text, first + share * (last - first))
-        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        left = self.deadline.seconds_left
         try:
             problem, most = rung.job.problem(), self.job.max_iterations
             solution = solve(problem, guess, max_iterations=most, time_limit=left)

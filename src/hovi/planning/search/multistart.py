@@ -10,9 +10,8 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.resource_tracker import ensure_running
 
 import numpy as np
@@ -27,6 +26,7 @@ from hovi.planning.search.job import Job, Progress
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import remember
 
 Array = npt.NDArray[np.float64]
@@ -43,16 +43,16 @@ SAME_COST = 1e-6
 class Pool:
     """Solves a job from many guesses, here or in worker processes.
 
-    deadline: by the monotonic clock, in [s]; none when None.
+    deadline: of all solves together.
     """
 
     job: Job
     processes: int
-    deadline: float | None = None
+    deadline: Deadline = field(default_factory=Deadline)
 
     def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
         """Solutions in the order of the guesses."""
-        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
+        left = self.deadline.seconds_left
         count = min(self.processes, len(guesses))
         if count <= 1:
             return _solve_chunk(self.job, guesses, left)
@@ -88,10 +88,10 @@ def _solve_chunk(
     job: Job, guesses: Sequence[DiscretePath], time_limit: float | None
 ) -> list[Solution]:
     problem = job.problem()
-    ends = None if time_limit is None else time.monotonic() + time_limit
+    deadline = Deadline(time_limit)
     solutions = []
     for guess in guesses:
-        left = None if ends is None else max(ends - time.monotonic(), 0.0)
+        left = deadline.seconds_left
         solution = solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
         solutions.append(dataclasses.replace(solution, problem=None))
         if solution.status is Status.INTERRUPTED:
@@ -145,7 +145,7 @@ def _ended(pool: Pool, solutions: Sequence[Solution]) -> bool:
     """Whether time is up, or a person asked for an end."""
     if any(solution.status is Status.INTERRUPTED for solution in solutions):
         return True
-    return pool.deadline is not None and time.monotonic() > pool.deadline
+    return pool.deadline.passed
 
 
 def _round(

@@ -43,6 +43,7 @@ from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import go_on, interrupted, interruptible, remember
 
 COARSE_INTERVALS = 60
@@ -154,10 +155,9 @@ def plan(
             raise InputError("turns are for a goal of the joints: give a State instead of a frame.")
         fine = dataclasses.replace(fine, goal=dataclasses.replace(fine.goal, turns=turns))
     fine = _with_room(fine, guess)
-    ends = None if time_limit is None else time.monotonic() + time_limit
     chatter = progress or _silent
     count = processes or default_processes()
-    search = _Search(fine, count, ends, chatter, free, wanted, continuation)
+    search = _Search(fine, count, Deadline(time_limit), chatter, free, wanted, continuation)
     problem = fine.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run(guess, starts, seed)
@@ -194,7 +194,7 @@ class _Search:
 
     fine: Job
     processes: int
-    deadline: float | None
+    deadline: Deadline
     progress: Progress
     free: FreeDuration | None = None
     tolerance: Tolerance | None = None
@@ -253,21 +253,19 @@ class _Search:
             wide = problem.ld.turns(best.trajectory.path) > np.pi
             if not wide.any():
                 break
-            left = None if self.deadline is None else self.deadline - time.monotonic()
-            if left is not None and left <= 0:
+            if self.deadline.passed:
                 break
             finer = dataclasses.replace(self.fine, grid=grid.halved(wide))
             halved = _with_room(finer, best.trajectory)
             most = self.fine.max_iterations
+            left = self.deadline.seconds_left
             best = solve(halved.problem(), best.trajectory, max_iterations=most, time_limit=left)
         return best
 
-    def _explore_until(self, job: Job) -> float | None:
+    def _explore_until(self, job: Job) -> Deadline:
         """The search's deadline, which leaves time for refining."""
-        if self.deadline is None or (job is self.fine and self.tolerance is None):
-            return self.deadline
-        now = time.monotonic()
-        return now + EXPLORING * (self.deadline - now)
+        whole = job is self.fine and self.tolerance is None
+        return self.deadline if whole else self.deadline.part(EXPLORING)
 
     def _coarse(self, guess: str | Trajectory) -> Job:
         grid = self.fine.grid
@@ -293,7 +291,7 @@ class _Search:
         """Minima to a tolerance, each on a grid of its own."""
         problem, refined = self.fine.problem(), []
         for i, solution in enumerate(found[:REFINED]):
-            late = self.deadline is not None and time.monotonic() > self.deadline
+            late = self.deadline.passed
             if i > 0 and (late or interrupted()):
                 break
             which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
@@ -311,24 +309,20 @@ class _Search:
         )
         better = None
         if far_from_limits(known):
-            free = refine(without_limits(known), time_limit=self._left())
+            free = refine(without_limits(known), time_limit=self.deadline.seconds_left)
             better = with_limits_again(free, known)
-        return refine(known, time_limit=self._left()) if better is None else better
+        return refine(known, time_limit=self.deadline.seconds_left) if better is None else better
 
     def _tell(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
         self.progress(text, 0.9)
-
-    def _left(self) -> float | None:
-        """Seconds left of the time limit; None where there is none."""
-        return None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
 
     def _freed(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
         """Every motion with the duration that is best for it, the cheapest first."""
 
         freed: list[Solution] = []
         for i, solution in enumerate(found):
-            late = self.deadline is not None and time.monotonic() > self.deadline
+            late = self.deadline.passed
             if freed and (late or interrupted()):
                 break
             which = f"{i + 1} of {len(found)} motions"
@@ -348,7 +342,7 @@ class _Search:
         def solve_for(T: float, guess: Trajectory) -> Solution:
             stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
             problem = dataclasses.replace(self.fine, grid=stretched).problem()
-            left = self._left()
+            left = self.deadline.seconds_left
             return solve(problem, guess, max_iterations=self.fine.max_iterations, time_limit=left)
 
         return solve_for

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -31,6 +30,7 @@ from hovi.planning.solver.clearance_outputs import CUSHION, ClearanceOutputs
 from hovi.planning.solver.limited_outcome import LimitedOutcome
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import PenalizedAction
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import remember
 
 Array = npt.NDArray[np.float64]
@@ -87,8 +87,7 @@ def solve_limited(
     if reason:
         value = problem.ld.action(path)
         return LimitedOutcome(problem, path, value, Stop.DIVERGED, 0, [], -1, reason=reason)
-    deadline = None if options.time_limit is None else time.monotonic() + options.time_limit
-    search = _Search(problem, limits, options, deadline, report, path)
+    search = _Search(problem, limits, options, Deadline(options.time_limit), report, path)
     try:
         return search.run(path)
     except KeyboardInterrupt:  # between two solves, each of which hears its own
@@ -103,7 +102,7 @@ class _Search:
     problem: TrajectoryProblem
     limits: Limits
     options: Options
-    deadline: float | None
+    deadline: Deadline
     report: Report | None
     guess: DiscretePath
     iterations: int = 0
@@ -367,8 +366,7 @@ class _Search:
         return outcome
 
     def _options(self) -> Options:
-        left = None if self.deadline is None else max(self.deadline - time.monotonic(), 0.0)
-        return dataclasses.replace(self.options, time_limit=left)
+        return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
 
     def _inertia(self, outcome: BoundedOutcome[DiscretePath]) -> int:
         """n_neg of the condensed system, which is positive definite at a minimum."""

@@ -33,7 +33,7 @@ from hovi.planning.solver.warm_start import follow
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
-from hovi.system.deadline import TimeLeft
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible, remember
 
 Report = Callable[[int, float], None]
@@ -268,12 +268,12 @@ def _with_equations(
         message = f"{problem.unreachable}."
         return _Answer(problem, path, value, Status.INFEASIBLE, message, 0, -1, [], None)
     history: list[Iteration] = []
-    time_left = TimeLeft(options.time_limit)
+    deadline = Deadline(options.time_limit)
 
     def round_(known: Multipliers, x: DiscretePath, decrease: float) -> Outcome[DiscretePath]:
         objective = ActionObjective(problem, multipliers=known)
         tolerance = max(decrease, options.decrease)
-        chosen = dataclasses.replace(options, decrease=tolerance, time_limit=time_left())
+        chosen = dataclasses.replace(options, decrease=tolerance, time_limit=deadline.seconds_left)
         outcome = minimize(objective, x, chosen, _shifted(report, len(history)))
         history.extend(outcome.history)
         return outcome
