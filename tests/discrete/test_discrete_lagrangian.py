@@ -239,7 +239,7 @@ def test_multipliers_predict_the_torque_after_a_step(arm_scene: Scene, coordinat
 
             def torque(e: Array, i: int = i, k: int = k, one: DiscreteLagrangian = one) -> Array:
                 moved = to_path(h[i], columns[i, :k] + e[0] * step[i, :k])
-                return one.expand(moved).torque[0][0]
+                return one.expand(moved).outputs[0][0]
 
             origin = np.zeros(1)
             slope = derivative(torque, origin, step=1e-4)[..., 0]
@@ -251,8 +251,8 @@ def test_multipliers_change_nothing_but_the_hessian(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     path = random_path(grid, 2)
     plain = ld.expand(path)
-    same = ld.expand(path, multipliers=[tau for tau, _ in plain.torque])
-    other = ld.expand(path, multipliers=[0 * tau for tau, _ in plain.torque])
+    same = ld.expand(path, multipliers=[tau for tau, _ in plain.outputs])
+    other = ld.expand(path, multipliers=[0 * tau for tau, _ in plain.outputs])
     assert_close(same.hessian, plain.hessian, 1e-14)
     assert np.abs(other.hessian - plain.hessian).max() > 1e-3
     for expansion in (same, other):

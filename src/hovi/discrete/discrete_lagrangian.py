@@ -6,6 +6,7 @@ differentiated or compiled again when the scheme, the step or the number of inte
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,9 +19,7 @@ from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interv
 from hovi.discrete.interval_charts import IntervalCharts
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.lagrangian import Lagrangian, PointTerms
-from hovi.scene.squared_effort import predict
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
@@ -35,15 +34,15 @@ class Expansion:
     them; inner modes that an interval does not have are zero.
 
     values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
-    torque, jacobian: tau and d tau / d(q, v, a) at the quadrature points for an effort
-        Lagrangian, one pair per batch, for lifted Newton steps.
+    outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
+        steps; those of a Lagrangian without outputs have no rows.
     charts: those of the intervals, one per batch, where configurations are not vectors.
     """
 
     values: Array
     gradient: Array
     hessian: Array
-    torque: list[tuple[Array, Array]]
+    outputs: list[tuple[Array, Array]]
     charts: list[IntervalCharts] | None = None
 
     @property
@@ -97,8 +96,8 @@ class DiscreteLagrangian:
     ) -> Expansion:
         """Value, gradient and Hessian of every L_d: see Expansion.
 
-        multipliers: weights of the curvature of tau, one array per batch, as `predict` gives
-            them; the torque itself when None.
+        multipliers: weights of the outputs' curvature, one array per batch, as `predict` gives
+            them; R y when None.
         terms: what limits add at the points, one per batch; the values stay those of L_d.
         jets: as for `values`.
         """
@@ -108,18 +107,17 @@ class DiscreteLagrangian:
         for i, batch in enumerate(self._batches):
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
-            value, point_gradient, point_hessian, torque = self._evaluate(
-                batch, known[i], multiplier, term
-            )
+            point = self.lagrangian.expand(*known[i], t=batch.t, multiplier=multiplier, terms=term)
+            value, outputs = batch.sums(point.value), [(point.outputs, point.jacobian)]
             if charts is not None:
-                gradient, hessian = charts[i].expand(point_gradient, point_hessian)
-                parts.append(Expansion(value, gradient, hessian, torque, [charts[i]]))
+                gradient, hessian = charts[i].expand(point.gradient, point.hessian)
+                parts.append(Expansion(value, gradient, hessian, outputs, [charts[i]]))
                 continue
             table = batch.tables[coordinates]
             gradient, hessian = contract(
-                table, batch.scheme.weights, batch.h, point_gradient, point_hessian
+                table, batch.scheme.weights, batch.h, point.gradient, point.hessian
             )
-            parts.append(Expansion(value, gradient, hessian, torque))
+            parts.append(Expansion(value, gradient, hessian, outputs))
         return parts[0] if len(parts) == 1 else self._joined(parts)
 
     def gradient(
@@ -154,23 +152,18 @@ class DiscreteLagrangian:
             values[batch.index] = part.values
             gradient[batch.index, :k] = part.gradient
             hessian[batch.index, :k, :k] = part.hessian
-        torque = [tau_J for part in parts for tau_J in part.torque]
+        outputs = [pair for part in parts for pair in part.outputs]
         charts = [each for part in parts for each in part.charts or ()] or None
-        return Expansion(values, gradient, hessian, torque, charts)
+        return Expansion(values, gradient, hessian, outputs, charts)
 
-    def predict(
-        self, expansion: Expansion, step: Array, coordinates: Coordinates
-    ) -> list[Array] | None:
-        """R (tau + J dx) at the quadrature points after a step: multipliers for `expand`.
+    def predict(self, expansion: Expansion, step: Array, coordinates: Coordinates) -> list[Array]:
+        """R (y + J dx) at the quadrature points after a step: multipliers for `expand`.
 
         step: in the intervals' scaled coordinates, shape (N, m, n).
         """
-        if not expansion.torque or not isinstance(self.lagrangian, EffortLagrangian):
-            return None
         steps = self.point_steps(step, coordinates, expansion)
-        weight = self.lagrangian.weight
-        pairs = zip(expansion.torque, steps, strict=True)
-        return [predict(tau, weight, J, dx) for (tau, J), dx in pairs]
+        pairs = zip(expansion.outputs, steps, strict=True)
+        return [self.lagrangian.predicted_slope(y, J, dx) for (y, J), dx in pairs]
 
     def point_steps(
         self, step: Array, coordinates: Coordinates, expansion: Expansion
@@ -267,14 +260,10 @@ class DiscreteLagrangian:
         jets: list[Jet] | None = None,
     ) -> list[Array]:
         """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
-        gradients = []
         known = jets or self.jets(path)
-        for i, (batch, jet) in enumerate(zip(self._batches, known, strict=True)):
-            if forces is not None and isinstance(self.lagrangian, EffortLagrangian):
-                gradients.append(self.lagrangian.gradient(*jet, t=batch.t, terms=forces[i]))
-            else:
-                gradients.append(self.lagrangian.gradient(*jet, t=batch.t))
-        return gradients
+        terms: Sequence[PointTerms | None] = forces or [None] * len(known)
+        triples = zip(self._batches, known, terms, strict=True)
+        return [self.lagrangian.gradient(*jet, t=b.t, terms=term) for b, jet, term in triples]
 
     def duration_derivative(
         self, path: DiscretePath, forces: list[PointTerms] | None = None
@@ -305,20 +294,6 @@ class DiscreteLagrangian:
     @cached_property
     def _batches(self) -> list[IntervalBatch]:
         return list(interval_batches(self.grid))
-
-    def _evaluate(
-        self, batch: IntervalBatch, jet: Jet, multiplier: Array | None, terms: PointTerms | None
-    ) -> tuple[Array, Array, Array, list[tuple[Array, Array]]]:
-        """L_d (B,), point gradients and Hessians, and (tau, J) where there are torques."""
-        if isinstance(self.lagrangian, EffortLagrangian):
-            value, gradient, hessian, tau, J = self.lagrangian.expand(
-                *jet, t=batch.t, multiplier=multiplier, terms=terms
-            )
-            torque = [(tau, J)]
-        else:
-            value, gradient, hessian = self.lagrangian.evaluate(*jet, t=batch.t)
-            torque = []
-        return batch.sums(value), gradient, hessian, torque
 
 
 def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:

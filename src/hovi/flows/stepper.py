@@ -26,7 +26,6 @@ from hovi.flows.legendre_transforms import hamiltonian
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian, uniform_grid
 from hovi.flows.segment import Segment
 from hovi.flows.symmetry import Symmetry
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
@@ -96,16 +95,14 @@ class Flow:
     def trajectory(self) -> Trajectory:
         """The motion of a scene's effort Lagrangian as a Trajectory, to be replayed and saved."""
         lagrangian, ld = self.ld.lagrangian, self.ld
-        if not isinstance(lagrangian, EffortLagrangian) or not isinstance(
-            ld, SchemeLagrangian | ChartedLagrangian
-        ):
+        scene = getattr(lagrangian, "scene", None)
+        if not isinstance(scene, Scene) or not isinstance(ld, SchemeLagrangian | ChartedLagrangian):
             raise InputError("only the flow of a scene's effort Lagrangian is a Trajectory.")
-        assert isinstance(lagrangian.scene, Scene)
         q, v = self.jets
         path = DiscretePath(q.copy(), v.copy(), self.z, self.inner)
         N = len(self.z)
         grid = Grid(np.full(N, ld.h), (ld.scheme,) * N)
-        return Trajectory(grid, path, self.p, lagrangian.scene, {"status": "flow"})
+        return Trajectory(grid, path, self.p, scene, {"status": "flow"})
 
 
 def flow(

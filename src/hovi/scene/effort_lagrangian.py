@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -12,8 +12,8 @@ from hovi.dynamics.torque_model import TorqueModel
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.cost_terms import EffortTerm, PotentialTerm
-from hovi.scene.lagrangian import Lagrangian, PointTerms
-from hovi.scene.squared_effort import expand_squares, weighted_square
+from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms, add_weights
+from hovi.scene.squared_effort import expand_squares, predict, weighted_square
 
 Array = npt.NDArray[np.float64]
 
@@ -61,6 +61,28 @@ class EffortLagrangian(Lagrangian):
         """The robot's configuration space; None where configurations are vectors."""
         return self.scene.robot.curved_space
 
+    @property
+    def output_weight(self) -> Array:
+        """R: the outputs are the torques."""
+        return self.weight
+
+    @property
+    def output_name(self) -> str:
+        """What an output is called in a sentence."""
+        return "torque"
+
+    def output(self, *jet: Array, t: Array | None = None) -> Array:
+        """tau at P points, shape (P, nv)."""
+        return self.torques.torque(jet[0], jet[1], jet[2], t)
+
+    def predicted_slope(self, outputs: Array, jacobian: Array, change: Array) -> Array:
+        """R (tau + J dx), shape (P, nv)."""
+        return predict(outputs, self.weight, jacobian, change)
+
+    def reweighted(self, weight: Array) -> EffortLagrangian:
+        """The same with another R, shape (nv,)."""
+        return replace(self, weight=weight)
+
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> tuple[Array, Array]:
         """tau (P, nv) and J = d tau / d(q, v, a), shape (P, nv, 3 nv)."""
         return self.torques.linearize(q, v, a, t)
@@ -73,7 +95,7 @@ class EffortLagrangian(Lagrangian):
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """1/2 tau^T diag(R) tau + V + phi, shape (P,)."""
-        tau = self.torques.torque(jet[0], jet[1], jet[2], t)
+        tau = self.output(*jet, t=t)
         value = 0.5 * np.vecdot(tau, self.weight * tau)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
@@ -82,14 +104,14 @@ class EffortLagrangian(Lagrangian):
         return np.asarray(value)
 
     def integral(
-        self, tau: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
+        self, outputs: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
     ) -> float:
-        """sum_p w_p L at points where the torque is known; weights: w, shape (P,)."""
-        total = weighted_square(tau, self.weight, weights)
+        """sum_p w_p L at points where the torques are known; weights: w, shape (P,)."""
+        total = weighted_square(outputs, self.weight, weights)
         if self.potential is not None:
             total += float(weights @ self.potential.value(*jet, t=t))
         if self.effort_term is not None:
-            total += float(weights @ self.effort_term.value(tau, jet[1]))
+            total += float(weights @ self.effort_term.value(outputs, jet[1]))
         return total
 
     def gradient(
@@ -101,7 +123,7 @@ class EffortLagrangian(Lagrangian):
         """
         q, v, a = jet
         tau, J = self.torques.linearize(q, v, a, t)
-        force = None if terms is None else terms.effort_gradient
+        force = None if terms is None else terms.output_gradient
         _, gradient = expand_squares(tau, self.weight, J, force)
         if self.effort_term is not None:
             gradient = gradient + self.effort_term.expand(tau, v, J)[1]
@@ -123,33 +145,29 @@ class EffortLagrangian(Lagrangian):
         t: Array | None = None,
         multiplier: Array | None = None,
         terms: PointTerms | None = None,
-    ) -> tuple[Array, Array, Array, Array, Array]:
+    ) -> PointExpansion:
         """As evaluate, with the curvature of tau weighted by `multiplier` instead of R tau.
 
         multiplier: shape (P, nv). Weighted with the torque that the last step predicted
             (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
         terms: what limits add.
-        Returns value (P,), gradient (P, 3 nv), hessian (P, 3 nv, 3 nv), tau, J.
         """
         q, v, a = jet
-        R = self.weight if terms is None else self.weight + terms.effort_weight
+        R = self.weight if terms is None else self.weight + terms.output_weight
         if self.effort_term is not None:
             tau = self.torques.torque(q, v, a, t)
             given = self.weight * tau if multiplier is None else multiplier
             multiplier = given + self.effort_term.slope(tau, v)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
-        force = None if terms is None else terms.effort_gradient
+        force = None if terms is None else terms.output_gradient
         value, gradient = expand_squares(tau, self.weight, J, force)
         if terms is not None:
             gradient += terms.jet_gradient
-            diagonal = np.arange(hessian.shape[1])
-            hessian[:, diagonal, diagonal] += terms.jet_weight
-            if terms.configuration_weight is not None:
-                hessian[:, : self.nv, : self.nv] += terms.configuration_weight
+            add_weights(hessian, terms, self.nv)
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV
         if self.effort_term is not None:
             phi, dphi, ddphi = self.effort_term.expand(tau, v, J)
             value, gradient, hessian = value + phi, gradient + dphi, hessian + ddphi
-        return value, gradient, hessian, tau, J
+        return PointExpansion(value, gradient, hessian, tau, J)

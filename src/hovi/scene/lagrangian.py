@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +17,53 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 Array = npt.NDArray[np.float64]
 
 
+@dataclass(frozen=True, eq=False)
+class PointTerms:
+    """What limits and multipliers add to a Lagrangian's derivatives at P points.
+
+    With the jet x = (q, v, a, ...) and the outputs y(x) of the Lagrangian, gradient:
+    jet_gradient + J^T output_gradient; Hessian: diag(jet_weight) + J^T diag(output_weight) J, and
+    configuration_weight in its block of q.
+
+    jet_gradient, jet_weight: shape (P, (k+1) nv). output_gradient, output_weight: shape (P, m).
+    configuration_weight: shape (P, nv, nv); nothing when None.
+    """
+
+    jet_gradient: Array
+    jet_weight: Array
+    output_gradient: Array
+    output_weight: Array
+    configuration_weight: Array | None = None
+
+    @classmethod
+    def on_outputs(cls, gradient: Array, jet_size: int) -> PointTerms:
+        """A force on the outputs alone, shape (P, m); jet_size: (k+1) nv."""
+        jet = np.zeros((len(gradient), jet_size))
+        return cls(jet, jet, gradient, np.zeros_like(gradient))
+
+
+class PointExpansion(NamedTuple):
+    """A Lagrangian at P points to second order, and its outputs to first.
+
+    value: shape (P,). gradient: shape (P, (k+1) nv). hessian: shape (P, (k+1) nv, (k+1) nv).
+    outputs: y, shape (P, m). jacobian: J = dy/dx, shape (P, m, (k+1) nv).
+    """
+
+    value: Array
+    gradient: Array
+    hessian: Array
+    outputs: Array
+    jacobian: Array
+
+
 class Lagrangian(ABC):
     """L on T^(k)Q: what a discrete Lagrangian needs to know of it.
 
     Derivatives live in the tangent space: with respect to q they are taken along `integrate`.
+
+    A Lagrangian may be L = 1/2 y^T diag(R) y + rest in m outputs y of its jet, joint torques for
+    instance. Outputs can be bounded and given multipliers, and a lifted Newton step weighs their
+    curvature by what the last step predicted of them. Without outputs nothing of that applies.
     """
 
     order: int
@@ -54,30 +98,69 @@ class Lagrangian(ABC):
         Returns value (P,), gradient (P, k+1, nv), hessian (P, k+1, nv, k+1, nv).
         """
 
-    def gradient(self, *jet: Array, t: Array | None = None) -> Array:
-        """The gradient alone, shape (P, k+1, nv)."""
-        return self.evaluate(*jet, t=t)[1]
+    @property
+    def output_weight(self) -> Array:
+        """R, shape (m,): none without outputs."""
+        return np.zeros(0)
+
+    @property
+    def output_name(self) -> str:
+        """What an output is called in a sentence."""
+        return "output"
+
+    def output(self, *jet: Array, t: Array | None = None) -> Array:
+        """y at P points, shape (P, m)."""
+        return np.zeros((len(jet[0]), 0))
+
+    def output_slope(self, outputs: Array) -> Array:
+        """R y, shape (P, m)."""
+        return self.output_weight * outputs
+
+    def predicted_slope(self, outputs: Array, jacobian: Array, change: Array) -> Array:
+        """R (y + J dx) after a change dx of the jet, shape (P, m)."""
+        return self.output_slope(outputs + np.matmul(jacobian, change[:, :, None])[:, :, 0])
+
+    def reweighted(self, weight: Array) -> Lagrangian:
+        """The same with another R, shape (m,)."""
+        raise NotImplementedError
+
+    def integral(
+        self, outputs: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
+    ) -> float:
+        """sum_p w_p L at points where the outputs are known; weights: w, shape (P,)."""
+        return float(weights @ self.value(*jet, t=t))
+
+    def gradient(
+        self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
+    ) -> Array:
+        """The gradient alone, shape (P, k+1, nv); terms: what limits and multipliers add."""
+        gradient = self.evaluate(*jet, t=t)[1]
+        return gradient if terms is None else gradient + terms.jet_gradient.reshape(gradient.shape)
+
+    def expand(
+        self,
+        *jet: Array,
+        t: Array | None = None,
+        multiplier: Array | None = None,
+        terms: PointTerms | None = None,
+    ) -> PointExpansion:
+        """As evaluate, with outputs and what limits and multipliers add.
+
+        multiplier: what weighs the curvature of the outputs instead of R y, shape (P, m).
+        """
+        value, gradient, hessian = self.evaluate(*jet, t=t)
+        size = (self.order + 1) * self.nv
+        gradient, hessian = gradient.reshape(-1, size), hessian.reshape(-1, size, size)
+        if terms is not None:
+            gradient, hessian = gradient + terms.jet_gradient, hessian.copy()
+            add_weights(hessian, terms, self.nv)
+        outputs = self.output(*jet, t=t)
+        return PointExpansion(value, gradient, hessian, outputs, np.zeros((len(value), 0, size)))
 
 
-@dataclass(frozen=True, eq=False)
-class PointTerms:
-    """What limits add to an effort Lagrangian's derivatives at P points.
-
-    With x = (q, v, a), gradient: jet_gradient + J^T effort_gradient; Hessian: diag(jet_weight) +
-    J^T diag(effort_weight) J, and configuration_weight in its block of q.
-
-    jet_gradient, jet_weight: shape (P, 3 nv). effort_gradient, effort_weight: shape (P, nv).
-    configuration_weight: shape (P, nv, nv); nothing when None.
-    """
-
-    jet_gradient: Array
-    jet_weight: Array
-    effort_gradient: Array
-    effort_weight: Array
-    configuration_weight: Array | None = None
-
-    @classmethod
-    def of_effort(cls, gradient: Array) -> PointTerms:
-        """A force on the torques alone, shape (P, nv)."""
-        jet = np.zeros((len(gradient), 3 * gradient.shape[1]))
-        return cls(jet, jet, gradient, np.zeros_like(gradient))
+def add_weights(hessian: Array, terms: PointTerms, nv: int) -> None:
+    """Add what limits add to the Hessian of the jet itself, in place."""
+    diagonal = np.arange(hessian.shape[1])
+    hessian[:, diagonal, diagonal] += terms.jet_weight
+    if terms.configuration_weight is not None:
+        hessian[:, :nv, :nv] += terms.configuration_weight

@@ -13,7 +13,7 @@ from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.certificate import momentum_jump
 from hovi.planning.refinement.error_estimate import prolonged
-from hovi.planning.refinement.interpolated_efforts import carried_efforts
+from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import NearbyMinimum, nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
@@ -48,7 +48,7 @@ def approached(solution: Solution, problem: TrajectoryProblem) -> NearbyMinimum 
     assert solution.problem is not None
     path = solution.trajectory.path
     objective, start = ActionObjective(problem), prolonged(path, problem.grid)
-    efforts = carried_efforts(solution.problem.ld, path, problem.ld)
+    efforts = interpolated_slopes(solution.problem.ld, path, problem.ld)
     model = objective.model_with(start, efforts, None)
     return nearby_minimum(objective, start, model, known=solution.cost)
 
@@ -112,19 +112,19 @@ def test_far_from_a_minimum_nothing_is_found(arm_scene: Scene) -> None:
 def test_efforts_carried_to_the_same_points_are_the_torques_there(ur5: Solution) -> None:
     assert ur5.problem is not None
     ld = ur5.problem.ld
-    (carried,) = carried_efforts(ld, ur5.trajectory.path, ld)
+    (carried,) = interpolated_slopes(ld, ur5.trajectory.path, ld)
     (tau,) = ActionObjective(ur5.problem).torques(ur5.trajectory.path)
     np.testing.assert_allclose(carried, tau, atol=1e-10 * np.abs(tau).max())
 
 
-def test_carried_efforts_are_nearer_to_the_right_ones(ur5: Solution) -> None:
+def test_interpolated_slopes_are_nearer_to_the_right_ones(ur5: Solution) -> None:
     problem = finer(ur5)
     assert ur5.problem is not None
     path = prolonged(ur5.trajectory.path, problem.grid)
     objective = ActionObjective(problem)
     (right,) = objective.torques(solve(problem, path).trajectory.path)
     (own,) = objective.torques(path)
-    (carried,) = carried_efforts(ur5.problem.ld, ur5.trajectory.path, problem.ld)
+    (carried,) = interpolated_slopes(ur5.problem.ld, ur5.trajectory.path, problem.ld)
     assert np.abs(carried - right).max() < 0.2 * np.abs(own - right).max()
 
 
@@ -135,7 +135,7 @@ def test_a_grid_of_other_intervals_and_degrees_sees_the_same_torques(arm_scene: 
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
     motion = solve(problem).trajectory
     other = DiscreteLagrangian(lagrangian, Grid(np.full(5, 0.2), (galerkin(2),) * 5))
-    (carried,) = carried_efforts(ld, motion.path, other)
+    (carried,) = interpolated_slopes(ld, motion.path, other)
     tau = motion.sample(other.point_times[0]).tau
     scale = np.abs(tau).max()
     np.testing.assert_allclose(carried, np.array([1.0, 3.0]) * tau, atol=0.01 * scale)
@@ -149,7 +149,7 @@ def test_a_hessian_weighted_so_stays_definite_beside_a_minimum() -> None:
     solution = solve(TrajectoryProblem(ld, task.start, task.goal))
     problem = finer(solution)
     start, objective = prolonged(solution.trajectory.path, problem.grid), ActionObjective(problem)
-    efforts = carried_efforts(ld, solution.trajectory.path, problem.ld)
+    efforts = interpolated_slopes(ld, solution.trajectory.path, problem.ld)
     assert objective.model(start, None, None).factor(0.0) is None
     assert objective.model_with(start, efforts, None).factor(0.0) is not None
     found = approached(solution, problem)

@@ -26,7 +26,6 @@ from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.model import check_mass_matrix
 from hovi.robot.robot import Robot
-from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene, require_known_joints
 from hovi.schemes import require_regular
 
@@ -46,7 +45,7 @@ class TrajectoryProblem:
     D2 L_d(k) + D4 L_d(k-1) = 0 at the inner nodes are its first-order conditions.
     [ColomboFerraroMartin2016, section 3]
 
-    ld: the discrete Lagrangian of a scene's effort on a grid.
+    ld: the discrete Lagrangian on a grid; its Lagrangian belongs to a scene.
     start: state at t = 0. goal: state at t = T, or a goal of a frame.
     limits: bounds that hold along the motion; none when None.
     via: what the motion passes through, at nodes of the grid.
@@ -196,10 +195,10 @@ class TrajectoryProblem:
 
     @property
     def scene(self) -> Scene:
-        """The scene whose effort is minimised."""
-        lagrangian = self.ld.lagrangian
-        if isinstance(lagrangian, EffortLagrangian) and isinstance(lagrangian.scene, Scene):
-            return lagrangian.scene
+        """The scene that the Lagrangian belongs to."""
+        scene = getattr(self.ld.lagrangian, "scene", None)
+        if isinstance(scene, Scene):
+            return scene
         raise InputError("a trajectory problem needs the effort Lagrangian of a Scene.")
 
     @property

@@ -16,7 +16,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate, least_error
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
-from hovi.planning.refinement.interpolated_efforts import carried_efforts
+from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import moved_to, next_grid
 from hovi.planning.solver.action_objective import ActionObjective
@@ -234,7 +234,7 @@ def _near(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:
     """A solution next to a finer one on another grid; None where it takes the optimiser."""
     if problem.limited or problem.constrained:
         return None
-    efforts = carried_efforts(finer.problem.ld, finer.path, problem.ld)
+    efforts = interpolated_slopes(finer.problem.ld, finer.path, problem.ld)
     objective, start = ActionObjective(problem), moved_to(finer, problem)
     found = nearby_minimum(objective, start, objective.model_with(start, efforts, None))
     return None if found is None else found.solution()

@@ -23,7 +23,7 @@ from hovi.discrete.motion_error import MotionError, deviation, places
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.interpolated_efforts import carried_efforts
+from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
@@ -100,7 +100,7 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
         return _solved(fine, start, problem, path)
     values = problem.ld.values(path)
     objective, known = ActionObjective(fine), float(np.sum(values))
-    efforts = carried_efforts(problem.ld, path, fine.ld)
+    efforts = interpolated_slopes(problem.ld, path, fine.ld)
     model = objective.model_with(start, efforts, None)
     gains = _gains(objective.expansion, values)
     found = nearby_minimum(objective, start, model, known)

@@ -96,7 +96,7 @@ def nearby_minimum(
     """Newton's method from a path; None where it does not contract at once.
 
     model: the last of the objective, at the path: its curvature is best weighted with
-        carried_efforts. Later Hessians are weighted with what the steps foresee.
+        interpolated_slopes. Later Hessians are weighted with what the steps foresee.
     known: a cost whose difference from the minimum's has to come out well.
     Lengths are those of changes of q and T v: in a flat valley a change of the action says little
     of them.

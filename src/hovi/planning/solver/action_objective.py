@@ -6,7 +6,6 @@ hovi.planning.solver.multipliers.
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Literal
 
 import numpy as np
@@ -25,8 +24,7 @@ from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
-from hovi.scene.effort_lagrangian import EffortLagrangian
-from hovi.scene.lagrangian import PointTerms
+from hovi.scene.lagrangian import Lagrangian, PointTerms
 
 Array = npt.NDArray[np.float64]
 LinearAlgebra = Literal["band", "tree"]
@@ -68,7 +66,7 @@ class ActionObjective(Objective[DiscretePath]):
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
-        self._torques: tuple[DiscretePath, list[Array]] | None = None
+        self._outputs: tuple[DiscretePath, list[Array]] | None = None
 
     @property
     def expansion(self) -> Expansion:
@@ -84,31 +82,31 @@ class ActionObjective(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The discrete action, with what equations add."""
-        return self.value_of(x, self.torques(x))
+        return self.value_of(x, self.outputs(x))
 
-    def torques(self, x: DiscretePath) -> list[Array]:
-        """tau at the quadrature points, (P, nv) per batch, remembered for the last path."""
-        if self._torques is None or self._torques[0] is not x:
-            torque = self.lagrangian.torques.torque
+    def outputs(self, x: DiscretePath) -> list[Array]:
+        """The Lagrangian's outputs at the quadrature points, per batch, kept for the last path."""
+        if self._outputs is None or self._outputs[0] is not x:
+            output = self.lagrangian.output
             pairs = zip(self.jets(x), self.ld.point_times, strict=True)
-            self._torques = x, [torque(*jet, t) for jet, t in pairs]
-        return self._torques[1]
+            self._outputs = x, [output(*jet, t=t) for jet, t in pairs]
+        return self._outputs[1]
 
     def _overturned(self, x: DiscretePath) -> bool:
         """Whether an orientation leaves the chart of an interval, which is singular at a turn."""
         return self.ld.chart is not None and bool(self.ld.turns(x).max() > CHART_END)
 
-    def value_of(self, x: DiscretePath, torques: list[Array]) -> float:
-        """The value where the torques at the quadrature points are known."""
+    def value_of(self, x: DiscretePath, outputs: list[Array]) -> float:
+        """The value where the outputs at the quadrature points are known."""
         if self._overturned(x):
             return float("inf")
         value = 0.0
         for i, (jet, t, weights) in enumerate(
             zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)
         ):
-            value += self.lagrangian.integral(torques[i], jet, t, weights)
+            value += self.lagrangian.integral(outputs[i], jet, t, weights)
             if self.multipliers is not None:
-                value += float(weights @ np.vecdot(self.multipliers.torque[i], torques[i]))
+                value += float(weights @ np.vecdot(self.multipliers.torque[i], outputs[i]))
         if self.multipliers is not None:
             rho = self.multipliers.node_penalty
             residuals = node_residuals(self.problem, x)
@@ -116,23 +114,22 @@ class ActionObjective(Objective[DiscretePath]):
                 value += float(mu @ c + 0.5 * rho * c @ c)
         return value
 
-    def effort(self, torque: Array, batch: int) -> Array:
-        """d value / d tau at the points of a batch: R tau, and the multipliers."""
-        effort = self.lagrangian.weight * torque
-        return effort if self.multipliers is None else effort + self.multipliers.torque[batch]
+    def output_slope(self, outputs: Array, batch: int) -> Array:
+        """d value / dy at the points of a batch: R y, and the multipliers."""
+        slope = self.lagrangian.output_slope(outputs)
+        return slope if self.multipliers is None else slope + self.multipliers.torque[batch]
 
     def residuals(self, x: DiscretePath) -> Residuals:
         """By how much the equations fail."""
-        torques = self.torques(x)
+        torques = self.outputs(x)
         largest = max(float(np.max(np.abs(tau))) for tau in torques)
         largest = max(largest, LEAST_TORQUE * self.problem.inertial_torque)
         passive = [tau[:, self.problem.passive] for tau in torques]
         return Residuals(passive, node_residuals(self.problem, x), largest)
 
     @property
-    def lagrangian(self) -> EffortLagrangian:
-        """The effort that is minimised."""
-        assert isinstance(self.ld.lagrangian, EffortLagrangian)
+    def lagrangian(self) -> Lagrangian:
+        """What is minimised, with the weights of penalties."""
         return self.ld.lagrangian
 
     def jets(self, x: DiscretePath) -> list[Jet]:
@@ -144,16 +141,16 @@ class ActionObjective(Objective[DiscretePath]):
     def model(
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
-        """The quadratic model at x, its curvature weighted by the predicted torque."""
+        """The quadratic model at x, its curvature weighted by the predicted outputs."""
         curvatures = None
         if previous is not None and step is not None and self._expansion is not None:
             local = previous.gather(step)
             curvatures = self.ld.predict(self._expansion, local, self.coordinates)
         if curvatures is None:
-            curvatures = [self.effort(tau, i) for i, tau in enumerate(self.torques(x))]
+            curvatures = [self.output_slope(y, i) for i, y in enumerate(self.outputs(x))]
         elif self.multipliers is not None:
             pairs = zip(curvatures, self.multipliers.torque, strict=True)
-            curvatures = [effort + more for effort, more in pairs]
+            curvatures = [slope + more for slope, more in pairs]
         return self.model_with(x, curvatures, None)
 
     def model_with(
@@ -164,7 +161,7 @@ class ActionObjective(Objective[DiscretePath]):
     ) -> QuadraticModel:
         """The model at x with given curvature weights and with what limits add at the points.
 
-        curvatures: weights of the curvature of tau, multipliers of equations included.
+        curvatures: weights of the outputs' curvature, multipliers of equations included.
         """
         if self.multipliers is not None:
             terms = self.multipliers.added_to(terms)
@@ -230,9 +227,8 @@ class ActionObjective(Objective[DiscretePath]):
 
 def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
     """The discrete Lagrangian whose weight of the passive joints' torques is their penalty."""
-    lagrangian = problem.ld.lagrangian
-    if not isinstance(lagrangian, EffortLagrangian) or len(problem.passive) == 0:
+    if len(problem.passive) == 0:
         return problem.ld
-    weight = lagrangian.weight.copy()
+    weight = problem.ld.lagrangian.output_weight.copy()
     weight[problem.passive] = multipliers.torque_penalty
-    return DiscreteLagrangian(dataclasses.replace(lagrangian, weight=weight), problem.grid)
+    return DiscreteLagrangian(problem.ld.lagrangian.reweighted(weight), problem.grid)

@@ -13,7 +13,6 @@ from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
-from hovi.scene.effort_lagrangian import EffortLagrangian
 
 TORQUE_PENALTY = 10.0
 """First penalty of a passive joint's torque, relative to the mean weight of the others."""
@@ -158,9 +157,8 @@ def _softest(problem: TrajectoryProblem, path: DiscretePath, known: Multipliers)
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
     """None, with penalties that suit the weights of the torques and the cost of a path."""
-    lagrangian = problem.ld.lagrangian
-    assert isinstance(lagrangian, EffortLagrangian)
-    weight = float(np.delete(lagrangian.weight, problem.passive).mean())
+    weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
+    weight = float(weights.mean()) if len(weights) > 0 else 1.0
     cost = max(abs(problem.ld.action(path)), 1e-6)
     none = Multipliers.zero(problem, TORQUE_PENALTY * weight, NODE_PENALTY * cost)
     share = ActionObjective(problem, multipliers=none).residuals(path).torque_share

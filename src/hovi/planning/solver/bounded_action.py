@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.errors import InputError
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.interior_point import BoundedObjective, Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -52,6 +53,10 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         self.ld = self.action.ld
         self.lagrangian = self.action.lagrangian
         self.columns = np.flatnonzero(limits.bounded.ravel())
+        self._jet_size = (self.lagrangian.order + 1) * self.lagrangian.nv
+        self._size = self._jet_size + len(self.lagrangian.output_weight)
+        if self.columns.max(initial=0) >= self._size:
+            raise InputError("limits on tau need a Lagrangian of torques: leave them out.")
         self.more = more
         self.bounds = self._bounds(margins)
         self._predicted: list[Array] | None = None
@@ -61,8 +66,8 @@ class LimitedAction(BoundedObjective[DiscretePath]):
 
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs in units of their ranges."""
-        torques = self.action.torques(x)
-        pairs = zip(self.action.jets(x), torques, strict=True)
+        outputs = self.action.outputs(x)
+        pairs = zip(self.action.jets(x), outputs, strict=True)
         space = self.lagrangian.space
         rows = [
             np.concatenate([q if space is None else space.coordinates(q), v, a, tau], axis=1)
@@ -71,7 +76,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         y = self._scaled(np.concatenate(rows))
         if self.more is not None:
             y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
-        return Outputs(self.action.value_of(x, torques), y)
+        return Outputs(self.action.value_of(x, outputs), y)
 
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
@@ -82,11 +87,11 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         weight = self._unscaled(sigma, 2)
         force = self._unscaled(multipliers, 1)
         terms, curvatures = [], []
-        k = 3 * self.lagrangian.nv  # (q, v, a) first, then tau
+        k = self._jet_size  # (q, v, a) first, then tau
         for i, part in enumerate(self._parts):
             slope, curve = gradient[part], weight[part]
             terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
-            curvatures.append(self._effort(x, i) + force[part, k:])
+            curvatures.append(self._slope(x, i) + force[part, k:])
         if self.more is not None:
             terms = self._with_more(x, terms, sigma, rho, multipliers)
         return self.action.model_with(x, curvatures, terms)
@@ -97,7 +102,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         multipliers: of the outputs, shape (P, K).
         """
         force = self._unscaled(multipliers, 1)
-        k = 3 * self.lagrangian.nv
+        k = self._jet_size
         zero = np.zeros_like(force)
         terms = [
             PointTerms(force[p, :k], zero[p, :k], force[p, k:], zero[p, k:]) for p in self._parts
@@ -135,7 +140,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         changes = self.ld.point_steps(model.gather(step), self.action.coordinates, expansion)
         rows = []
         self._linear = []
-        for dx, (_tau, J) in zip(changes, expansion.torque, strict=True):
+        for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
             dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
             self._linear.append(dtau)
             rows.append(np.concatenate([dx, dtau], axis=1))
@@ -149,9 +154,10 @@ class LimitedAction(BoundedObjective[DiscretePath]):
 
     def follow(self, fraction: float) -> None:
         """The torques that the step taken foresees weight the next curvature."""
-        pairs = zip(self.action.expansion.torque, self._linear, strict=True)
+        pairs = zip(self.action.expansion.outputs, self._linear, strict=True)
         self._predicted = [
-            self.action.effort(tau + fraction * dtau, i) for i, ((tau, _), dtau) in enumerate(pairs)
+            self.action.output_slope(tau + fraction * dtau, i)
+            for i, ((tau, _), dtau) in enumerate(pairs)
         ]
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
@@ -162,12 +168,12 @@ class LimitedAction(BoundedObjective[DiscretePath]):
         """q at all quadrature points, (P, nq)."""
         return np.concatenate([jet[0] for jet in self.action.jets(x)])
 
-    def _effort(self, x: DiscretePath, batch: int) -> Array:
-        """R tau as foreseen, or as it is at x."""
+    def _slope(self, x: DiscretePath, batch: int) -> Array:
+        """R y as foreseen, or as it is at x."""
         if self._predicted is not None:
             return self._predicted[batch]
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
-        return self.action.effort(self.lagrangian.torques.torque(*jet, t), batch)
+        return self.action.output_slope(self.lagrangian.output(*jet, t=t), batch)
 
     @cached_property
     def _ranges(self) -> Array:
@@ -190,7 +196,7 @@ class LimitedAction(BoundedObjective[DiscretePath]):
 
     def _unscaled(self, y: Array, power: int) -> Array:
         """Derivatives by scaled outputs as derivatives by (q, v, a, tau), (P, 4 nv)."""
-        full = np.zeros((len(y), self.limits.lower.size))
+        full = np.zeros((len(y), self._size))
         full[:, self.columns] = y[:, : len(self.columns)] / self._ranges**power
         return full
 

@@ -53,23 +53,26 @@ class Multipliers:
 
     torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
         is not passive. nodes: mu of every condition.
-    torque_penalty, node_penalty: rho.
+    torque_penalty, node_penalty: rho. jet_size: numbers (k+1) nv of the jet at a point.
     """
 
     torque: list[Array]
     nodes: list[Array]
     torque_penalty: float
     node_penalty: float
+    jet_size: int
 
     @classmethod
     def zero(
         cls, problem: TrajectoryProblem, torque_penalty: float, node_penalty: float
     ) -> Multipliers:
         """No multipliers yet."""
-        n = problem.robot.nv
-        torque = [np.zeros((len(t), n)) for t in problem.ld.point_times]
+        lagrangian = problem.ld.lagrangian
+        outputs = len(lagrangian.output_weight)
+        torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
         nodes = [np.zeros(each.condition.size) for each in problem.conditions]
-        return cls(torque, nodes, torque_penalty, node_penalty)
+        jet_size = (lagrangian.order + 1) * lagrangian.nv
+        return cls(torque, nodes, torque_penalty, node_penalty, jet_size)
 
     def updated(self, residuals: Residuals, passive: npt.NDArray[np.intp]) -> Multipliers:
         """lambda + rho c, the first-order estimate of the multipliers."""
@@ -90,9 +93,9 @@ class Multipliers:
     def added_to(self, terms: list[PointTerms] | None) -> list[PointTerms]:
         """What limits add at the points, and the forces on the torques."""
         if terms is None:
-            return [PointTerms.of_effort(force) for force in self.torque]
+            return [PointTerms.on_outputs(force, self.jet_size) for force in self.torque]
         return [
-            dataclasses.replace(term, effort_gradient=term.effort_gradient + force)
+            dataclasses.replace(term, output_gradient=term.output_gradient + force)
             for term, force in zip(terms, self.torque, strict=True)
         ]
 

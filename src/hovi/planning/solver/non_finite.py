@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.scene.effort_lagrangian import EffortLagrangian
 
 Array = npt.NDArray[np.float64]
 
@@ -39,9 +38,9 @@ def _at_points(problem: TrajectoryProblem, path: DiscretePath) -> str:
     points = zip(jets, problem.ld.point_times, problem.ld.point_intervals, strict=True)
     for jet, t, numbers in points:
         found: list[tuple[str, Array]] = [("acceleration", jet[2])]
-        if isinstance(problem.ld.lagrangian, EffortLagrangian):
-            found.append(("torque", problem.ld.lagrangian.torque(*jet, t)[0]))
-        found.append(("cost", problem.ld.lagrangian.value(*jet, t=t)[:, None]))
+        lagrangian = problem.ld.lagrangian
+        found.append((lagrangian.output_name, lagrangian.output(*jet, t=t)))
+        found.append(("cost", lagrangian.value(*jet, t=t)[:, None]))
         for term, values in found:
             place = _first(values)
             if place is not None:
