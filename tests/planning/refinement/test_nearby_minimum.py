@@ -122,8 +122,8 @@ def test_interpolated_slopes_are_nearer_to_the_right_ones(ur5: Solution) -> None
     assert ur5.problem is not None
     path = prolonged(ur5.trajectory.path, problem.grid)
     objective = ActionObjective(problem)
-    (right,) = objective.torques(solve(problem, path).trajectory.path)
-    (own,) = objective.torques(path)
+    (right,) = objective.outputs(solve(problem, path).trajectory.path)
+    (own,) = objective.outputs(path)
     (carried,) = interpolated_slopes(ur5.problem.ld, ur5.trajectory.path, problem.ld)
     assert np.abs(carried - right).max() < 0.2 * np.abs(own - right).max()
 
