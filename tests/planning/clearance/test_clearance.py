@@ -16,7 +16,7 @@ from hovi.planning.clearance.obstacles import Box, Obstacle, Sphere
 from hovi.planning.clearance.violation import approach_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.solver import guess_path, solve
 from hovi.planning.solver.status import Status
@@ -49,7 +49,7 @@ def test_the_model_with_distances_is_that_of_linear_and_square_terms(
     given = problem(arm_scene, BALL, intervals=4)
     assert given.distances is not None
     limits = as_limits(arm_scene.robot, {"base": "none", "v": 9.0})
-    limited = LimitedAction(given, limits, more=ClearanceOutputs(given.distances, 0.05))
+    limited = BoundedAction(given, limits, more=ClearanceOutputs(given.distances, 0.05))
     random = np.random.default_rng(0)
     x = guess_path(given, "cubic")
     y0 = limited.outputs(x).y

@@ -113,7 +113,7 @@ def test_efforts_carried_to_the_same_points_are_the_torques_there(ur5: Solution)
     assert ur5.problem is not None
     ld = ur5.problem.ld
     (carried,) = interpolated_slopes(ld, ur5.trajectory.path, ld)
-    (tau,) = ActionObjective(ur5.problem).torques(ur5.trajectory.path)
+    (tau,) = ActionObjective(ur5.problem).outputs(ur5.trajectory.path)
     np.testing.assert_allclose(carried, tau, atol=1e-10 * np.abs(tau).max())
 
 

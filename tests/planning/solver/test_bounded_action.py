@@ -12,7 +12,7 @@ from hovi.discrete.state import State
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
-from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -22,16 +22,16 @@ LIMITS = {"base": "none", "q": [[-4.0, 4.0], [-3.0, 3.0]], "v": 7.0, "tau": [9.0
 
 
 @pytest.fixture(params=["band", "tree"])
-def limited(request: pytest.FixtureRequest, arm_scene: Scene) -> LimitedAction:
+def limited(request: pytest.FixtureRequest, arm_scene: Scene) -> BoundedAction:
     """The reach of the arm on four intervals of unequal length, limited in q, v and tau."""
     algebra: LinearAlgebra = request.param
     grid = Grid(np.array([0.3, 0.2, 0.1, 0.4]), (galerkin(1),) * 4)
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     problem = TrajectoryProblem(ld, State([-1.5, 0.0]), State([0.3, 0.7], [0.5, -0.4]))
-    return LimitedAction(problem, as_limits(arm_scene.robot, LIMITS), algebra=algebra)
+    return BoundedAction(problem, as_limits(arm_scene.robot, LIMITS), algebra=algebra)
 
 
-def test_outputs_are_measured_in_ranges_from_the_lower_bound(limited: LimitedAction) -> None:
+def test_outputs_are_measured_in_ranges_from_the_lower_bound(limited: BoundedAction) -> None:
     x = guess_path(limited.problem, "cubic")
     (q, v, a), *_ = limited.ld.jets(x)
     tau = limited.problem.scene.inverse_dynamics(q, v, a)
@@ -43,7 +43,7 @@ def test_outputs_are_measured_in_ranges_from_the_lower_bound(limited: LimitedAct
 
 
 def test_the_model_is_that_of_the_action_with_linear_and_square_terms(
-    limited: LimitedAction,
+    limited: BoundedAction,
 ) -> None:
     """phi(x) = action + sum weights (rho y + sigma (y - y0)^2 / 2), with multipliers rho."""
     random = np.random.default_rng(0)
@@ -68,7 +68,7 @@ def test_the_model_is_that_of_the_action_with_linear_and_square_terms(
     assert float(square) == pytest.approx(curve, rel=1e-5)
 
 
-def test_linear_outputs_are_first_order_changes(limited: LimitedAction) -> None:
+def test_linear_outputs_are_first_order_changes(limited: BoundedAction) -> None:
     x = guess_path(limited.problem, "cubic")
     zero = np.zeros_like(limited.outputs(x).y)
     model = limited.model(x, zero, zero, zero)
@@ -87,7 +87,7 @@ def test_margins_draw_the_bounds_of_their_interval_in(arm_scene: Scene) -> None:
     margins = np.zeros((2, 3, 4, 2))
     margins[1, 1, 1, 0] = 0.25  # the upper velocity bound of the shoulder, second interval
     limits = as_limits(arm_scene.robot, {"base": "none", "v": 2.0})
-    bounds = LimitedAction(problem, limits, margins).bounds
+    bounds = BoundedAction(problem, limits, margins).bounds
     np.testing.assert_allclose(bounds.lower, 0.0)
     np.testing.assert_allclose(bounds.upper[:, 1], 1.0)
     np.testing.assert_allclose(bounds.upper[:, 0], [1, 1, 0.75, 0.75, 1, 1])

@@ -24,7 +24,7 @@ from hovi.scene.lagrangian import PointTerms
 Array = npt.NDArray[np.float64]
 
 
-class LimitedAction(BoundedObjective[DiscretePath]):
+class BoundedAction(BoundedObjective[DiscretePath]):
     """The discrete action, with (q, v, a, tau) bounded at the quadrature points.
 
     Outputs of q that have to be 0 or more, distances to obstacles for instance, follow those in

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Objective
-from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.bounded_action import BoundedAction
 
 Array = npt.NDArray[np.float64]
 
@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 class PenalizedAction(Objective[DiscretePath]):
     """The action plus penalty/2 sum weights (distance outside the bounds)^2."""
 
-    def __init__(self, limited: LimitedAction, penalty: float) -> None:
+    def __init__(self, limited: BoundedAction, penalty: float) -> None:
         self.limited = limited
         self.penalty = penalty
 

@@ -4,47 +4,35 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, moved, named_curve, stretched, with_turns
-from hovi.discrete.interval_batch import Jet
 from hovi.discrete.nodal_momenta import carried_momenta
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
+from hovi.optimize.trust_region import Iteration, Options
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy
-from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.augmented_lagrangian import polished, satisfy, unmet_sentence
-from hovi.planning.solver.limited_solver import solve_limited
-from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.status import Status, chart_sentence, limited_verdict, verdict
+from hovi.planning.solver.methods.choice import method_for
+from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.status import Status
 from hovi.planning.solver.warm_start import follow
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
-from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible, remember
-
-Report = Callable[[int, float], None]
-"""What is told the number of each step and the least cost so far."""
 
 CORRECTIONS = 6
 """Quasi-Newton steps that may correct the guess of a motion between other states."""
 DECREASE = 1e-9
 """Relative decrease of a Newton step from which on a motion is stationary but for rounding."""
-POLISHES = 8
-"""Newton steps after the last round of equations, until only rounding is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +129,7 @@ def solve(
     time_limit: float | None = None,
     escape_saddles: bool = True,
     report: Report | None = None,
+    method: Method | None = None,
 ) -> Solution:
     """A motion that makes the discrete action stationary, by a trust-region Newton method.
 
@@ -150,72 +139,60 @@ def solve(
         return the best motion so far.
     escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
     report: called with the number of each step and the least cost so far.
+    method: how to minimise; the first of hovi.planning.solver.methods.choice that suits when None.
     With limits, `cost` is that of the motion that holds them everywhere, and intervals may have
     been split for it.
-    Raises InputError for a guess that does not fit.
+    Raises InputError for a guess or a method that does not fit.
     """
     began = time.perf_counter()
+    method = method or method_for(problem)
+    if not method.suits(problem):
+        raise InputError(f"{type(method).__name__} cannot meet all that this problem asks for.")
     path = guess_path(problem, guess)
     options = Options(
         decrease=DECREASE,
         max_iterations=max_iterations,
         time_limit=time_limit,
         escape_saddles=escape_saddles,
-        exact=not (problem.limited or problem.constrained),
     )
     started = time.perf_counter()
-    method = _with_limits if problem.limited else _without_limits
     try:
-        answer = method(problem, path, options, report)
+        answer = method.minimize(problem, path, options, report)
     except KeyboardInterrupt:  # outside of the iterations, which keep what they have
         remember()
         answer = _interrupted(problem, path)
-    return _dressed(answer, started - began, time.perf_counter() - started)
+    return _solution(answer, started - began, time.perf_counter() - started)
 
 
-@dataclass(frozen=True, eq=False)
-class _Answer:
-    """What a method found, before it is dressed as a Solution."""
-
-    problem: TrajectoryProblem
-    path: DiscretePath
-    value: float
-    status: Status
-    message: str
-    nit: int
-    n_neg: int
-    history: list[Iteration]
-    forces: list[PointTerms] | None
-    jets: list[Jet] | None = None
-
-    def trajectory(self) -> Trajectory:
-        """The motion with its momenta and where it came from."""
-        problem = self.problem
-        metadata: dict[str, Any] = {
-            "cost": self.value,
-            "status": str(self.status),
-            "n_neg": self.n_neg,
-        }
-        if problem.limits is not None and problem.limited:
-            metadata["limits"] = problem.limits.to_dict()
-        if problem.clearance is not None and problem.distances is not None:
-            metadata["clearance"] = problem.clearance.to_dict()
-        momenta = carried_momenta(problem.ld.derivatives(self.path, self.forces, self.jets))
-        return Trajectory(problem.grid, self.path, momenta, problem.scene, metadata)
+def _trajectory(answer: Answer) -> Trajectory:
+    """The motion with its momenta and where it came from."""
+    problem = answer.problem
+    metadata: dict[str, Any] = {
+        "cost": answer.cost,
+        "status": str(answer.status),
+        "n_neg": answer.n_neg,
+    }
+    if problem.limits is not None and problem.limited:
+        metadata["limits"] = problem.limits.to_dict()
+    if problem.clearance is not None and problem.distances is not None:
+        metadata["clearance"] = problem.clearance.to_dict()
+    derivatives = problem.ld.derivatives(answer.path, answer.forces, answer.jets)
+    momenta = carried_momenta(derivatives)
+    return Trajectory(problem.grid, answer.path, momenta, problem.scene, metadata)
 
 
-def _dressed(answer: _Answer, setup_seconds: float, solve_seconds: float) -> Solution:
+def _solution(answer: Answer, setup_seconds: float, solve_seconds: float) -> Solution:
     """The answer as a Solution."""
     return Solution(
         success=answer.status is Status.MINIMUM,
         status=answer.status,
         message=answer.message,
-        trajectory=answer.trajectory(),
-        cost=answer.value,
+        trajectory=_trajectory(answer),
+        cost=answer.cost,
         nit=answer.nit,
         n_neg=answer.n_neg,
         problem=answer.problem,
-        minima=(answer.value,) if answer.status is Status.MINIMUM else (),
+        minima=(answer.cost,) if answer.status is Status.MINIMUM else (),
         history=tuple(answer.history),
         setup_seconds=setup_seconds,
         solve_seconds=solve_seconds,
@@ -232,94 +209,14 @@ def minimum_at(
     """
     value = problem.ld.action(path)
     message = f"a minimum of cost {value:.10g} after {steps} steps."
-    answer = _Answer(problem, path, value, Status.MINIMUM, message, steps, 0, [], None)
-    return _dressed(answer, 0.0, seconds)
+    answer = Answer(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
+    return _solution(answer, 0.0, seconds)
 
 
-def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> _Answer:
+def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> Answer:
     """The guess, where an interrupt left nothing else."""
     value, message = problem.ld.action(path), "the solve was interrupted; the motion is its guess."
-    return _Answer(problem, path, value, Status.INTERRUPTED, message, 0, -1, [], None)
-
-
-def _without_limits(
-    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
-) -> _Answer:
-    """By a trust region."""
-    if problem.constrained:
-        return _with_equations(problem, path, options, report)
-    objective = ActionObjective(problem, structure=problem.structure)
-    outcome = minimize(objective, path, options, report)
-    n_neg = 0 if outcome.convex else _inertia(objective, outcome)
-    status, message = verdict(problem, outcome, n_neg)
-    message += chart_sentence(problem, outcome.x)
-    nit, history, jets = outcome.iterations, outcome.history, objective.jets(outcome.x)
-    return _Answer(
-        problem, outcome.x, outcome.value, status, message, nit, n_neg, history, None, jets
-    )
-
-
-def _with_equations(
-    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
-) -> _Answer:
-    """By trust regions in rounds of an augmented Lagrangian."""
-    if problem.unreachable:
-        value = problem.ld.action(path)
-        message = f"{problem.unreachable}."
-        return _Answer(problem, path, value, Status.INFEASIBLE, message, 0, -1, [], None)
-    history: list[Iteration] = []
-    deadline = Deadline(options.time_limit)
-
-    def round_(known: Multipliers, x: DiscretePath, decrease: float) -> Outcome[DiscretePath]:
-        objective = ActionObjective(problem, multipliers=known)
-        tolerance = max(decrease, options.decrease)
-        chosen = dataclasses.replace(options, decrease=tolerance, time_limit=deadline.seconds_left)
-        outcome = minimize(objective, x, chosen, _shifted(report, len(history)))
-        history.extend(outcome.history)
-        return outcome
-
-    rounds = satisfy(problem, path, round_)
-    outcome = rounds.result
-    n_neg = _inertia(ActionObjective(problem, multipliers=rounds.multipliers), outcome)
-    nit = len(history)
-    outcome.value, outcome.iterations = problem.ld.action(outcome.x), nit
-    status, message = verdict(problem, outcome, n_neg)
-    if rounds.reason:
-        status, message = Status.INFEASIBLE, f"{rounds.reason}."
-    elif status is not Status.MINIMUM and not rounds.met:
-        unmet = unmet_sentence(problem, outcome.x, rounds.residuals).partition(";")[0]
-        message = f"{message} Until then, {unmet}."
-    polish = POLISHES if status is Status.MINIMUM else 0
-    outcome.x, known = polished(problem, outcome.x, rounds.multipliers, polish)
-    forces, value = known.forces, problem.ld.action(outcome.x)
-    return _Answer(problem, outcome.x, value, status, message, nit, n_neg, history, forces)
-
-
-def _shifted(report: Report | None, done: int) -> Report | None:
-    """A report that counts on from the steps of earlier rounds."""
-    if report is None:
-        return None
-    return lambda step, cost: report(done + step, cost)
-
-
-def _with_limits(
-    problem: TrajectoryProblem, path: DiscretePath, options: Options, report: Report | None
-) -> _Answer:
-    """By an interior point."""
-    limits = problem.limits or no_limits(problem.robot)
-    outcome = solve_limited(problem, limits, path, options, report)
-    status, message = limited_verdict(outcome)
-    return _Answer(
-        outcome.problem,
-        outcome.x,
-        outcome.value,
-        status,
-        message,
-        outcome.iterations,
-        outcome.n_neg,
-        outcome.history,
-        outcome.forces,
-    )
+    return Answer(problem, path, value, Status.INTERRUPTED, message)
 
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
@@ -338,11 +235,3 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
             f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."
         )
     return problem.path(stretched(guess, grid.duration))
-
-
-def _inertia(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
-    """n_neg from the exact Hessian, -1 where there is none."""
-    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
-        return -1
-    definite = objective.model(outcome.x, None, None).factor(0.0) is not None
-    return 0 if definite else objective.negative_eigenvalues(outcome.x)

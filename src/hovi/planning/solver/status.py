@@ -10,7 +10,6 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Outcome, Stop
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.limited_outcome import LimitedOutcome
 from hovi.planning.solver.non_finite import non_finite_sentence
 
 Array = npt.NDArray[np.float64]
@@ -50,31 +49,12 @@ _UNFINISHED = {
 }
 
 
-def limited_verdict(outcome: LimitedOutcome) -> tuple[Status, str]:
-    """Status and sentence of an outcome under limits."""
-    if outcome.reason:
-        return Status.INFEASIBLE, f"no motion within the limits was found: {outcome.reason}."
-    if outcome.stop is not Stop.STATIONARY:
-        status, reason = _UNFINISHED[outcome.stop]
-        return status, (
-            f"{reason} after {outcome.iterations} steps, before a motion within the limits was "
-            f"found to be a minimum; the motion is the best so far, of cost {outcome.value:.10g}."
-        )
-    share = f" to {outcome.excess:.1e} of their ranges" if outcome.excess > 0 else ""
-    held = f"limits hold everywhere{share}, on {outcome.problem.grid.intervals} intervals"
-    if outcome.n_neg == 0:
-        return (
-            Status.MINIMUM,
-            f"a minimum of cost {outcome.value:.10g} after {outcome.iterations} steps; {held}.",
-        )
-    return (
-        Status.SADDLE,
-        f"a saddle of cost {outcome.value:.10g} with {outcome.n_neg} directions of negative "
-        "curvature; solve again with another guess.",
-    )
+def unfinished(stop: Stop) -> tuple[Status, str]:
+    """Status and first words of the sentence for what ended a method before a stationary motion."""
+    return _UNFINISHED[stop]
 
 
-def verdict(
+def status_of(
     problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
 ) -> tuple[Status, str]:
     """Status and sentence of an outcome."""
@@ -99,7 +79,7 @@ def verdict(
             f"a saddle of cost {outcome.value:.10g} with {n_neg} directions of negative curvature; "
             "solve again with escape_saddles=True or another guess.",
         )
-    status, reason = _UNFINISHED[outcome.stop]
+    status, reason = unfinished(outcome.stop)
     return status, (
         f"{reason} after {outcome.iterations} steps, before a minimum was found; the motion is the "
         f"best so far, of cost {outcome.value:.10g}.{left}"

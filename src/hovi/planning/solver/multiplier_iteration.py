@@ -36,8 +36,6 @@ NODE_MISS = 1e-11
 """Residual of a condition that counts as met, in [rad] or [m]."""
 CLOSE = 1e-6
 """The same for a round whose residuals rounding keeps from falling further."""
-SOFTER = 4
-"""Powers of ten by which a penalty may be lowered for the last steps."""
 FIRST_DECREASE = 1e-3
 """Relative decrease that a first round may leave; later rounds leave what their residual allows."""
 
@@ -69,7 +67,7 @@ class Satisfied(Generic[Result]):
     @property
     def met(self) -> bool:
         """Whether the equations hold to working precision."""
-        return _met(self.residuals, TORQUE_SHARE, NODE_MISS)
+        return within(self.residuals, TORQUE_SHARE, NODE_MISS)
 
 
 def satisfy(
@@ -93,7 +91,7 @@ def satisfy(
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
         sizes = residuals.torque_share, residuals.node_miss
-        if result.stop is not Stop.STATIONARY or _met(residuals, TORQUE_SHARE, NODE_MISS):
+        if result.stop is not Stop.STATIONARY or within(residuals, TORQUE_SHARE, NODE_MISS):
             break
         slow = [
             size > max(FALL * before, 0.1 * met)
@@ -106,53 +104,11 @@ def satisfy(
         decrease = float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))
         last = sizes
     reason = ""
-    if result.stop is Stop.STATIONARY and not _met(residuals, CLOSE, CLOSE):
+    if result.stop is Stop.STATIONARY and not within(residuals, CLOSE, CLOSE):
         reason = unmet_sentence(problem, path, residuals)
     elif result.stop is Stop.STATIONARY:
         reason = _elsewhere(problem, path)
     return Satisfied(result, multipliers, residuals, reason)
-
-
-def polished(
-    problem: TrajectoryProblem, path: DiscretePath, known: Multipliers, steps: int
-) -> tuple[DiscretePath, Multipliers]:
-    """Newton steps from a minimum, each with the multipliers that the last one leads to.
-
-    With the least penalty that leaves the Hessian positive definite: rounding in a passive joint's
-    torque reaches its multiplier, and so the momenta, times the penalty. What the penalties exert
-    besides belongs to the multipliers that are returned.
-    """
-    objective = ActionObjective(problem, multipliers=known)
-    residuals = objective.residuals(path)
-    first = path, known.updated(residuals, problem.passive)
-    allowed = max(TORQUE_SHARE, residuals.torque_share), max(NODE_MISS, residuals.node_miss)
-    known = _softest(problem, path, known) if steps > 0 else known
-    for _ in range(steps):
-        known = known.updated(
-            ActionObjective(problem, multipliers=known).residuals(path), problem.passive
-        )
-        objective = ActionObjective(problem, multipliers=known)
-        model = objective.model(path, None, None)
-        factor = model.factor(0.0)
-        if factor is None:
-            return first
-        path = objective.retract(path, factor.solve(-model.gradient), model)
-    residuals = objective.residuals(path)
-    if not _met(residuals, *allowed):
-        return first
-    return path, known.updated(residuals, problem.passive)
-
-
-def _softest(problem: TrajectoryProblem, path: DiscretePath, known: Multipliers) -> Multipliers:
-    """The least penalty of torques, by tens, with which the Hessian is positive definite."""
-    softest = known
-    for _ in range(SOFTER):
-        softer = softest.stiffer(0.1, 1.0)
-        model = ActionObjective(problem, multipliers=softer).model(path, None, None)
-        if model.factor(0.0) is None:
-            break
-        softest = softer
-    return softest
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
@@ -165,7 +121,8 @@ def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipl
     return none.stiffer(WARM, 1.0) if share <= NEARLY else none
 
 
-def _met(residuals: Residuals, torque_share: float, node_miss: float) -> bool:
+def within(residuals: Residuals, torque_share: float, node_miss: float) -> bool:
+    """Whether passive torques and conditions at nodes fail by no more than that."""
     return residuals.torque_share <= torque_share and residuals.node_miss <= node_miss
 
 

@@ -17,7 +17,7 @@ from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
-from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import guess_path, solve
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
@@ -53,7 +53,7 @@ def test_at_the_points_the_least_cost_is_that_of_ipopt(
 ) -> None:
     problem = reach(models, name, limits)
     assert problem.limits is not None
-    objective = LimitedAction(problem, problem.limits)
+    objective = BoundedAction(problem, problem.limits)
     outcome = minimize_bounded(objective, guess_path(problem, "cubic"), Options())
     assert outcome.stop is Stop.STATIONARY
     assert outcome.feasible

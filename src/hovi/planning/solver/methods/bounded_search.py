@@ -1,0 +1,176 @@
+"""What the stages of a solve under limits share: the problem, its bounds and budgets, the solve."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.banded_model import BandModel
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
+from hovi.optimize.merge_tree import MergeTreeModel
+from hovi.optimize.trust_region import Iteration, Options, Stop
+from hovi.planning.clearance.clearance import SCALE
+from hovi.planning.clearance.violation import approach_along, approach_sentence
+from hovi.planning.problem.contradictions import static_sentence
+from hovi.planning.problem.limit_violation import excess_along, worst_sentence
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.clearance_outputs import CUSHION, ClearanceOutputs
+from hovi.planning.solver.methods.method import Report
+from hovi.planning.solver.multiplier_iteration import satisfy
+from hovi.planning.solver.multipliers import Multipliers
+from hovi.scene.lagrangian import PointTerms
+from hovi.system.deadline import Deadline
+
+Array = npt.NDArray[np.float64]
+Bounded = BoundedOutcome[DiscretePath]
+
+ENDED = Stop.TIME_LIMIT, Stop.INTERRUPTED
+"""What ends a search whatever is left to try."""
+WARM_MU = 1e-7, 1e-4
+"""Range of the first barrier parameter of a tightened problem, relative to the mean density."""
+
+
+@dataclass(eq=False)
+class BoundedSearch:
+    """The problem as it is solved by now, and what has been spent.
+
+    problem: its intervals are halved where limits do not hold between their points.
+    guess: what the search began with, on the problem's grid.
+    margins: by which share of its range each bound is tightened, in every interval, shape
+        (2, N, 4 nv + pairs). clearance: distances that are kept, or None.
+    multipliers, unmet: of the equations, and why they cannot be met, or "".
+    last: the problem and the motion in which the last solve ended.
+    """
+
+    problem: TrajectoryProblem
+    limits: Limits
+    options: Options
+    report: Report | None
+    guess: DiscretePath
+    iterations: int = 0
+    multipliers: Multipliers | None = None
+    unmet: str = ""
+
+    def __post_init__(self) -> None:
+        self.deadline = Deadline(self.options.time_limit)
+        self.last = self.problem, self.guess
+        self.history: list[Iteration] = []
+        distances = self.problem.distances
+        self.clearance: ClearanceOutputs | None = None
+        if distances is not None:
+            self.clearance = ClearanceOutputs(distances, self.least_distance + CUSHION * SCALE)
+        self.margins = self.no_margins()
+
+    @property
+    def least_distance(self) -> float:
+        """The distance that counts as held to the tolerance where it is kept exactly, in [m]."""
+        assert self.problem.clearance is not None
+        return float(self.problem.clearance.margin) + self.limits.tolerance * SCALE
+
+    def no_margins(self) -> Array:
+        """Bounds where they are, in every interval: (2, N, 4 nv + pairs)."""
+        pairs = 0 if self.clearance is None else self.clearance.size
+        return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
+
+    def objective(self, known: Multipliers | None) -> BoundedAction:
+        """The action between the bounds as they are tightened."""
+        return BoundedAction(
+            self.problem, self.limits, self.margins, multipliers=known, more=self.clearance
+        )
+
+    def remaining_options(self) -> Options:
+        """The options with the time that is left."""
+        return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
+
+    def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
+        """By the interior point at the quadrature points, in rounds where there are equations."""
+        if not self.problem.constrained:
+            return self._minimized(self.objective(None), path, self.remaining_options(), start)
+
+        def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
+            nonlocal start
+            objective, options = self.objective(known), self.remaining_options()
+            options = dataclasses.replace(options, decrease=max(decrease, options.decrease))
+            outcome = self._minimized(objective, x, options, start)
+            mu = WARM_MU[1] * mean_density(outcome, objective)
+            start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
+            return outcome
+
+        rounds = satisfy(self.problem, path, minimize_round, self.multipliers)
+        self.multipliers, self.unmet = rounds.multipliers, rounds.reason
+        return rounds.result
+
+    def _minimized(
+        self, objective: BoundedAction, path: DiscretePath, options: Options, start: Barrier | None
+    ) -> Bounded:
+        outcome = minimize_bounded(objective, path, options, self.report, start)
+        self.iterations += outcome.iterations
+        self.history += outcome.history
+        self.last = self.problem, outcome.x
+        return outcome
+
+    def forces(self, outcome: Bounded) -> list[PointTerms]:
+        """What limits and equations exert, with what the equations' penalties exert besides."""
+        known = self.multipliers
+        if known is not None:
+            action = self.objective(known).action
+            known = known.updated(action.residuals(outcome.x), self.problem.passive)
+        return self.objective(known).forces(outcome.x, outcome.barrier.multipliers)
+
+    def negative_eigenvalues(self, outcome: Bounded) -> int:
+        """n_neg of the condensed system, which is positive definite at a minimum."""
+        if outcome.stop is not Stop.STATIONARY or outcome.model is None:
+            return -1
+        if outcome.model.factor(0.0) is not None:
+            return 0
+        if not self.problem.plain and isinstance(outcome.model, BandModel):
+            return outcome.model.negative_eigenvalues()
+        objective = BoundedAction(
+            self.problem, self.limits, self.margins, "tree", more=self.clearance
+        )
+        barrier: Barrier = outcome.barrier
+        model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)
+        return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
+
+    def trajectory(self, path: DiscretePath) -> Trajectory:
+        """A path for sampling, without its momenta."""
+        momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+        return Trajectory(self.problem.grid, path, momenta, self.problem.scene)
+
+    def excess(self, path: DiscretePath) -> Array:
+        """Excess over lower and upper bounds in every interval, (2, N, 4 nv + pairs)."""
+        trajectory = self.trajectory(path)
+        excess = excess_along(trajectory, self.limits)
+        sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
+        if self.clearance is None:
+            return sides
+        least = self.least_distance
+        approach = approach_along(trajectory, self.clearance.distances, least)
+        short = (least - approach.distance) / SCALE
+        return np.concatenate([sides, np.stack([short, np.full_like(short, -np.inf)])], axis=2)
+
+    def worst(self, path: DiscretePath) -> str:
+        """Which limit or distance is violated most, by joint or pair and time."""
+        trajectory = self.trajectory(path)
+        if self.clearance is not None:
+            sides, first = self.excess(path), self.limits.lower.size
+            if sides[:, :, first:].max() >= sides[:, :, :first].max():
+                distances, least = self.clearance.distances, self.least_distance
+                approach = approach_along(trajectory, distances, least)
+                margin = least - self.limits.tolerance * SCALE
+                return approach_sentence(trajectory, distances, approach, margin)
+        sentence = worst_sentence(trajectory, self.limits, self.problem.robot)
+        return sentence + static_sentence(self.problem, self.limits)
+
+
+def mean_density(outcome: Bounded, objective: BoundedAction) -> float:
+    """The objective over the weight of all points."""
+    return max(abs(outcome.outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))

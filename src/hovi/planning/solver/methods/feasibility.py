@@ -1,0 +1,135 @@
+"""A first motion between the bounds at the quadrature points, or the reason why there is none."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.guess import stretched, with_bump
+from hovi.optimize.trust_region import Stop, minimize
+from hovi.planning.clearance.violation import approach_along
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.clearance_outputs import ClearanceOutputs
+from hovi.planning.solver.methods.bounded_search import (
+    ENDED,
+    Bounded,
+    BoundedSearch,
+    mean_density,
+)
+from hovi.planning.solver.multiplier_iteration import first_multipliers
+from hovi.planning.solver.penalized_action import PenalizedAction
+
+PENALTIES = 1.0, 1e2, 1e4, 1e6
+"""Penalties of violated limits, relative to the mean density, where the interior point fails."""
+PENALTY_STEPS = 150
+"""Steps with each penalty."""
+BUMPED_GUESSES = 3
+"""Perturbed guesses that are tried before limits are called infeasible."""
+STAGE_DEPTH = 0.04
+"""Depth by which a motion is moved out of obstacles at a time, in [m]."""
+MOST_STAGES = 8
+"""Most times that it is."""
+STAGE_STEPS = 80
+"""Steps of each, whose result is only a guess."""
+SMALL_VIOLATION = 1e-3
+"""Violation, as a share of the range, from which the interior point is tried again."""
+
+
+def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
+    """What the guess leads to at the quadrature points, and why there is no motion, or ""."""
+    path = search.guess
+    if search.clearance is not None:
+        path = _moved_out_of_obstacles(search, path, search.clearance)
+    outcome = search.solve(path)
+    if outcome.feasible or outcome.stop is not Stop.DIVERGED:
+        return outcome, ""
+    return _restored(search, outcome)
+
+
+def _moved_out_of_obstacles(
+    search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
+) -> DiscretePath:
+    """A guess: the least action without obstacles, moved out of them little by little.
+
+    A guess that runs deep into obstacles is pushed out on other sides at other times.
+    """
+    options, search.clearance = search.options, None
+    path = _without_obstacles(search, path)
+    approach = approach_along(search.trajectory(path), wanted.distances, wanted.least)
+    depth = wanted.least - float(approach.distance.min())
+    stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MOST_STAGES))
+    search.options = dataclasses.replace(options, max_iterations=STAGE_STEPS)
+    for share in np.arange(1, stages) / stages:
+        least = wanted.least - (1.0 - share) * depth
+        search.clearance = ClearanceOutputs(wanted.distances, least)
+        outcome = search.solve(path)
+        path = outcome.x
+        if outcome.stop in ENDED:
+            break
+    search.options, search.clearance = options, wanted
+    return path
+
+
+def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePath:
+    """The motion that knows of no obstacle, or the guess where none is found."""
+    if search.limits.bounded.any():
+        outcome = search.solve(path)
+        return outcome.x if outcome.feasible else path
+    if search.problem.constrained:
+        return path
+    objective, options = ActionObjective(search.problem), search.remaining_options()
+    result = minimize(objective, path, options, search.report)
+    search.iterations += result.iterations
+    return result.x if np.isfinite(result.value) else path
+
+
+def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
+    """More tries, from motions that violate little, or the reason why there is none."""
+    constrained = search.problem.constrained
+    known = first_multipliers(search.problem, outcome.x) if constrained else None
+    objective = search.objective(known)
+    density = mean_density(outcome, objective)
+    least = np.inf
+    for guess in _guesses(search):
+        path, violation, stop = _penalized(search, objective, guess, density)
+        if stop in ENDED:
+            outcome.stop = stop
+            return outcome, ""
+        if violation <= SMALL_VIOLATION:
+            search.multipliers = None
+            again = search.solve(path)
+            if again.feasible or again.stop in ENDED:
+                return again, ""
+        if violation < least:
+            least, outcome.x = violation, path
+    outcome.outputs = objective.outputs(outcome.x)
+    return outcome, search.worst(outcome.x)
+
+
+def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
+    """The guess, and perturbations of it."""
+    yield search.guess
+    problem = search.problem
+    T = problem.grid.duration
+    base = stretched(search.trajectory(search.guess), T)
+    for seed in range(BUMPED_GUESSES):
+        yield problem.path(with_bump(base, problem.robot, T, seed))
+
+
+def _penalized(
+    search: BoundedSearch, objective: BoundedAction, path: DiscretePath, density: float
+) -> tuple[DiscretePath, float, Stop]:
+    """A motion of little violation, by penalties that grow, its violation, and why it ended."""
+    for penalty in PENALTIES:
+        penalized = PenalizedAction(objective, penalty * density)
+        options = dataclasses.replace(search.remaining_options(), max_iterations=PENALTY_STEPS)
+        result = minimize(penalized, path, options, None)
+        path = result.x
+        search.iterations += result.iterations
+        if result.stop in ENDED:
+            break
+    return path, penalized.violation(path), result.stop

@@ -1,0 +1,101 @@
+"""Motions between limits and around obstacles: an interior point, tightened between its points."""
+
+from __future__ import annotations
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options, Stop
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods.bounded_search import BoundedSearch
+from hovi.planning.solver.methods.feasibility import feasible_motion
+from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.methods.tightening import tightened, usable
+from hovi.planning.solver.status import Status, unfinished
+from hovi.system.interruption import remember
+
+
+class InteriorPoint(Method):
+    """A primal-dual interior point, with rounds of multipliers where equations have to be met.
+
+    First the quadrature points are brought between the bounds, then bounds are tightened and
+    intervals halved until the limits hold everywhere to their tolerance.
+    """
+
+    def suits(self, problem: TrajectoryProblem) -> bool:
+        """Problems with limits or obstacles, with or without equations."""
+        return problem.limited
+
+    def minimize(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None = None,
+    ) -> Answer:
+        """See Method.minimize; the guess may violate everything, and intervals may be split."""
+        limits = problem.limits or no_limits(problem.robot)
+        reason = contradiction(problem, limits)
+        if reason:
+            value = problem.ld.action(path)
+            return Answer(problem, path, value, Status.INFEASIBLE, _infeasible(reason))
+        search = BoundedSearch(problem, limits, options, report, path)
+        try:
+            return _searched(search)
+        except KeyboardInterrupt:  # between two solves, each of which hears its own
+            remember()
+            return _interrupted(search)
+
+
+def _searched(search: BoundedSearch) -> Answer:
+    """All stages."""
+    outcome, reason = feasible_motion(search)
+    reason, excess = reason or search.unmet, 0.0
+    if not reason and usable(outcome):
+        outcome, reason, excess = tightened(search, outcome)
+        reason = reason or search.unmet
+    problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
+    value, nit = problem.ld.action(x), search.iterations
+    if reason:
+        status, message = Status.INFEASIBLE, _infeasible(reason)
+    elif outcome.stop is not Stop.STATIONARY:
+        status, message = _unfinished(outcome.stop, nit, value)
+    elif n_neg == 0:
+        status, message = Status.MINIMUM, _minimum(search, value, excess)
+    else:
+        status, message = Status.SADDLE, _saddle(value, n_neg)
+    forces = search.forces(outcome)
+    return Answer(problem, x, value, status, message, nit, n_neg, search.history, forces)
+
+
+def _interrupted(search: BoundedSearch) -> Answer:
+    """Where the last solve ended, and nothing else."""
+    problem, path = search.last
+    value, nit = problem.ld.action(path), search.iterations
+    status, message = _unfinished(Stop.INTERRUPTED, nit, value)
+    return Answer(problem, path, value, status, message, nit, history=search.history)
+
+
+def _infeasible(reason: str) -> str:
+    return f"no motion within the limits was found: {reason}."
+
+
+def _unfinished(stop: Stop, nit: int, cost: float) -> tuple[Status, str]:
+    status, reason = unfinished(stop)
+    return status, (
+        f"{reason} after {nit} steps, before a motion within the limits was found to be a minimum; "
+        f"the motion is the best so far, of cost {cost:.10g}."
+    )
+
+
+def _minimum(search: BoundedSearch, cost: float, excess: float) -> str:
+    share = f" to {excess:.1e} of their ranges" if excess > 0 else ""
+    held = f"limits hold everywhere{share}, on {search.problem.grid.intervals} intervals"
+    return f"a minimum of cost {cost:.10g} after {search.iterations} steps; {held}."
+
+
+def _saddle(cost: float, n_neg: int) -> str:
+    return (
+        f"a saddle of cost {cost:.10g} with {n_neg} directions of negative curvature; solve again "
+        "with another guess."
+    )

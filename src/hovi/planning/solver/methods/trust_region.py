@@ -1,0 +1,54 @@
+"""Motions between fixed or free ends, without limits or equations: a trust-region Newton method."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.status import chart_sentence, status_of
+
+
+class TrustRegion(Method):
+    """Newton's method with exact Hessians in a trust region, until only rounding is left."""
+
+    def suits(self, problem: TrajectoryProblem) -> bool:
+        """Problems without limits and equations."""
+        return not (problem.limited or problem.constrained)
+
+    def minimize(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None = None,
+    ) -> Answer:
+        """See Method.minimize."""
+        objective = ActionObjective(problem)
+        outcome = minimize(objective, path, dataclasses.replace(options, exact=True), report)
+        n_neg = 0 if outcome.convex else negative_eigenvalues(objective, outcome)
+        status, message = status_of(problem, outcome, n_neg)
+        return Answer(
+            problem,
+            outcome.x,
+            outcome.value,
+            status,
+            message + chart_sentence(problem, outcome.x),
+            outcome.iterations,
+            n_neg,
+            outcome.history,
+            jets=objective.jets(outcome.x),
+        )
+
+
+def negative_eigenvalues(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
+    """n_neg from the exact Hessian, -1 where there is none."""
+    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
+        return -1
+    definite = objective.model(outcome.x, None, None).factor(0.0) is not None
+    return 0 if definite else objective.negative_eigenvalues(outcome.x)

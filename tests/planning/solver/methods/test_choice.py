@@ -1,0 +1,60 @@
+"""Every problem is solved by the first method that suits it, and methods are exchangeable."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.errors import InputError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
+from hovi.planning.solver.methods.choice import METHODS, method_for
+from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.methods.method import Method
+from hovi.planning.solver.methods.trust_region import TrustRegion
+from hovi.planning.solver.solver import solve
+from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task_plan import plan_task
+from hovi.robot.bundled_models import example
+
+EXPECTED = {
+    "two_link_reach": TrustRegion,
+    "cart_pole_swing_up": AugmentedLagrangian,
+    "ur5_reach": InteriorPoint,
+}
+
+
+def problem_of(name: str, **options: object) -> TrajectoryProblem:
+    solution = plan_task(
+        load_task(example(name)), max_iterations=1, starts=1, continuation=False, **options
+    )
+    assert solution.problem is not None
+    return solution.problem
+
+
+@pytest.mark.parametrize(("name", "kind"), EXPECTED.items())
+def test_the_first_method_that_suits_is_chosen(name: str, kind: type[Method]) -> None:
+    limits = "urdf" if kind is InteriorPoint else "none"
+    assert isinstance(method_for(problem_of(name, limits=limits)), kind)
+
+
+def test_methods_that_suit_the_same_problem_find_the_same_minimum() -> None:
+    problem = problem_of("two_link_reach", limits="none")
+    suited = [method for method in METHODS if method.suits(problem)]
+    assert [type(method) for method in suited] == [TrustRegion, AugmentedLagrangian]
+    found = [solve(problem, method=method) for method in suited]
+    assert all(solution.success for solution in found)
+    assert found[1].cost == pytest.approx(found[0].cost, rel=1e-11)
+
+
+def test_limits_that_bind_nowhere_change_nothing() -> None:
+    free = solve(problem_of("two_link_reach", limits="none"))
+    wide = {"base": "none", "v": 1e3 * float(np.abs(free.trajectory.v).max())}
+    between = solve(problem_of("two_link_reach", limits=wide))
+    assert between.success
+    assert between.cost == pytest.approx(free.cost, rel=1e-6)
+
+
+def test_a_method_that_does_not_suit_is_refused() -> None:
+    with pytest.raises(InputError, match="TrustRegion cannot meet all"):
+        solve(problem_of("ur5_reach", limits="urdf"), method=TrustRegion())
