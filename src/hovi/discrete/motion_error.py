@@ -17,9 +17,6 @@ Index = npt.NDArray[np.intp]
 
 LEAST_PLACES = 9
 """Places of an interval at which two motions are compared, both ends included, at the least."""
-LENGTHS_OF = {"JointModelFreeFlyer": 3, "JointModelTranslation": 3, "JointModelPlanar": 2}
-"""How many coordinates of a joint are lengths, the first ones, where not all or none are."""
-_SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +96,7 @@ def deviation(
         _at_nodes(trajectory, q),
         _at_nodes(trajectory, tip),
         name,
-        sliding_coordinates(robot),
+        robot.sliding,
     )
 
 
@@ -117,17 +114,6 @@ def places(trajectory: Trajectory) -> tuple[Index, Array]:
     count = max(LEAST_PLACES, 2 * trajectory.grid.inner_modes + 7)
     N = trajectory.grid.intervals
     return np.repeat(np.arange(N), count), np.tile(chebyshev_points(count), N)
-
-
-def sliding_coordinates(robot: Robot) -> npt.NDArray[np.bool_]:
-    """Which joint coordinates are lengths, shape (nv,)."""
-    sliding = np.zeros(robot.nv, dtype=bool)
-    for joint in list(robot.model.joints)[1:]:
-        coordinates = slice(joint.idx_v, joint.idx_v + joint.nv)
-        name = joint.shortname()
-        sliding[coordinates] = name.startswith(_SLIDING)
-        sliding[joint.idx_v : joint.idx_v + LENGTHS_OF.get(name, 0)] = True
-    return sliding
 
 
 def _at_places(reference: Trajectory, trajectory: Trajectory, k: Index, s: Array) -> Sample:

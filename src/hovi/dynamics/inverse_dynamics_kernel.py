@@ -14,32 +14,20 @@ import pinocchio as pin
 from hovi._native import _core
 from hovi.dynamics.extension import archive
 from hovi.errors import InputError, ModelError
+from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
-
-# Joints along whose own motion the axes do not change: the closed forms assume it.
-# "SphericalZYX" and "Universal" bend theirs.
-_FIXED_AXES = frozenset(
-    ["JointModelTranslation"]
-    + [f"JointModel{kind}{axis}" for kind in ("R", "P", "H", "RUB") for axis in "XYZ"]
-    + [f"JointModel{kind}Unaligned" for kind in ("Revolute", "Prismatic", "Helical")]
-    + ["JointModelRevoluteUnboundedUnaligned"]
-)
-_BASES = frozenset(["JointModelFreeFlyer", "JointModelSpherical", "JointModelPlanar"])
-"""Where such a joint carries all others, it enters through gravity alone."""
 
 
 def joints_without_kernel(model: pin.Model) -> tuple[str, ...]:
     """Names of the joints for which there are no analytic second derivatives."""
-    mimicking = set(model.mimicking_joints)
     alone = list(model.parents)[1:].count(0) == 1
-    return tuple(
-        str(name)
-        for index, (name, joint) in enumerate(zip(model.names, model.joints, strict=True))
-        if index > 0
-        and (joint.shortname() not in _FIXED_AXES or index in mimicking)
-        and not (joint.shortname() in _BASES and index == 1 and alone)
-    )
+
+    def served(index: int) -> bool:
+        kernel = kind_of(model.joints[index]).kernel
+        return kernel == "anywhere" or (kernel == "as base" and index == 1 and alone)
+
+    return tuple(str(model.names[i]) for i in range(1, model.njoints) if not served(i))
 
 
 class InverseDynamicsKernel:

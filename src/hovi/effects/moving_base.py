@@ -11,6 +11,7 @@ from hovi.effects.effect import Effect
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.effects.expressions.time_vector import TimeVector, in_words, time_vector
 from hovi.errors import SceneError
+from hovi.robot.space.joint_kinds import FLOATING, kind_of
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot
@@ -38,7 +39,7 @@ class MovingBase(Effect):
         for name in ("position", "rotation"):
             time_vector(f"effect 'moving_base': {name}", getattr(self, name), ca.SX.sym("t"))
         for name, joint in list(zip(robot.model.names, robot.model.joints, strict=True))[1:]:
-            if joint.shortname() == "JointModelFreeFlyer":
+            if kind_of(joint) is FLOATING:
                 raise SceneError(
                     f"effect 'moving_base': joint {name!r} of robot {robot.name!r} floats, so that "
                     "its base moves by itself; load the robot with free_flyer=False."

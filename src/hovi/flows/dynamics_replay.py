@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.discrete.motion_error import sliding_coordinates
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.robot.mass_matrix import MassMatrix
@@ -99,7 +98,7 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         np.abs(hv / h - trajectory.v[1:]),
         np.linalg.norm(tips[0] - tips[1], axis=1),
         name,
-        sliding_coordinates(robot),
+        robot.sliding,
     )
 
 

@@ -13,27 +13,11 @@ from hovi.robot.mimic_model import couplings_of
 from hovi.robot.mimic_tags import held_values
 from hovi.robot.model import couplings_in
 from hovi.robot.source import RobotSource
+from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.robot.urdf.check import checked_urdf
 
 Array = npt.NDArray[np.float64]
 
-_TYPES = {
-    "JointModelFreeFlyer": "floating",
-    "JointModelPlanar": "planar",
-    "JointModelSpherical": "spherical",
-    "JointModelSphericalZYX": "spherical",
-    "JointModelTranslation": "translation",
-    "JointModelComposite": "composite",
-}
-_TYPE_BEGINNINGS = {
-    "JointModelRUB": "continuous",
-    "JointModelRevoluteUnbounded": "continuous",
-    "JointModelR": "revolute",
-    "JointModelP": "prismatic",
-    "JointModelH": "helical",
-    "JointModelU": "universal",
-    "JointModelMimic": "mimic",
-}
 _ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
 
 
@@ -53,13 +37,6 @@ def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -
     if notes:
         sections.append("\n".join(["Worth knowing:", *notes]))
     return "\n\n".join(sections)
-
-
-def joint_type(joint: pin.JointModel) -> str:
-    """A joint's type in URDF's words, or Pinocchio's name where URDF has none."""
-    short = str(joint.shortname())
-    beginnings = (word for start, word in _TYPE_BEGINNINGS.items() if short.startswith(start))
-    return _TYPES.get(short) or next(beginnings, short)
 
 
 def _headline(name: str, model: pin.Model, source: RobotSource) -> str:
@@ -99,7 +76,7 @@ def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
             )
         speed = _number(max(model.velocityLimit[joint.idx_v : joint.idx_v + joint.nv]))
         effort = _number(max(model.effortLimit[joint.idx_v : joint.idx_v + joint.nv]))
-        yield _ROW.format(name, joint_type(joint), *limits, speed, effort, width=width)
+        yield _ROW.format(name, kind_of(joint).word, *limits, speed, effort, width=width)
     for name, value in held.items():
         yield f"  {name:<{width}}  {'mimic':<11}  = {value:g}"
 
@@ -107,8 +84,8 @@ def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
 def _place(model: pin.Model, source: RobotSource, tip_frame: str) -> str:
     base = "floating" if source.free_flyer else "fixed"
     if source.kind == "model":
-        first = joint_type(model.joints[1]) if model.njoints > 1 else "fixed"
-        base = "floating" if first == "floating" else "fixed"
+        floats = model.njoints > 1 and kind_of(model.joints[1]) is FLOATING
+        base = FLOATING.word if floats else "fixed"
     locked = f"; locked: {', '.join(source.locked)}" if source.locked else ""
     return f"Base: {base}{locked}. Tip frame: {tip_frame} ({_count(model.nframes, 'frame')})."
 

@@ -93,7 +93,7 @@ def uncoupled(model: pin.Model) -> pin.Model:
     """
     leaders = dict(zip(model.mimicking_joints, model.mimicked_joints, strict=True))
 
-    def kind(joint: pin.JointModel) -> pin.JointModel:
+    def replacement(joint: pin.JointModel) -> pin.JointModel:
         if joint.id not in leaders:
             return joint
         along, about = (part / joint.extract().scaling for part in axis(joint))
@@ -104,7 +104,7 @@ def uncoupled(model: pin.Model) -> pin.Model:
         turning = model.joints[leaders[joint.id]].nq == 2
         return (continuous_joint if turning else pin.JointModelRevoluteUnaligned)(about)
 
-    return rebuilt(model, range(1, model.njoints), kind)
+    return rebuilt(model, range(1, model.njoints), replacement)
 
 
 @dataclass(frozen=True, eq=False)

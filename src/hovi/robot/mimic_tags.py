@@ -97,16 +97,16 @@ def leaders_first(model: pin.Model, couplings: Sequence[Coupling]) -> pin.Model:
     pairs = [(model.getJointId(c.leader), follower) for follower, c in by_id.items()]
     order = list(_order(model, pairs))
 
-    def kind(joint: pin.JointModel) -> pin.JointModel:
+    def replacement(joint: pin.JointModel) -> pin.JointModel:
         coupling = by_id.get(joint.id)
         if coupling is None:
             return joint
         return _like(joint, model.joints[model.getJointId(coupling.leader)], coupling)
 
     same = order == list(range(1, model.njoints))
-    if same and all(kind(joint) is joint for joint in list(model.joints)[1:]):
+    if same and all(replacement(joint) is joint for joint in list(model.joints)[1:]):
         return model
-    return rebuilt(model, order, kind)
+    return rebuilt(model, order, replacement)
 
 
 def _like(joint: pin.JointModel, leader: pin.JointModel, coupling: Coupling) -> pin.JointModel:

@@ -26,21 +26,21 @@ IN_V = (
 IN_Q = ("lowerPositionLimit", "upperPositionLimit")
 """What it holds per number of q."""
 
-JointKinds = Callable[[pin.JointModel], pin.JointModel]
+Replacement = Callable[[pin.JointModel], pin.JointModel]
 
 
-def rebuilt(model: pin.Model, order: Sequence[int], kind: JointKinds) -> pin.Model:
+def rebuilt(model: pin.Model, order: Sequence[int], replacement: Replacement) -> pin.Model:
     """The same bodies and frames on joints in another order, each after the one that carries it.
 
     order: Pinocchio's indices of all joints but the universe, depth first.
-    kind: what takes the place of a joint. What is stated per coordinate (limits, armature, losses)
-        goes along with joints that keep their size; others get none.
+    replacement: what takes the place of a joint. What is stated per coordinate (limits, armature,
+        losses) goes along with joints that keep their size; others get none.
     """
     built = pin.Model()
     built.name, built.gravity = model.name, model.gravity
     places = {0: 0}
     for index in order:
-        joint = kind(model.joints[index])
+        joint = replacement(model.joints[index])
         at = places[model.parents[index]], joint, model.jointPlacements[index]
         places[index] = built.addJoint(*at, str(model.names[index]))
         built.appendBodyToJoint(places[index], model.inertias[index], pin.SE3.Identity())

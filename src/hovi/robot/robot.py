@@ -27,6 +27,7 @@ from hovi.robot.source import RobotSource
 from hovi.robot.space import pinocchio_configurations as configuration
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
+from hovi.robot.space.joint_kinds import LENGTH, Units, coordinate_units
 from hovi.robot.srdf import Srdf, parse_srdf
 
 Array = npt.NDArray[np.float64]
@@ -78,6 +79,16 @@ class Robot:
     def coordinate_names(self) -> tuple[str, ...]:
         """One name per velocity, (nv,): the joint's name, with [i] where it has several."""
         return configuration.entry_names(self.model, "nv")
+
+    @cached_property
+    def coordinate_units(self) -> tuple[Units, ...]:
+        """Units of q, v, a and tau at each coordinate, (nv,)."""
+        return coordinate_units(self.model)
+
+    @property
+    def sliding(self) -> npt.NDArray[np.bool_]:
+        """Which coordinates are lengths, (nv,)."""
+        return np.array([units == LENGTH for units in self.coordinate_units], dtype=bool)
 
     @cached_property
     def space(self) -> ConfigurationSpace:

@@ -250,8 +250,8 @@ def require_known_joints(robot: Robot) -> None:
     if robot.unplanned_joints:
         joints = ", ".join(repr(joint) for joint in robot.unplanned_joints)
         raise ModelError(
-            f"robot {robot.name!r} cannot be planned on: {joints} move neither by numbers that add "
-            "nor on SO(2), SE(2), SO(3) or SE(3); lock these joints with "
+            f"robot {robot.name!r} cannot be planned on: {joints} are not known to move by numbers "
+            "that add or on SO(2), SE(2), SO(3) or SE(3); lock these joints with "
             "load_robot(..., locked=[...])."
         )
     for coupling in robot.couplings:

@@ -23,7 +23,6 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
-from hovi.discrete.motion_error import sliding_coordinates
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limits import KINDS, Limits
@@ -178,7 +177,7 @@ def is_planar_two_link(robot: Robot) -> bool:
     if (robot.nq, robot.nv, robot.model.njoints) != (2, 2, 3) or list(robot.model.parents)[2] != 1:
         return False
     first, second = _axes_in_world(robot).T
-    return bool(not sliding_coordinates(robot).any() and abs(first @ second) > 1 - 1e-9)
+    return bool(not robot.sliding.any() and abs(first @ second) > 1 - 1e-9)
 
 
 def _robot(trajectory: Trajectory) -> Robot:
@@ -245,7 +244,7 @@ def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion
         _lines(ax, trajectory, panel.kind, curve, y, 1.0, np.arange(y.shape[-1]))
         _dress(ax, label)
         return
-    angular, side = ~sliding_coordinates(robot), ax
+    angular, side = ~robot.sliding, ax
     for mask, (label, scale) in ((angular, panel.angular), (~angular, panel.linear)):
         if mask.any():
             side = ax.twinx() if side.lines else ax

@@ -13,7 +13,6 @@ from hovi.robot.space.groups import SE2, SE3, SO2, SO3
 Array = npt.NDArray[np.float64]
 
 _NOTHING = 1e-9
-_PARTS = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
@@ -47,7 +46,7 @@ def shown_names(space: ConfigurationSpace, coordinates: Sequence[str]) -> tuple[
     shown = list(coordinates)
     for factor in space.curved:
         joint = shown[factor.v.start].removesuffix("[0]")
-        shown[factor.v] = [f"{joint}[{_PARTS[place]}]" for place in factor.group.places]
+        shown[factor.v] = [f"{joint}[{part}]" for part in factor.group.coordinates]
     return tuple(shown)
 
 

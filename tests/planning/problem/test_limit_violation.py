@@ -7,7 +7,7 @@ import pytest
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import closeness, excess_along, worst_sentence
-from hovi.planning.problem.limits import as_limits, unit_of
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -60,6 +60,6 @@ def test_the_worst_is_named_with_joint_time_and_numbers(
 
 def test_sliding_joints_are_measured_in_metres(panda: Robot) -> None:
     hand = load_robot("panda")  # with its two sliding fingers
-    assert unit_of(hand, "v", 8) == "m/s"
-    assert unit_of(hand, "tau", 8) == "N"
-    assert unit_of(panda, "tau", 0) == "N m"
+    assert hand.coordinate_units[8].v == "m/s"
+    assert hand.coordinate_units[8].tau == "N"
+    assert panda.coordinate_units[0].tau == "N m"

@@ -13,7 +13,6 @@ from hovi.discrete.motion_error import (
     MotionError,
     deviation,
     relative_difference,
-    sliding_coordinates,
 )
 from hovi.discrete.state import State
 from hovi.effects import Gravity
@@ -183,11 +182,11 @@ def test_turning_and_sliding_joints_are_told_apart() -> None:
         )
 
     robot = cart(joint(1, "prismatic") + joint(2, "revolute"))
-    np.testing.assert_array_equal(sliding_coordinates(robot), [True, False])
+    np.testing.assert_array_equal(robot.sliding, [True, False])
 
 
 def test_lengths_of_bases_are_told_from_their_angles() -> None:
-    slides = {base: sliding_coordinates(load_robot(with_arm(base))) for base in BASES}
+    slides = {base: load_robot(with_arm(base)).sliding for base in BASES}
     assert slides["free-flyer"].tolist() == [True] * 3 + [False] * 5 + [True]
     assert slides["planar"].tolist() == [True] * 2 + [False] * 3 + [True]
     assert slides["spherical"].tolist() == [False] * 5 + [True]

@@ -133,8 +133,6 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
 
 
 def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) -> dict[str, Any]:
-    from hovi.cli.reports.simulation import units_of
-
     joints, tip = abs(tracking.joint_deviation), tracking.tip_deviation
     return {
         "plan": str(plan),
@@ -144,7 +142,7 @@ def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) 
         "tip_deviation_max": float(tip.max()),
         "joint_deviation_end": joints[-1].tolist(),
         "joint_deviation_max": joints.max(axis=0).tolist(),
-        "joint_units": units_of(tracking.simulation.scene.robot),
+        "joint_units": [units.q for units in tracking.simulation.scene.robot.coordinate_units],
         "feedback_torque_max": abs(tracking.feedback_torque).max(axis=0).tolist(),
     }
 
@@ -167,15 +165,14 @@ def _print(report: dict[str, Any], motion: Simulation) -> None:
     if passed:
         print(limits_sentence(passed))
     if "plan" in report:
-        _print_deviation(report)
+        _print_deviation(report, [units.tau for units in motion.scene.robot.coordinate_units])
     if report["out"] is not None:
         print(f"written to {report['out']}")
 
 
-def _print_deviation(report: dict[str, Any]) -> None:
+def _print_deviation(report: dict[str, Any], efforts: list[str]) -> None:
     units = report["joint_units"]
     if report["bandwidth"] is not None:
-        efforts = ["N" if unit == "m" else "N m" for unit in units]
         most = _measured(report["feedback_torque_max"], efforts)
         print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {most}")
     print(

@@ -9,13 +9,11 @@ import numpy as np
 from rich.box import SIMPLE
 from rich.table import Table
 
-from hovi.discrete.motion_error import sliding_coordinates
 from hovi.planning.problem.limits import urdf_limits
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
 if TYPE_CHECKING:
     from hovi.flows.simulator import Simulation
-    from hovi.robot.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class Passed:
 def passed_limits(motion: Simulation) -> list[Passed]:
     """The first limit that each joint is beyond at a node by more than rounding, by time."""
     robot, found = motion.scene.robot, []
-    limits, units = urdf_limits(robot), units_of(robot)
+    limits, units = urdf_limits(robot), robot.coordinate_units
     for iq, iv in zip(*robot.space.plain, strict=True):
         low, high = limits.lower[0, iv], limits.upper[0, iv]
         q = motion.q[:, iq]
@@ -41,7 +39,7 @@ def passed_limits(motion: Simulation) -> list[Passed]:
             k = beyond[0]
             limit = float(low if q[k] < low else high)
             name = robot.coordinate_names[iv]
-            found.append(Passed(name, limit, units[iv], float(motion.t[k])))
+            found.append(Passed(name, limit, units[iv].q, float(motion.t[k])))
     return sorted(found, key=lambda each: each.t)
 
 
@@ -55,20 +53,14 @@ def limits_sentence(passed: list[Passed]) -> str:
     )
 
 
-def units_of(robot: Robot) -> list[str]:
-    """The unit of each coordinate."""
-    return ["m" if slides else "rad" for slides in sliding_coordinates(robot)]
-
-
 def end_state(motion: Simulation) -> list[dict[str, Any]]:
     """A row for each coordinate: joint, q, v and unit at the end, as `unwrapped` shows them."""
     robot = motion.scene.robot
     names = shown_names(robot.space, robot.coordinate_names)
     rows = zip(names, unwrapped(robot.space, motion.q)[-1], motion.v[-1], strict=True)
-    units = units_of(robot)
     return [
-        {"joint": name, "q": q, "v": v, "unit": unit}
-        for (name, q, v), unit in zip(rows, units, strict=True)
+        {"joint": name, "q": q, "v": v, "unit": units.q}
+        for (name, q, v), units in zip(rows, robot.coordinate_units, strict=True)
     ]
 
 

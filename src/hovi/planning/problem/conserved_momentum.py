@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -35,7 +36,7 @@ class Kept:
 def falls_freely(scene: Scene) -> bool:
     """Whether the first joint is a free base without torque on which nothing acts but gravity."""
     model, terms = scene.robot.model, scene.terms
-    floats = model.joints[1].shortname() == "JointModelFreeFlyer"
+    floats = kind_of(model.joints[1]) is FLOATING
     alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
     if not (floats and alone and scene.robot.joint_names[0] in scene.passive):
         return False

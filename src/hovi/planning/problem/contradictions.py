@@ -8,7 +8,7 @@ import numpy.typing as npt
 from hovi.planning.clearance.violation import in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
-from hovi.planning.problem.limits import KINDS, NAMES, Limits, unit_of
+from hovi.planning.problem.limits import KINDS, NAMES, Limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.robot import Robot
@@ -52,7 +52,8 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
         if over[i] > 0:
             bound = limits.upper[3, i] if tau[i] > 0 else limits.lower[3, i]
             return (
-                f"; holding the {end} alone takes {tau[i]:.4g} N m at joint "
+                f"; holding the {end} alone takes {tau[i]:.4g} "
+                f"{problem.robot.coordinate_units[i].tau} at joint "
                 f"{problem.robot.coordinate_names[i]!r}, whose limit is {bound:.4g}"
             )
     return ""
@@ -65,10 +66,9 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, he
     i = int(np.argmax(outside))
     if outside[i] <= limits.tolerance:
         return ""
-    kind, name = KINDS[row], robot.coordinate_names[i]
+    name, unit = robot.coordinate_names[i], robot.coordinate_units[i][row]
     return (
-        f"the {NAMES[kind]} of joint {name!r} at the {end} is {values[i]:.6g} "
-        f"{unit_of(robot, kind, i)}, "
+        f"the {NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
         f"{end} or widen them"
     )
@@ -124,9 +124,9 @@ def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...
     i = int(np.argmax(needed))
     if needed[i] <= T:
         return ""
-    way, speed = unit_of(problem.robot, "q", i), unit_of(problem.robot, "v", i)
+    units = problem.robot.coordinate_units[i]
     return (
-        f"joint {names[i]!r} has {abs(distance[i]):.4g} {way} to go, which takes {needed[i]:.4g} s "
-        f"at its velocity limit of {fastest[i]:.4g} {speed}, more than the duration of {T:.4g} s; "
-        "allow more time or a higher velocity"
+        f"joint {names[i]!r} has {abs(distance[i]):.4g} {units.q} to go, which takes "
+        f"{needed[i]:.4g} s at its velocity limit of {fastest[i]:.4g} {units.v}, more than the "
+        f"duration of {T:.4g} s; allow more time or a higher velocity"
     )

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.problem.limits import KINDS, NAMES, Limits, unit_of
+from hovi.planning.problem.limits import KINDS, NAMES, Limits
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -105,7 +105,7 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
     value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
     bound = (limits.upper if above else limits.lower)[kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    unit = unit_of(robot, KINDS[kind], int(joint))
+    unit = robot.coordinate_units[joint][kind]
     return (
         f"the {NAMES[KINDS[kind]]} of joint {robot.coordinate_names[joint]!r} reaches {value:.4g} "
         f"{unit} at t = {t:.3g} s, its limit is {bound:.4g}"

@@ -18,8 +18,6 @@ Range = tuple[Array, Array]
 KINDS = ("q", "v", "a", "tau")
 """What can be limited, in the order in which outputs are stacked."""
 NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
-_SLIDING = tuple(f"JointModelP{axis}" for axis in ("X", "Y", "Z", "rismatic"))
-_TRANSLATIONS = {"JointModelFreeFlyer": 3, "JointModelPlanar": 2, "JointModelTranslation": 3}
 UNLIMITED = 1e15
 """Bounds beyond this mean that there is none."""
 LEAST_ROOM = 1e-12
@@ -212,16 +210,3 @@ def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
     raise InputError(
         f"limits.{kind} of {name!r} is a positive number or a rising pair, got {value!r}."
     )
-
-
-def unit_of(robot: Robot, kind: str, i: int) -> str:
-    """Unit of q, v, a or tau at a joint coordinate: radians and N m, or metres and N.
-
-    kind: one of KINDS. i: place in v.
-    """
-    joint = next(j for j in list(robot.model.joints)[1:] if j.idx_v <= i < j.idx_v + j.nv)
-    sliding = joint.shortname().startswith(_SLIDING) or i - joint.idx_v < _TRANSLATIONS.get(
-        joint.shortname(), 0
-    )
-    angle, effort = ("m", "N") if sliding else ("rad", "N m")
-    return {"q": angle, "v": f"{angle}/s", "a": f"{angle}/s^2", "tau": effort}[kind]

@@ -5,10 +5,14 @@ The expression that belongs to Pinocchio's `integrate`: d/ds of q (+) s v at s =
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import pinocchio as pin
 
 from hovi.errors import SceneError
+from hovi.robot.space.groups import SE2, SE3, SO2, SO3
+from hovi.robot.space.joint_kinds import kind_of
 
 
 def configuration_rate(model: pin.Model, q: ca.SX, v: ca.SX) -> ca.SX:
@@ -20,24 +24,35 @@ def configuration_rate(model: pin.Model, q: ca.SX, v: ca.SX) -> ca.SX:
     for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
         here = q[joint.idx_q : joint.idx_q + joint.nq]
         rate = v[joint.idx_v : joint.idx_v + joint.nv]
-        rates.append(_rate(str(name), joint.shortname(), here, rate))
+        rates.append(_rate(str(name), joint, here, rate))
     return ca.vertcat(*rates)
 
 
-def _rate(name: str, kind: str, q: ca.SX, v: ca.SX) -> ca.SX:
-    if q.shape == v.shape:
+def _rate(name: str, joint: pin.JointModel, q: ca.SX, v: ca.SX) -> ca.SX:
+    if joint.nq == joint.nv:
         return v
-    if kind.startswith(("JointModelRUB", "JointModelRevoluteUnbounded")):
-        return ca.vertcat(-q[1], q[0]) * v  # (cos, sin)
-    if kind == "JointModelPlanar":
-        moved = ca.vertcat(q[2] * v[0] - q[3] * v[1], q[3] * v[0] + q[2] * v[1])
-        return ca.vertcat(moved, -q[3] * v[2], q[2] * v[2])
-    if kind == "JointModelSpherical":
-        return _quaternion_rate(q, v)
-    if kind == "JointModelFreeFlyer":
-        moved = _rotated(q[3:], v[:3])
-        return ca.vertcat(moved, _quaternion_rate(q[3:], v[3:]))
-    raise SceneError(f"joint {name!r} is of a kind ({kind}) whose frames no effect can follow.")
+    kind = kind_of(joint)
+    if kind.group is None:
+        raise SceneError(
+            f"joint {name!r} is of a kind ({kind.word}) whose frames no effect can follow."
+        )
+    return _RATES[kind.group.name](q, v)
+
+
+def _angle_rate(q: ca.SX, v: ca.SX) -> ca.SX:
+    """Of (cos, sin)."""
+    return ca.vertcat(-q[1], q[0]) * v
+
+
+def _plane_rate(q: ca.SX, v: ca.SX) -> ca.SX:
+    """Of (x, y, cos, sin)."""
+    moved = ca.vertcat(q[2] * v[0] - q[3] * v[1], q[3] * v[0] + q[2] * v[1])
+    return ca.vertcat(moved, -q[3] * v[2], q[2] * v[2])
+
+
+def _pose_rate(q: ca.SX, v: ca.SX) -> ca.SX:
+    """Of (position, quaternion)."""
+    return ca.vertcat(_rotated(q[3:], v[:3]), _quaternion_rate(q[3:], v[3:]))
 
 
 def _quaternion_rate(q: ca.SX, spin: ca.SX) -> ca.SX:
@@ -50,3 +65,11 @@ def _rotated(q: ca.SX, x: ca.SX) -> ca.SX:
     """x from the body's axes into its parent's, by the unit quaternion (x, y, z, w)."""
     twice = 2 * ca.cross(q[:3], x)
     return x + q[3] * twice + ca.cross(q[:3], twice)
+
+
+_RATES: dict[str, Callable[[ca.SX, ca.SX], ca.SX]] = {
+    SO2.name: _angle_rate,
+    SE2.name: _plane_rate,
+    SO3.name: _quaternion_rate,
+    SE3.name: _pose_rate,
+}

@@ -11,27 +11,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import InputError
-from hovi.robot.space.groups import (
-    GROUPS,
-    SE2,
-    SE3,
-    SO2,
-    SO3,
-    Group,
-    Layout,
-    differenced,
-    integrated,
-)
+from hovi.robot.space.groups import GROUPS, SE2, SO2, Group, Layout, differenced, integrated
+from hovi.robot.space.joint_kinds import COMPOSITE, kind_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-
-_JOINTS = {
-    "JointModelPlanar": SE2,
-    "JointModelSpherical": SO3,
-    "JointModelFreeFlyer": SE3,
-}
-_CONTINUOUS = "JointModelRUB", "JointModelRevoluteUnbounded"
 
 
 @dataclass(frozen=True)
@@ -213,18 +197,16 @@ def configuration_space(model: pin.Model) -> tuple[ConfigurationSpace, tuple[str
 
 def _parts_of(joint: pin.JointModel) -> list[int | str] | None:
     """The parts of a joint, those of a composite's members; None for one that has none."""
-    kind = joint.shortname()
-    if kind == "JointModelComposite":
+    kind = kind_of(joint)
+    if kind is COMPOSITE:
         members = [_parts_of(member) for member in joint.extract().joints]
         known = [part for member in members if member is not None for part in member]
         return known if all(member is not None for member in members) else None
-    if kind.startswith(_CONTINUOUS):
-        return [SO2.name]
-    if kind in _JOINTS:
-        return [_JOINTS[kind].name]
-    if joint.nq != joint.nv:
+    if kind.group is not None:
+        return [kind.group.name]
+    if kind.units is None:
         return None
-    return [int(joint.nv)] if joint.nv else []
+    return [len(kind.units)] if kind.units else []
 
 
 def _merged(parts: Sequence[int | str]) -> list[int | str]:

@@ -54,6 +54,11 @@ class Group:
         return differenced(self._layout, g0, g1, expected)
 
     @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the numbers of a position and a rotation vector, (nv,), as reports use them."""
+        return tuple(_COORDINATES[place] for place in self.places)
+
+    @property
     def _layout(self) -> Layout:
         return np.array([[self.kind, 0, 0, self.nv]])
 
@@ -119,6 +124,7 @@ def _rows(x: Array, lead: tuple[int, ...]) -> Array:
     return np.ascontiguousarray(full, dtype=np.float64).reshape(-1, x.shape[-1])
 
 
+_COORDINATES = ("x", "y", "z", "rx", "ry", "rz")
 _TURN = ("qx", "qy", "qz", "qw")
 SO2 = Group("SO(2)", 1, 2, 1, (0,), (5,), (0, 1), ("cos", "sin"))
 SE2 = Group("SE(2)", 2, 4, 3, (2,), (0, 1, 5), (2, 3), ("x", "y", "cos", "sin"))
