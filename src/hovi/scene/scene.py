@@ -250,9 +250,9 @@ def require_known_joints(robot: Robot) -> None:
     if robot.unplanned_joints:
         joints = ", ".join(repr(joint) for joint in robot.unplanned_joints)
         raise ModelError(
-            f"robot {robot.name!r} cannot be planned on: {joints} are not known to move by numbers "
-            "that add or on SO(2), SE(2), SO(3) or SE(3); lock these joints with "
-            "load_robot(..., locked=[...])."
+            f"robot {robot.name!r} cannot be planned on: it has joints of no known kind, {joints}: "
+            "known ones move by numbers that add or on SO(2), SE(2), SO(3) or SE(3); lock these "
+            "joints with load_robot(..., locked=[...])."
         )
     for coupling in robot.couplings:
         try:

@@ -143,7 +143,7 @@ def test_what_the_table_does_not_know_is_refused_by_name(monkeypatch: pytest.Mon
     robot = load_robot(chain([JOINTS["RX"], JOINTS["HX"], JOINTS["PY"]]))
     assert "JointModelHX" in robot.describe()
     assert [each.q for each in robot.coordinate_units] == ["rad", "rad", "m"]
-    with pytest.raises(ModelError, match=r"cannot be planned on: 'j1' .* lock these joints"):
+    with pytest.raises(ModelError, match=r"cannot be planned on: .* no known kind, 'j1': .* lock"):
         Scene(robot).effort_lagrangian()
 
 
