@@ -20,7 +20,7 @@ from pathlib import Path
 from measuring import alone, print_machine, print_table
 
 import hovi
-from hovi.accuracy import Diagram, MotionError, Run, work_precision
+from hovi.accuracy import Diagram, Run, Thresholds, work_precision
 from hovi.accuracy.peers.external_method import crocoddyl_peers, drake_peers
 from hovi.accuracy.peers.ipopt_method import ipopt_peers
 from hovi.accuracy.picture import plot_work_precision
@@ -31,7 +31,7 @@ SHARES = {"two_link_reach": 0.4}
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
 REPEATS = 4
-ENOUGH = MotionError(cost=1e-11, joints=1e-6, tip=1e-2)
+ENOUGH = Thresholds(cost=1e-11, joints=1e-6, tip=1e-5)
 INTERPRETED = ("hermite-simpson", "lg-3", "lg-5", "lgr-5")
 INTRODUCTION = """\
 Every solve starts near the motion (nine tenths of it, one tenth of the cubic). *Warm* is the

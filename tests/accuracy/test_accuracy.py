@@ -17,13 +17,15 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.accuracy import MotionError, Run, work_precision
+import hovi
+import hovi.accuracy
+from hovi.accuracy import Run, Thresholds, work_precision
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.measuring import LADDER, measure
 from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.picture import work_precision_figure
-from hovi.accuracy.reference_motion import Yardstick
+from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.tables import as_csv
 from hovi.cli import main
 from hovi.discrete.state import State
@@ -47,8 +49,15 @@ def reach() -> Diagram:
     )
 
 
+def error_of(cost: float, joints: float, tip: float) -> hovi.MotionError:
+    """One joint that turns, with the same error everywhere."""
+    q, one = np.full((2, 1), joints), np.full(2, tip)
+    unknown, sliding = np.full((1, 1), np.nan), np.zeros(1, dtype=bool)
+    return hovi.MotionError(cost, q[:1], unknown, unknown, one[:1], q, one, "tip", sliding)
+
+
 def run(method: str, intervals: int, cost: float, seconds: float, joints: float = 1e-3) -> Run:
-    error = MotionError(cost, joints, 1.0)
+    error = error_of(cost, joints, 1e-3)
     return Run(method, "hovi", 4, intervals, True, "", 1.0, 3, error, 0.1, 1.0, (seconds,))
 
 
@@ -56,7 +65,7 @@ def diagram_of(reach: Diagram, *runs: Run) -> Diagram:
     return Diagram("synthetic", "near", reach.resolved, runs)
 
 
-def test_errors_are_in_radians_and_in_millimetres_at_the_tip(pendulum: Robot) -> None:
+def test_errors_are_in_radians_and_in_metres_at_the_tip(pendulum: Robot) -> None:
     turn, T = 1e-3, 2.0
 
     def still(t: Array) -> Array:
@@ -66,10 +75,45 @@ def test_errors_are_in_radians_and_in_millimetres_at_the_tip(pendulum: Robot) ->
         return np.where(t[:, None] > T / 2, turn, 0.0)
 
     length = np.linalg.norm(pendulum.frame_position(pendulum.tip_frame, np.zeros((1, 1))))
-    error = Yardstick(pendulum, T, still, 2.0).error(2.0 * (1 + 1e-5), turned)
+    error = ReferenceMotion(pendulum, T, still, 2.0).error(2.0 * (1 + 1e-5), turned)
     assert error.cost == pytest.approx(1e-5, rel=1e-9)
-    assert error.joints == turn
-    assert error.tip == pytest.approx(1e3 * 2 * length * math.sin(turn / 2), rel=1e-9)
+    assert error.angle == error.largest_q == turn
+    assert error.largest_tip == pytest.approx(2 * length * math.sin(turn / 2), rel=1e-9)
+    np.testing.assert_array_equal(error.q_at_nodes, [[0.0], [turn]])
+    assert error.frame == pendulum.tip_frame
+
+
+@pytest.mark.parametrize("cost", [math.inf, math.nan])
+def test_a_motion_whose_cost_is_not_finite_is_infinitely_far(pendulum: Robot, cost: float) -> None:
+    reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
+    error = reference.error(cost, lambda t: np.full((len(t), 1), np.nan))
+    assert error.cost == error.largest_q == error.largest_tip == math.inf
+
+
+def test_there_is_one_motion_error_and_its_old_name_says_so() -> None:
+    with pytest.warns(DeprecationWarning, match=r"hovi\.accuracy\.Thresholds"):
+        assert hovi.accuracy.MotionError is hovi.MotionError
+
+
+def test_thresholds_are_met_where_no_error_is_larger() -> None:
+    small = Thresholds(cost=1e-6, joints=1e-4, tip=1e-3)
+    assert small.met_by(error_of(1e-6, 1e-4, 1e-3))
+    for error in (error_of(2e-6, 0, 0), error_of(0, 2e-4, 0), error_of(0, 0, 2e-3)):
+        assert not small.met_by(error)
+
+
+def test_files_and_pictures_show_the_tip_in_millimetres(reach: Diagram) -> None:
+    data, resolved = reach.to_dict(), reach.resolved.uncertainty
+    assert data["resolved"]["uncertainty"]["tip"] == 1e3 * resolved.largest_tip
+    for row, each in zip(data["runs"], reach.runs, strict=True):
+        assert row["tip_error_mm"] == 1e3 * each.error.largest_tip
+    for choice, each in zip(data["choices"], reach.choices, strict=True):
+        assert choice["error"]["tip"] == 1e3 * each.error.largest_tip
+    panel = work_precision_figure(reach).axes[2]
+    assert panel.get_ylabel() == "largest error of the tip [mm]"
+    shown = panel.lines[0].get_ydata()
+    counted = [1e3 * each.error.largest_tip for each in reach.of(FEW[0]) if each.counts]
+    np.testing.assert_array_equal(shown, np.maximum(counted, 1e-16))
 
 
 def test_the_motion_that_others_are_measured_against_solves_pontryagins_equations(
@@ -80,7 +124,7 @@ def test_the_motion_that_others_are_measured_against_solves_pontryagins_equation
     ends = (paper_arm.HANG, paper_arm.REST, paper_arm.REACH_Q, paper_arm.REACH_V)
     true = paper_arm.extremal(ends, 1.0, (motion.t, y), tolerance=1e-9)
     assert reach.resolved.cost == pytest.approx(true.cost, rel=1e-9)
-    t = reach.resolved.yardstick.times
+    t = reach.resolved.reference.times
     np.testing.assert_allclose(motion.configurations(t), true.at(t)[0], rtol=0, atol=1e-8)
 
 
@@ -102,7 +146,7 @@ def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) 
     assert reach.complete
     for each in reach.runs:
         assert each.intervals in LADDER
-        assert each.counts == (each.success and each.error.joints <= 0.1)
+        assert each.counts == (each.success and each.error.largest_q <= 0.1)
         assert each.setup_seconds > 0
         assert each.first_seconds > 0
         assert len(each.repeats) == (1 if each.counts else 0)
@@ -171,8 +215,8 @@ class Pretended(Method):
 
 
 def measured(pendulum: Robot, budget: float, *methods: Method) -> Any:
-    yardstick = Yardstick(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
-    return measure(methods, yardstick, Budget(budget), lambda text, fraction: None)
+    reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
+    return measure(methods, reference, Budget(budget), lambda text, fraction: None)
 
 
 def test_a_method_that_refuses_a_grid_keeps_its_runs_and_is_named(pendulum: Robot) -> None:

@@ -38,10 +38,10 @@ def test_a_resolved_motion_solves_pontryagins_equations(scene: str, tolerance: f
     guess = np.concatenate([path.q, path.v, *momenta], axis=1).T
     true = extremal(problem.scene.model, problem.boundary, path.t, guess, tolerance)
     assert motion.cost == pytest.approx(true.cost, rel=1e-2 * tolerance)
-    t = motion.yardstick.times
+    t = motion.reference.times
     np.testing.assert_allclose(path.configurations(t), true.q(t), rtol=0, atol=0.1 * tolerance)
     assert motion.uncertainty.cost <= 1e-12
-    assert motion.uncertainty.joints <= 1e-9
+    assert motion.uncertainty.largest_q <= 1e-9
 
 
 def test_a_motion_that_costs_nothing_has_no_relative_error(arm_scene: Scene) -> None:

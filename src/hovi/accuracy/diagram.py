@@ -6,13 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from hovi.accuracy.measures import MEASURES, shown_sizes, size
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
 from hovi.accuracy.tolerance_method import Choice
-
-MEASURES = ("cost", "joints", "tip")
-"""Fields of MotionError."""
-UNITS = {"cost": "relative", "joints": "rad", "tip": "mm"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +45,11 @@ class Diagram:
         """The runs of a method that count, each with the largest error of it and all finer ones.
 
         An error that is small by luck, and grows again on the next grid, promises nothing.
-        measure: in MEASURES.
+        measure: in MEASURES, with its unit there.
         """
         worst, pairs = 0.0, []
         for run in reversed([run for run in self.of(method) if run.counts]):
-            worst = max(worst, getattr(run.error, measure))
+            worst = max(worst, size(run.error, measure))
             pairs.append((run, worst))
         return tuple(reversed(pairs))
 
@@ -95,7 +92,7 @@ class Diagram:
         return replace(self, notes=(*self.notes, *notes))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it."""
+        """As JSON holds it, errors of the tip in [mm]."""
         front = {measure: {id(run) for run in self.front(measure)} for measure in MEASURES}
         return {
             "scene": self.scene,
@@ -105,7 +102,7 @@ class Diagram:
                 "scheme": self.resolved.scheme,
                 "intervals": self.resolved.intervals,
                 "cost": self.resolved.cost,
-                "uncertainty": vars(self.resolved.uncertainty),
+                "uncertainty": shown_sizes(self.resolved.uncertainty),
             },
             "complete": self.complete,
             "notes": list(self.notes),

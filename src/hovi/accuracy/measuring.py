@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
-from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
-from hovi.accuracy.reference_motion import MotionError, Yardstick
+from hovi.accuracy.measures import Thresholds
+from hovi.accuracy.method import Method, Prepared, Stopwatch
+from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
 
@@ -18,7 +18,7 @@ Progress = Callable[[str, float], None]
 
 LADDER = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
 """Numbers of intervals, from 4 on, each about 1.4 times the last."""
-ENOUGH = MotionError(cost=1e-12, joints=1e-8, tip=1e-5)
+ENOUGH = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
 """Errors below which finer grids would measure rounding."""
 REPEATS = 7
 """Solves by which a time is judged, after the first."""
@@ -50,12 +50,12 @@ class Measured:
 
 def measure(
     methods: Sequence[Method],
-    yardstick: Yardstick,
+    reference: ReferenceMotion,
     budget: Budget,
     progress: Progress,
     share: float = 1.0,
     repeats: int = REPEATS,
-    enough: MotionError = ENOUGH,
+    enough: Thresholds = ENOUGH,
 ) -> Measured:
     """Every method on finer and finer grids, until it is exact or its time is up.
 
@@ -73,7 +73,7 @@ def measure(
         all_rungs.append(rungs)
         progress(method.name, budget.fraction)
         try:
-            ended = _climb(method, all_rungs, yardstick, budget, budget.fraction + part, enough)
+            ended = _climb(method, all_rungs, reference, budget, budget.fraction + part, enough)
             complete = complete and ended
         except UnmeasurableError as refused:
             notes.append(f"{method.name}: {refused}")
@@ -85,10 +85,10 @@ def measure(
 def _climb(
     method: Method,
     all_rungs: list[Rungs],
-    yardstick: Yardstick,
+    reference: ReferenceMotion,
     budget: Budget,
     share: float,
-    enough: MotionError,
+    enough: Thresholds,
 ) -> bool:
     """One grid of the ladder after the other, as long as the next is worth while.
 
@@ -101,18 +101,13 @@ def _climb(
             return False
         watch = Stopwatch()
         prepared = method.prepare(intervals)
-        run = _first(method, intervals, prepared, yardstick)
+        run = _first(method, intervals, prepared, reference)
         all_rungs[-1].append((prepared, run))
         slow = run.first_seconds > SLOWEST * budget.seconds
-        if slow or _within(run.error, enough) or _beaten(run, all_rungs):
+        if slow or enough.met_by(run.error) or _beaten(run, all_rungs):
             break
         expected = _GROWTH * watch.seconds
     return True
-
-
-def _within(error: MotionError, enough: MotionError) -> bool:
-    names = ("cost", "joints", "tip")
-    return all(getattr(error, name) <= getattr(enough, name) for name in names)
 
 
 def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:
@@ -128,7 +123,7 @@ def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:
     )
 
 
-def _first(method: Method, intervals: int, prepared: Prepared, yardstick: Yardstick) -> Run:
+def _first(method: Method, intervals: int, prepared: Prepared, reference: ReferenceMotion) -> Run:
     answer = prepared.solve()
     return Run(
         method=method.name,
@@ -139,16 +134,10 @@ def _first(method: Method, intervals: int, prepared: Prepared, yardstick: Yardst
         message=answer.message,
         cost=answer.cost,
         steps=answer.steps,
-        error=_error(answer, yardstick),
+        error=reference.error(answer.cost, answer.configurations),
         setup_seconds=prepared.seconds,
         first_seconds=answer.seconds,
     )
-
-
-def _error(answer: Answer, yardstick: Yardstick) -> MotionError:
-    if not math.isfinite(answer.cost):
-        return MotionError(math.inf, math.inf, math.inf)
-    return yardstick.error(answer.cost, answer.configurations)
 
 
 def _repeat(

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hovi.accuracy import MEASURES, Diagram, Run
+from hovi.accuracy.measures import shown_size
 from hovi.viewing.figures import write_figure
 
 OWN = "hovi"
@@ -122,7 +123,7 @@ def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
     """A star per tolerance, with the tolerance beside it where it is of the cost."""
     chosen = diagram.choices
     x = [_MILLISECONDS * (c.best_seconds if fastest else c.seconds) for c in chosen]
-    y = [max(getattr(choice.error, measure), _LEAST) for choice in chosen]
+    y = [max(shown_size(choice.error, measure), _LEAST) for choice in chosen]
     look = {"linestyle": "none", "marker": "*", "markersize": 12.0, "zorder": 9.0}
     if chosen:
         (stars,) = ax.plot(x, y, color="#d00000", label="chosen by a tolerance")
@@ -153,4 +154,4 @@ def _name_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float])
 
 def _points(runs: Sequence[Run], measure: str, time: Time) -> tuple[list[float], list[float]]:
     x = [_MILLISECONDS * time(run) for run in runs]
-    return x, [max(getattr(run.error, measure), _LEAST) for run in runs]
+    return x, [max(shown_size(run.error, measure), _LEAST) for run in runs]

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hovi.accuracy.reference_motion import MotionError, Yardstick
+from hovi.accuracy.measures import Thresholds
+from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.variational_method import on_grid
 from hovi.discrete.grid import Grid
+from hovi.discrete.motion_error import MotionError
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import UnmeasurableError
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -18,7 +20,7 @@ from hovi.schemes import galerkin
 MODES = 8
 """Inner modes of the resolved motion: more than those of any scheme that is measured by default."""
 COARSEST, FINEST = 16, 1024
-STILL = MotionError(cost=1e-13, joints=1e-9, tip=1e-6)
+STILL = Thresholds(cost=1e-13, joints=1e-9, tip=1e-9)
 """Changes below which a doubling of the intervals has changed nothing."""
 TRUSTED = 1e-6
 """Change of the cost at the last doubling above which there is nothing to measure against."""
@@ -50,9 +52,9 @@ class ResolvedMotion:
         return self.trajectory.grid.intervals
 
     @cached_property
-    def yardstick(self) -> Yardstick:
+    def reference(self) -> ReferenceMotion:
         """What measures the distance from it."""
-        return _yardstick(self.trajectory, self.cost)
+        return _reference(self.trajectory, self.cost)
 
 
 def resolve(
@@ -75,9 +77,9 @@ def resolve(
                 f"intervals: {solution.message}"
             )
         if intervals > COARSEST:
-            fine = _yardstick(solution.trajectory, solution.cost)
+            fine = _reference(solution.trajectory, solution.cost)
             change = fine.error(previous.cost, previous.trajectory.configurations)
-            if _still(change) or intervals >= FINEST or expired():
+            if STILL.met_by(change) or intervals >= FINEST or expired():
                 break
         previous, intervals = solution, 2 * intervals
     if abs(solution.cost) < NO_COST:
@@ -93,11 +95,7 @@ def resolve(
     return ResolvedMotion(solution.trajectory, solution.cost, change)
 
 
-def _yardstick(trajectory: Trajectory, cost: float) -> Yardstick:
+def _reference(trajectory: Trajectory, cost: float) -> ReferenceMotion:
     robot = trajectory.robot
     assert robot is not None
-    return Yardstick(robot, trajectory.duration, trajectory.configurations, cost)
-
-
-def _still(change: MotionError) -> bool:
-    return change.cost <= STILL.cost and change.joints <= STILL.joints and change.tip <= STILL.tip
+    return ReferenceMotion(robot, trajectory.duration, trajectory.configurations, cost)

@@ -6,7 +6,8 @@ import statistics
 from dataclasses import dataclass
 from typing import Any
 
-from hovi.accuracy.reference_motion import MotionError
+from hovi.accuracy.measures import shown_size, size
+from hovi.discrete.motion_error import MotionError
 
 ASTRAY = 0.1
 """[rad] or [m] beyond which a motion is taken for another one than that which was looked for."""
@@ -38,7 +39,7 @@ class Run:
     @property
     def counts(self) -> bool:
         """Whether it found the motion that was looked for: a minimum, and not another one."""
-        return self.success and self.error.joints <= ASTRAY
+        return self.success and size(self.error, "joints") <= ASTRAY
 
     @property
     def seconds(self) -> float:
@@ -65,9 +66,9 @@ class Run:
             "success": self.success,
             "counts": self.counts,
             "cost": self.cost,
-            "cost_error": self.error.cost,
-            "joints_error": self.error.joints,
-            "tip_error_mm": self.error.tip,
+            "cost_error": size(self.error, "cost"),
+            "joints_error": size(self.error, "joints"),
+            "tip_error_mm": shown_size(self.error, "tip"),
             "steps": self.steps,
             "setup_seconds": self.setup_seconds,
             "first_seconds": self.first_seconds,

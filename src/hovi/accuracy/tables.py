@@ -8,6 +8,7 @@ import json
 from collections.abc import Sequence
 
 from hovi.accuracy.diagram import Diagram
+from hovi.accuracy.measures import MEASURES, shown_size
 from hovi.accuracy.run import Run
 from hovi.system.files import finite
 
@@ -44,9 +45,7 @@ def _cells(run: Run) -> tuple[str, ...]:
     return (
         run.method,
         str(run.intervals),
-        f"{run.error.cost:.0e}",
-        f"{run.error.joints:.0e}",
-        f"{run.error.tip:.0e}",
+        *(f"{shown_size(run.error, measure):.0e}" for measure in MEASURES),
         *(f"{1e3 * x:.3g}" for x in (run.setup_seconds, run.first_seconds, run.seconds)),
         str(run.steps),
     )

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from hovi.accuracy.budget import Budget
+from hovi.accuracy.measures import shown_sizes
 from hovi.accuracy.method import Stopwatch
-from hovi.accuracy.reference_motion import MotionError, Yardstick
+from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.variational_method import on_grid
 from hovi.discrete.guess import Curve
+from hovi.discrete.motion_error import MotionError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.refinement.adaptive import first_grid, solve_to_tolerance
@@ -49,14 +51,14 @@ class Choice:
         return min(self.repeats)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it, times in [s]."""
-        return {**vars(self), "error": vars(self.error), "seconds": self.seconds}
+        """As JSON holds it, times in [s], the error of the tip in [mm]."""
+        return {**vars(self), "error": shown_sizes(self.error), "seconds": self.seconds}
 
 
 def choices(
     problem: TrajectoryProblem,
     guess: Curve,
-    yardstick: Yardstick,
+    reference: ReferenceMotion,
     budget: Budget,
     intervals: int,
     repeats: int,
@@ -78,12 +80,12 @@ def choices(
             solution = solve_to_tolerance(coarse, tolerance, path, time_limit=budget.left)
             times.append(watch.seconds)
         if times:
-            found.append(_choice(size, solution, times, yardstick))
+            found.append(_choice(size, solution, times, reference))
     return tuple(found)
 
 
 def _choice(
-    size: float, solution: Solution, times: Sequence[float], yardstick: Yardstick
+    size: float, solution: Solution, times: Sequence[float], reference: ReferenceMotion
 ) -> Choice:
     grid = solution.trajectory.grid
     names = sorted({scheme.name for scheme, _ in grid.groups})
@@ -93,7 +95,7 @@ def _choice(
         scheme=" and ".join(names),
         intervals=grid.intervals,
         estimate=solution.error_estimate,
-        error=yardstick.error(solution.cost, solution.trajectory.configurations),
+        error=reference.error(solution.cost, solution.trajectory.configurations),
         success=accuracy is not None and accuracy.reached,
         repeats=tuple(times),
     )

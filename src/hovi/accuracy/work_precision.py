@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import NEARER, guess_curve
+from hovi.accuracy.measures import Thresholds
 from hovi.accuracy.measuring import ENOUGH, REPEATS, SLOWEST, Progress, measure
 from hovi.accuracy.method import CLOCKS, Method
-from hovi.accuracy.reference_motion import MotionError
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.tolerance_method import choices
 from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
@@ -58,7 +58,7 @@ def work_precision(
     budget: float = 60.0,
     repeats: int = REPEATS,
     clock: str = "wall",
-    enough: MotionError = ENOUGH,
+    enough: Thresholds = ENOUGH,
     progress: Progress | None = None,
 ) -> Diagram:
     """Errors in cost, joints and tip against time, of many schemes on many grids.
@@ -115,9 +115,9 @@ def work_precision(
         except UnmeasurableError as refused:
             notes.append(str(refused))
     try:
-        measured = measure(methods, resolved.yardstick, time, report, MEASURING, repeats, enough)
+        measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
         report("what a tolerance chooses", time.fraction)
-        chosen = choices(problem, curve, resolved.yardstick, time, task.intervals, repeats, clock)
+        chosen = choices(problem, curve, resolved.reference, time, task.intervals, repeats, clock)
     finally:
         for method in methods:
             method.close()

@@ -52,6 +52,11 @@ class MotionError:
         return float(np.max(self.q[:, self.sliding], initial=0.0))
 
     @property
+    def largest_q(self) -> float:
+        """The largest of all joints, in [rad] or [m]."""
+        return float(np.max(self.q))
+
+    @property
     def largest_tip(self) -> float:
         """The largest of the frame, in [m]."""
         return float(np.max(self.tip))

@@ -119,13 +119,15 @@ def _print(diagram: Diagram) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from hovi.accuracy.measures import shown_sizes
     from hovi.accuracy.tables import COLUMNS, cheapest_rows
 
-    resolved, unsure = diagram.resolved, diagram.resolved.uncertainty
+    resolved = diagram.resolved
+    unsure = shown_sizes(resolved.uncertainty)
     print(
         f"{diagram.scene}: {len(diagram.runs)} runs in {diagram.seconds:.0f} s, measured against "
         f"{resolved.scheme} on {resolved.intervals} intervals: cost {resolved.cost:.12g}, known to "
-        f"{unsure.cost:.0e} relative, {unsure.joints:.0e} rad, {unsure.tip:.0e} mm."
+        f"{unsure['cost']:.0e} relative, {unsure['joints']:.0e} rad, {unsure['tip']:.0e} mm."
     )
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title="the cheapest run")
     for column in COLUMNS:
