@@ -8,11 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import HoviError
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.violation import distances_over_time
-from hovi.viewing.recorded_limits import imposed_clearance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,17 +20,6 @@ Array = npt.NDArray[np.float64]
 _SAMPLES = 600
 _NEAREST = 3
 _COLORS = ("#333333", "#D55E00", "#0072B2")
-
-
-def kept_distances(trajectory: Trajectory) -> tuple[Clearance, Distances] | None:
-    """What a motion was planned to keep away from; None where nothing is, or cannot be measured."""
-    clearance = imposed_clearance(trajectory)
-    if clearance is None or not clearance.wanted or trajectory.robot is None:
-        return None
-    try:
-        return clearance, distances_between(trajectory.robot, clearance)
-    except HoviError:  # the shapes are not on this machine
-        return None
 
 
 def draw_distances(

@@ -11,9 +11,10 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS
 from hovi.robot.robot import Robot
-from hovi.viewing.recorded_limits import at_limit, imposed_limits
+from hovi.viewing.recorded_limits import imposed_limits
 
 if TYPE_CHECKING:
     from pinocchio.visualize import MeshcatVisualizer

@@ -25,13 +25,14 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, expect
+from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
-from hovi.viewing.distance_panel import draw_distances, kept_distances
+from hovi.viewing.distance_panel import draw_distances
 from hovi.viewing.figures import align_zeros, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
-from hovi.viewing.recorded_limits import at_limit, imposed_limits
+from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]

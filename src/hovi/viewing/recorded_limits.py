@@ -1,23 +1,17 @@
-"""The limits and obstacles that a motion file records, and when a motion stands at a limit."""
+"""The limits and obstacles that a motion file records."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.discrete.trajectory import Sample, Trajectory
-from hovi.errors import InputError
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import HoviError, InputError
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.limits import Limits
-from hovi.robot.robot import Robot
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: no robot's, dark on the gray
-AT_LIMIT = 1e-3
-"""Share of its range within which an output counts as standing at its bound."""
 
 
 def imposed_limits(trajectory: Trajectory) -> Limits | None:
@@ -37,15 +31,6 @@ def imposed_limits(trajectory: Trajectory) -> Limits | None:
     return limits if fits and limits.bounded.any() else None
 
 
-def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> Mask:
-    """Which of q, v, a and tau stand at a bound, shape (M, 4, nv)."""
-    q = motion.q
-    if robot is not None and not robot.vector_joints:
-        q = robot.space.coordinates(q)
-    outputs = np.stack([q, motion.v, motion.a, motion.tau], axis=1)
-    return np.asarray(limits.excess(outputs) >= -AT_LIMIT)
-
-
 def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
     """The clearance that the metadata of a motion remembers; None where there is none.
 
@@ -57,6 +42,17 @@ def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
     try:
         return Clearance.from_dict(data)
     except (InputError, AttributeError, KeyError, TypeError, ValueError):
+        return None
+
+
+def kept_distances(trajectory: Trajectory) -> tuple[Clearance, Distances] | None:
+    """What a motion was planned to keep away from; None where nothing is, or cannot be measured."""
+    clearance = imposed_clearance(trajectory)
+    if clearance is None or not clearance.wanted or trajectory.robot is None:
+        return None
+    try:
+        return clearance, distances_between(trajectory.robot, clearance)
+    except HoviError:  # the shapes are not on this machine
         return None
 
 

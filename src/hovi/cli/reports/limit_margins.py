@@ -8,11 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.violation import approach_along
+from hovi.planning.problem.limit_violation import AT_LIMIT
 from hovi.planning.problem.limit_violation import closeness as closeness_along
 from hovi.planning.problem.limits import KINDS, Limits
-from hovi.viewing.distance_panel import kept_distances
-from hovi.viewing.recorded_limits import AT_LIMIT, imposed_limits
+from hovi.planning.solver.solver import Solution
+from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 
 Array = npt.NDArray[np.float64]
 
@@ -62,18 +65,38 @@ class Closeness:
         }
 
 
-def closeness(trajectory: Trajectory) -> Closeness | None:
+def closeness(motion: Solution | Trajectory) -> Closeness | None:
     """The room that a motion leaves to the limits it was planned under; None without any."""
-    limits = imposed_limits(trajectory)
-    if limits is None:
+    limits, trajectory = _limits_of(motion), _trajectory_of(motion)
+    if limits is None or not limits.bounded.any():
         return None
     return Closeness(trajectory.coordinate_names, closeness_along(trajectory, limits), limits)
 
 
-def least_distance(trajectory: Trajectory) -> float | None:
+def least_distance(motion: Solution | Trajectory) -> float | None:
     """The least distance of any pair, in [m]; None where nothing was to be kept away from."""
-    kept = kept_distances(trajectory)
+    kept = _distances_of(motion)
     if kept is None:
         return None
     clearance, distances = kept
-    return float(approach_along(trajectory, distances, clearance.margin).distance.min())
+    approach = approach_along(_trajectory_of(motion), distances, clearance.margin)
+    return float(approach.distance.min())
+
+
+def _trajectory_of(motion: Solution | Trajectory) -> Trajectory:
+    return motion.trajectory if isinstance(motion, Solution) else motion
+
+
+def _limits_of(motion: Solution | Trajectory) -> Limits | None:
+    """Those of the problem that was solved; a motion from a file has but what it records."""
+    if isinstance(motion, Solution) and motion.problem is not None:
+        return motion.problem.limits
+    return imposed_limits(_trajectory_of(motion))
+
+
+def _distances_of(motion: Solution | Trajectory) -> tuple[Clearance, Distances] | None:
+    """The same for what was to be kept away from."""
+    if not isinstance(motion, Solution) or motion.problem is None:
+        return kept_distances(_trajectory_of(motion))
+    clearance, distances = motion.problem.clearance, motion.problem.distances
+    return None if clearance is None or distances is None else (clearance, distances)

@@ -28,7 +28,7 @@ def as_json(
 ) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
     trajectory = solution.trajectory
-    room = closeness(trajectory)
+    room = closeness(solution)
     fields = {
         "success": bool(solution.success),
         "status": str(solution.status),
@@ -47,7 +47,7 @@ def as_json(
         "peaks": _peaks_json(peaks(trajectory)),
         "limits": None if room is None else room.by_kind(),
         "excess": None if room is None else room.excess,
-        "least_distance": least_distance(trajectory),
+        "least_distance": least_distance(solution),
         "out": None if out is None else str(out),
         **accuracy_json(solution, task),
         "certificate": None if certificate is None else certificate_json(certificate),
@@ -61,7 +61,7 @@ def print_report(
     """A summary, the peaks of the motion, and where it was written, on stdout."""
     for label, text in _summary(solution, task, coarse_grid(certificate)):
         print(f"{label:9s}{text}")
-    extremes, room = peaks(solution.trajectory), closeness(solution.trajectory)
+    extremes, room = peaks(solution.trajectory), closeness(solution)
     console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
     if room is not None:
         console.print(_room_table(extremes, room))
@@ -70,7 +70,7 @@ def print_report(
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
-    distance = least_distance(solution.trajectory)
+    distance = least_distance(solution)
     if distance is not None:
         kept = task.clearance.margin
         print(f"distance {distance:.4g} m at the nearest approach, the margin is {kept:g} m")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.trajectory import Trajectory
+from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.planning.problem.limits import KINDS, NAMES, Limits
 from hovi.robot.robot import Robot
 
@@ -17,6 +17,8 @@ SAMPLES = 33
 """Samples of an interval in the first pass, both ends included."""
 NEAR = 0.05
 """Outputs that come this near to a bound, as a share of its range, are searched again."""
+AT_LIMIT = 1e-3
+"""Share of its range within which an output counts as standing at its bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,3 +121,12 @@ def closeness(trajectory: Trajectory, limits: Limits) -> Array:
     """
     excess = excess_along(trajectory, limits)
     return np.asarray(-np.maximum(excess.lower.max(axis=0), excess.upper.max(axis=0)))
+
+
+def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> npt.NDArray[np.bool_]:
+    """Which of q, v, a and tau stand at a bound, shape (M, 4, nv)."""
+    q = motion.q
+    if robot is not None and not robot.vector_joints:
+        q = robot.space.coordinates(q)
+    outputs = np.stack([q, motion.v, motion.a, motion.tau], axis=1)
+    return np.asarray(limits.excess(outputs) >= -AT_LIMIT)
