@@ -1,4 +1,8 @@
-"""Effects: what a scene simulates beyond inertia, one file each, none unless it is named."""
+"""Effects: what a scene simulates beyond inertia, one file each, none unless it is named.
+
+This file is their one list: an effect that is imported here and named in EFFECTS and in __all__ is
+public, a table of scene files and of their JSON schema, and can stand in a motion file.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +24,29 @@ from hovi.effects.reference_cost import ReferenceCost
 from hovi.effects.registry import REGISTRY, register
 from hovi.effects.viscous_friction import ViscousFriction
 from hovi.effects.wrench import Wrench
+
+EFFECTS: tuple[type[Effect], ...] = (
+    Gravity,
+    ViscousFriction,
+    DryFriction,
+    Armature,
+    JointSprings,
+    JointLimitPotential,
+    Payload,
+    Wrench,
+    Drag,
+    MovingBase,
+    Custom,
+    EffortWeight,
+    VelocityCost,
+    AccelerationCost,
+    ReferenceCost,
+    PowerCost,
+)
+"""In the order of the JSON schema."""
+for _effect in EFFECTS:
+    register(_effect)
+
 
 __all__ = [
     "REGISTRY",

@@ -4,43 +4,11 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from hovi.effects.armature import Armature
-from hovi.effects.custom import Custom
-from hovi.effects.drag import Drag
-from hovi.effects.dry_friction import DryFriction
 from hovi.effects.effect import Effect
-from hovi.effects.effort_weight import EffortWeight
-from hovi.effects.gravity import Gravity
-from hovi.effects.joint_limit_potential import JointLimitPotential
-from hovi.effects.joint_springs import JointSprings
-from hovi.effects.motion_cost import AccelerationCost, VelocityCost
-from hovi.effects.moving_base import MovingBase
-from hovi.effects.payload import Payload
-from hovi.effects.power_cost import PowerCost
-from hovi.effects.reference_cost import ReferenceCost
-from hovi.effects.viscous_friction import ViscousFriction
-from hovi.effects.wrench import Wrench
 from hovi.errors import SceneError
 
-EFFECTS: tuple[type[Effect], ...] = (
-    Gravity,
-    ViscousFriction,
-    DryFriction,
-    Armature,
-    JointSprings,
-    JointLimitPotential,
-    Payload,
-    Wrench,
-    Drag,
-    MovingBase,
-    Custom,
-    EffortWeight,
-    VelocityCost,
-    AccelerationCost,
-    ReferenceCost,
-    PowerCost,
-)
-REGISTRY: dict[str, type[Effect]] = {effect.key: effect for effect in EFFECTS}
+REGISTRY: dict[str, type[Effect]] = {}
+"""The effects of hovi.effects, in its order, and those that were registered after them."""
 
 Kind = TypeVar("Kind", bound=type[Effect])
 
