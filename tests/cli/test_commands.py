@@ -344,6 +344,17 @@ def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> Non
     assert motion.with_suffix(".csv").exists()
 
 
+@pytest.mark.parametrize(
+    "arguments", [["--csv"], ["--format", "csv"], ["--csv", "--format", "csv"]]
+)
+def test_a_format_is_named_or_has_an_option(
+    arguments: list[str], run: Run, motion: Path, tmp_path: Path
+) -> None:
+    target = tmp_path / "reach.csv"
+    assert run("export", motion, *arguments, "--out", target)[0] == 0
+    assert target.read_text().startswith("t,q_")
+
+
 def test_a_motion_becomes_a_picture(run: Run, motion: Path, tmp_path: Path) -> None:
     code, out, _ = run("plot", motion, "--out", tmp_path)
     assert code == 0
@@ -469,6 +480,9 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "no such URDF": (["info", "nowhere.urdf"], ["nowhere.urdf"]),
     "no such motion": (["plot", "nowhere.npz"], ["nowhere.npz"]),
     "no format": (["export", "nowhere.npz"], ["--csv"]),
+    "no such format": (["export", "nowhere.npz", "--format", "cvs"], ["'cvs'", "'csv'"]),
+    "two formats": (["export", "m.npz", "--csv", "--format", "npy"], ["--csv", "--format npy"]),
+    "two files": (["export", "m.npz", "a.csv", "--csv", "--out", "b.csv"], ["a.csv", "b.csv"]),
     "command": (["plann"], ["plan"]),
 }
 
