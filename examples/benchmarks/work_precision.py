@@ -1,4 +1,4 @@
-"""What accuracy costs: hovi and other people's methods on the same scenes, in one run.
+"""What accuracy costs: hovi and the reference tools on the same scenes, in one run.
 
 Prints the table of time ratios and draws the diagrams of the docs. Crocoddyl and Drake live in
 environments of their own, whose Pythons are named by options or by HOVI_CROCODDYL_PYTHON and
@@ -21,8 +21,8 @@ from measuring import alone, print_machine, print_table
 
 import hovi
 from hovi.accuracy import Diagram, Run, Thresholds, work_precision
-from hovi.accuracy.peers.external_method import crocoddyl_peers, drake_peers
 from hovi.accuracy.peers.ipopt_method import ipopt_peers
+from hovi.accuracy.peers.tools import tool_peers
 from hovi.accuracy.picture import plot_work_precision
 from hovi.accuracy.tables import as_json
 
@@ -47,8 +47,8 @@ def measure(
     folder = None if kernels is None else Path(kernels)
     peers = [*ipopt_peers(compiled=True, folder=folder)]
     peers += [*ipopt_peers(compiled=False, schemes=INTERPRETED)]
-    peers += crocoddyl_peers(Path(crocoddyl)) if crocoddyl else []
-    peers += drake_peers(Path(drake)) if drake else []
+    peers += tool_peers("crocoddyl", Path(crocoddyl)) if crocoddyl else []
+    peers += tool_peers("drake", Path(drake)) if drake else []
 
     def progress(text: str, fraction: float) -> None:
         print(f"{scene} {100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)

@@ -314,6 +314,7 @@ def test_a_scene_with_limits_says_that_the_diagram_leaves_them_out() -> None:
         (["--guess", "qubic"], "did you mean 'cubic'"),
         (["--clock", "well"], "did you mean 'wall'"),
         (["--out", __file__], "is a file; name a folder"),
+        (["--peer", "drak=python"], "did you mean 'drake'"),
     ],
 )
 def test_misuse_is_one_sentence(

@@ -45,7 +45,7 @@ class Setting:
 
 
 Peer = Callable[[Setting], Method]
-"""What makes a method of somebody else for a setting. Raises UnmeasurableError if it cannot."""
+"""What makes a reference tool's method for a setting. Raises UnmeasurableError if it cannot."""
 
 
 @interruptible
@@ -68,7 +68,7 @@ def work_precision(
 
     guess: "near" (nine tenths of the resolved motion, one tenth of the cubic: all methods work on
         the same minimum) or "cubic" (they may end in others, and then do not count).
-    schemes: names as by_name takes them. peers: other people's methods.
+    schemes: names as by_name takes them. peers: reference tools for comparison.
     budget: of wall time, in [s]. repeats: of every solve, by which its time is judged.
     clock: "wall", or "processor" on a machine that is busy with other work.
     enough: errors at which a method need not become finer.

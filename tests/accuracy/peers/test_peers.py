@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from hovi.accuracy.peers.collocation_table import (
 )
 from hovi.accuracy.peers.external_method import OutsideMethod
 from hovi.accuracy.peers.ipopt_method import CollocationMethod, Kernels
+from hovi.accuracy.peers.tools import OUTSIDE, tool_peers
 from hovi.accuracy.peers.worker import Worker
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
@@ -204,6 +206,37 @@ def test_a_python_that_is_not_there_is_one_sentence(setting: Setting) -> None:
 def test_a_python_without_the_tool_says_which_module_it_lacks(setting: Setting) -> None:
     with pytest.raises(UnmeasurableError, match="No module named 'crocoddyl'"):
         outside(setting, Path(sys.executable))
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_a_tool_has_a_worker_and_a_method_per_variant(name: str, setting: Setting) -> None:
+    tool = OUTSIDE[name]
+    assert find_spec(f"hovi.accuracy.peers.{tool.worker}") is not None
+    peers = tool_peers(name, Path("/nowhere/bin/python"))
+    assert len(peers) == len(tool.variants) > 0
+    for peer in peers:
+        with pytest.raises(InputError, match="cannot be started: No such file"):
+            peer(setting)
+
+
+def test_a_tool_of_this_python_needs_no_other(setting: Setting) -> None:
+    peers = tool_peers("collocation")
+    methods = [peer(setting).name for peer in peers]
+    assert methods[: len(NAMES)] == [f"{name}, Ipopt, compiled" for name in NAMES]
+    assert len(methods) == 2 * len(NAMES)
+
+
+@pytest.mark.parametrize(
+    ("name", "python", "sentence"),
+    [
+        ("crocodyl", None, "there is no peer 'crocodyl': did you mean 'crocoddyl'"),
+        ("drake", None, "drake=PYTHON"),
+        ("collocation", Path("python3"), "runs in this Python"),
+    ],
+)
+def test_a_peer_that_cannot_be_is_refused(name: str, python: Path | None, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        tool_peers(name, python)
 
 
 def test_a_tool_that_says_nothing_is_given_up(tmp_path: Path) -> None:

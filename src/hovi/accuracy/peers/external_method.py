@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -78,41 +79,35 @@ class OutsideMethod(Method):
         self._worker.close()
 
 
-def crocoddyl_peers(python: Path) -> list[partial[OutsideMethod]]:
-    """Crocoddyl's FDDP with RK4 and two ways to write the torque in an interval.
+@dataclass(frozen=True, eq=False)
+class OutsideTool:
+    """A tool in an environment of its own, with the variants of it that are measured.
 
-    From the near guess it leaves for other minima on the arms, so it starts from the nearer one.
+    worker: the module of this folder that serve.py loads there. family: see Method.
+    variants: names, each with its order, see Method, and with what the worker needs to know.
+    nearer: whether it starts from the nearer guess, where it would end in other minima otherwise.
     """
-    kinds = {"zero": ("constant torque", 2), "two": ("quadratic torque", 4)}
-    return [
-        partial(
-            OutsideMethod,
-            python=python,
-            tool="crocoddyl_worker",
-            name=f"Crocoddyl, RK4, {words}",
-            family="Crocoddyl",
-            order=order,
-            options={"control": control},
-            nearer=True,
-        )
-        for control, (words, order) in kinds.items()
-    ]
 
+    worker: str
+    family: str
+    variants: Mapping[str, tuple[int | None, Mapping[str, Any]]]
+    nearer: bool = False
 
-def drake_peers(python: Path) -> list[partial[OutsideMethod]]:
-    """Drake's DirectCollocation with Ipopt and with SNOPT."""
-    return [
-        partial(
-            OutsideMethod,
-            python=python,
-            tool="drake_worker",
-            name=f"Drake, DirectCollocation, {solver}",
-            family="Drake",
-            order=None,
-            options={"solver": solver},
-        )
-        for solver in ("Ipopt", "SNOPT")
-    ]
+    def peers(self, python: Path) -> list[partial[OutsideMethod]]:
+        """A method per variant, for `work_precision(peers=)`. python: of its environment."""
+        return [
+            partial(
+                OutsideMethod,
+                python=python,
+                tool=self.worker,
+                name=f"{self.family}, {name}",
+                family=self.family,
+                order=order,
+                options=options,
+                nearer=self.nearer,
+            )
+            for name, (order, options) in self.variants.items()
+        ]
 
 
 def _scene(setting: Setting) -> dict[str, Any]:

@@ -90,6 +90,11 @@ def ipopt_peers(
     return [partial(CollocationMethod, scheme=scheme, kernels=kernels) for scheme in schemes]
 
 
+def collocation_peers() -> list[partial[CollocationMethod]]:
+    """All collocations with both kinds of kernels."""
+    return [*ipopt_peers(compiled=True), *ipopt_peers(compiled=False)]
+
+
 def _kept(kernels: PointKernels, folder: Path, clock: str) -> tuple[PointKernels, float]:
     """Compiled kernels from a folder, put there if they are new, and what compiling took."""
     text = kernels.hessian.serialize().encode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -33,14 +34,21 @@ def accuracy(
         Path | None,
         typer.Option(metavar="FOLDER", help="Where the picture, the CSV and the JSON go."),
     ] = None,
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME[=PYTHON]",
+            help="A reference tool as well, from the Python of its environment; repeat for more.",
+        ),
+    ] = None,
     collocation: Annotated[
         bool, typer.Option("--collocation", help="Collocation by CasADi and Ipopt as well.")
     ] = False,
     crocoddyl: Annotated[
-        Path | None, typer.Option(metavar="PYTHON", help="A Python that has Crocoddyl, as well.")
+        Path | None, typer.Option(metavar="PYTHON", help="The same as --peer crocoddyl=PYTHON.")
     ] = None,
     drake: Annotated[
-        Path | None, typer.Option(metavar="PYTHON", help="A Python that has Drake, as well.")
+        Path | None, typer.Option(metavar="PYTHON", help="The same as --peer drake=PYTHON.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
@@ -59,7 +67,10 @@ def accuracy(
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {str(out)!r} is a file; name a folder.")
     task = load_task(find_scene(scene))
-    peers = _peers(collocation, crocoddyl, drake)
+    short = {"crocoddyl": crocoddyl, "drake": drake}
+    asked = [*(peer or ()), *(["collocation"] if collocation else [])]
+    asked += [f"{name}={python}" for name, python in short.items() if python is not None]
+    peers = _peers(asked)
     try:
         with progress(quiet=json) as report:
             diagram = work_precision(
@@ -77,19 +88,13 @@ def accuracy(
         print(f"wrote {path}")
 
 
-def _peers(collocation: bool, crocoddyl: Path | None, drake: Path | None) -> list[Peer]:
-    """Other people's methods that were asked for."""
-    from hovi.accuracy.peers.external_method import crocoddyl_peers, drake_peers
-    from hovi.accuracy.peers.ipopt_method import ipopt_peers
+def _peers(asked: Sequence[str]) -> list[Peer]:
+    """The methods of the tools that were asked for, each as NAME or NAME=PYTHON."""
+    from hovi.accuracy.peers.tools import tool_peers
 
-    peers: list[Peer] = []
-    if collocation:
-        peers += [*ipopt_peers(compiled=True), *ipopt_peers(compiled=False)]
-    if crocoddyl is not None:
-        peers += crocoddyl_peers(crocoddyl)
-    if drake is not None:
-        peers += drake_peers(drake)
-    return peers
+    parts = [each.partition("=") for each in asked]
+    named = [(name, Path(python) if equals else None) for name, equals, python in parts]
+    return [peer for name, python in named for peer in tool_peers(name, python)]
 
 
 def _write(diagram: Diagram, folder: Path) -> list[Path]:
