@@ -15,6 +15,7 @@ import pytest
 from hovi.errors import SchemeError
 from hovi.schemes import (
     CLASSIC,
+    FAMILIES,
     Scheme,
     by_name,
     galerkin,
@@ -403,3 +404,11 @@ def test_numpys_whole_numbers_are_whole_numbers() -> None:
 def test_a_name_with_too_many_inner_modes_is_refused() -> None:
     with pytest.raises(SchemeError, match="0 to 40 inner modes"):
         by_name("galerkin-41")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("r", [0, 1, 3])
+def test_a_member_of_a_family_bears_its_name(family: str, r: int) -> None:
+    scheme = by_name(f"{family}-{r}")
+    assert (scheme.name, scheme.inner_modes) == (f"{family}-{r}", r)
+    np.testing.assert_array_equal(scheme.table, FAMILIES[family](r).table)

@@ -311,7 +311,7 @@ def _schemes(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
     for name, count in runs:
         if not isinstance(name, str) or type(count) is not int or not 0 < count <= _MAX_INTERVALS:
             raise InputError(f"{[name, count]!r} is not a scheme's name and a count")
-        modes = name.removeprefix("galerkin-")
+        modes = name.rpartition("-")[2]
         if modes.isdecimal() and int(modes) > inner[1]:
             raise InputError(f"the scheme {name!r} has more inner modes than the file")
         schemes += [by_name(name)] * count

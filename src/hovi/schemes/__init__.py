@@ -1,4 +1,8 @@
-"""Schemes: tables that turn a Lagrangian into a discrete Lagrangian."""
+"""Schemes: tables that turn a Lagrangian into a discrete Lagrangian.
+
+This file is their one list: a scheme in CLASSIC, or a family of schemes in FAMILIES, has a name
+that Python, scene files, motion files and the command line know.
+"""
 
 from __future__ import annotations
 
@@ -25,24 +29,28 @@ CLASSIC: dict[str, Callable[[], Scheme]] = {
     "trapezoid-difference": trapezoid_difference,
     "hermite-simpson": hermite_simpson,
 }
+FAMILIES: dict[str, Callable[[int], Scheme]] = {"galerkin": galerkin}
+"""By the number of inner modes."""
 
 
 def by_name(name: str) -> Scheme:
     """The scheme that a file or the command line calls `name`.
 
-    name: one of CLASSIC, or `galerkin-R` with R inner modes. Raises SchemeError otherwise.
+    name: one of CLASSIC, or `FAMILY-R` with R inner modes, as `galerkin-2`. Raises SchemeError
+        otherwise.
     """
     if name in CLASSIC:
         return CLASSIC[name]()
-    match = re.fullmatch(r"galerkin-(\d{1,4})", name)
-    if match:
-        return galerkin(int(match.group(1)))
-    known = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-3"]
+    match = re.fullmatch(r"(.+)-(\d{1,4})", name)
+    if match and match.group(1) in FAMILIES:
+        return FAMILIES[match.group(1)](int(match.group(2)))
+    known = [*CLASSIC, *(f"{family}-{modes}" for family in FAMILIES for modes in range(4))]
     raise SchemeError(f"there is no scheme {name!r}: {nearest(name, known)}")
 
 
 __all__ = [
     "CLASSIC",
+    "FAMILIES",
     "Scheme",
     "by_name",
     "end_basis",
