@@ -113,7 +113,7 @@ def ratios(diagram: Diagram, method: str) -> list[float | None]:
 
 
 def print_ratios(diagram: Diagram) -> None:
-    """A row per method of somebody else."""
+    """A row per method of a reference tool."""
     others = [m for m in diagram.methods if not of_hovi(diagram.of(m)[0])]
     table = {method: ratios(diagram, method) for method in others}
     columns = ["time / hovi's"]

@@ -22,7 +22,7 @@ import hovi.accuracy
 from hovi.accuracy import Run, Thresholds, work_precision
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
-from hovi.accuracy.measuring import LADDER, measure
+from hovi.accuracy.measuring import INTERVALS, measure
 from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.picture import work_precision_figure
 from hovi.accuracy.reference_motion import ReferenceMotion
@@ -145,7 +145,7 @@ def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) 
     assert reach.methods == FEW
     assert reach.complete
     for each in reach.runs:
-        assert each.intervals in LADDER
+        assert each.intervals in INTERVALS
         assert each.counts == (each.success and each.error.largest_q <= 0.1)
         assert each.setup_seconds > 0
         assert each.first_seconds > 0

@@ -14,24 +14,24 @@ from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
 
 Progress = Callable[[str, float], None]
-"""What is told how far the work is: a line of text and the fraction done."""
+"""Called with a line of text and the fraction done."""
 
-LADDER = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
+INTERVALS = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
 """Numbers of intervals, from 4 on, each about 1.4 times the last."""
 ENOUGH = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
 """Errors below which finer grids would measure rounding."""
 REPEATS = 7
 """Solves by which a time is judged, after the first."""
-CLIMBING = 0.7
+FIRST_SOLVES = 0.7
 """Share of the budget in which first solves may start."""
 SLOWEST = 0.1
 """Share of the budget that one solve may take, and about what its repeats may take."""
-HOPELESS = 15.0
+DOMINATED = 15.0
 """A method stops where one of its family was more accurate in so many times less time."""
 _GROWTH = 2.0  # of time from one number of intervals to the next, at most
 
 
-Rungs = list[tuple[Prepared, Run]]
+Solved = list[tuple[Prepared, Run]]
 """What a method has solved, by number of intervals."""
 
 
@@ -65,60 +65,60 @@ def measure(
     budget: of which `share` may be spent. repeats: of every run that counts.
     enough: errors at which a method need not become finer.
     """
-    all_rungs: list[Rungs] = []
+    all_solved: list[Solved] = []
     notes, complete = [], True
     for number, method in enumerate(methods):
-        part = (CLIMBING * share - budget.fraction) / (len(methods) - number)
-        rungs: Rungs = []
-        all_rungs.append(rungs)
+        part = (FIRST_SOLVES * share - budget.fraction) / (len(methods) - number)
+        solved: Solved = []
+        all_solved.append(solved)
         progress(method.name, budget.fraction)
         try:
-            ended = _climb(method, all_rungs, reference, budget, budget.fraction + part, enough)
+            ended = _refine(method, all_solved, reference, budget, budget.fraction + part, enough)
             complete = complete and ended
         except UnmeasurableError as refused:
             notes.append(f"{method.name}: {refused}")
-    _repeat(all_rungs, budget, progress, share, repeats)
-    runs = tuple(run for rungs in all_rungs for _, run in rungs)
+    _repeat(all_solved, budget, progress, share, repeats)
+    runs = tuple(run for solved in all_solved for _, run in solved)
     return Measured(runs, complete, tuple(notes))
 
 
-def _climb(
+def _refine(
     method: Method,
-    all_rungs: list[Rungs],
+    all_solved: list[Solved],
     reference: ReferenceMotion,
     budget: Budget,
     share: float,
     enough: Thresholds,
 ) -> bool:
-    """One grid of the ladder after the other, as long as the next is worth while.
+    """Finer and finer grids, as long as the next one is worth its time.
 
-    all_rungs: of all methods so far, of which the last is this one's. Returns whether it ended
+    all_solved: of all methods so far, of which the last is this one's. Returns whether it ended
     for another reason than time.
     """
     expected = 0.0
-    for intervals in [each for each in LADDER if each >= method.coarsest]:
+    for intervals in [each for each in INTERVALS if each >= method.coarsest]:
         if not budget.allows(expected, share):
             return False
         watch = Stopwatch()
         prepared = method.prepare(intervals)
         run = _first(method, intervals, prepared, reference)
-        all_rungs[-1].append((prepared, run))
+        all_solved[-1].append((prepared, run))
         slow = run.first_seconds > SLOWEST * budget.seconds
-        if slow or enough.met_by(run.error) or _beaten(run, all_rungs):
+        if slow or enough.met_by(run.error) or _dominated(run, all_solved):
             break
         expected = _GROWTH * watch.seconds
     return True
 
 
-def _beaten(run: Run, all_rungs: list[Rungs]) -> bool:
+def _dominated(run: Run, all_solved: list[Solved]) -> bool:
     """Whether finer grids of a method have no hope of being worth their time.
 
     A run that went astray says nothing of them.
     """
-    runs = (other for rungs in all_rungs for _, other in rungs)
+    runs = (other for solved in all_solved for _, other in solved)
     others = [other for other in runs if other.family == run.family and other.counts]
     return run.counts and any(
-        other.error.cost <= run.error.cost and HOPELESS * other.first_seconds <= run.first_seconds
+        other.error.cost <= run.error.cost and DOMINATED * other.first_seconds <= run.first_seconds
         for other in others
     )
 
@@ -141,15 +141,15 @@ def _first(method: Method, intervals: int, prepared: Prepared, reference: Refere
 
 
 def _repeat(
-    all_rungs: list[Rungs], budget: Budget, progress: Progress, share: float, repeats: int
+    all_solved: list[Solved], budget: Budget, progress: Progress, share: float, repeats: int
 ) -> None:
     """Rounds over all runs that count, as many as the budget allows."""
     for number in range(repeats):
-        for rungs in all_rungs:
-            for i, (prepared, run) in enumerate(rungs):
+        for solved in all_solved:
+            for i, (prepared, run) in enumerate(solved):
                 often = sum(run.repeats) > SLOWEST * budget.seconds / 2
                 if not run.counts or often or not budget.allows(run.first_seconds, share):
                     continue
                 progress(f"repeat {number + 1} of {repeats}, {run.method}", budget.fraction)
                 seconds = (*run.repeats, prepared.solve().seconds)
-                rungs[i] = prepared, dataclasses.replace(run, repeats=seconds)
+                solved[i] = prepared, dataclasses.replace(run, repeats=seconds)

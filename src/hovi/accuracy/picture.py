@@ -39,8 +39,8 @@ def plot_work_precision(
 def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
     """Three panels over the time of a solve when warm, one over building and the first solve.
 
-    One curve per scheme, a point per number of intervals; of each family of other people's
-    methods all points, and a curve through those that none of the family beats. The cheapest
+    One curve per scheme, a point per number of intervals; of each family of reference
+    tools all points, and a curve through those that none of the family beats. The cheapest
     front is shaded, and what `plan(tolerance=)` chose is a star.
 
     fastest: show the fastest of the repeats instead of their median, for a machine that is busy

@@ -1,4 +1,4 @@
-"""Other people's methods: their tables, their programs, their robot, and tools in other Pythons."""
+"""Reference tools: their tables, their programs, their robot, and tools in other Pythons."""
 
 from __future__ import annotations
 

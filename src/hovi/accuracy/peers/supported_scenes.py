@@ -1,4 +1,4 @@
-"""Which scenes other people's methods know: rigid bodies on vector joints, gravity, armature."""
+"""Which scenes the reference tools support: rigid bodies on vector joints, gravity, armature."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ def require_plain(setting: Setting) -> None:
     problem = setting.problem
     if not problem.plain:
         raise UnmeasurableError(
-            "other methods are measured between two states, with a torque at every joint."
+            "reference tools are measured between two states, with a torque at every joint."
         )
     if not problem.robot.vector_joints:
-        raise UnmeasurableError("other methods are measured on revolute and sliding joints only.")
+        raise UnmeasurableError("reference tools are measured on revolute and sliding joints only.")
     model, n = problem.scene.model, problem.robot.nv
     data = model.createData()
     q, v, a = np.random.default_rng(0).uniform(-1, 1, (3, POINTS, n))
@@ -29,6 +29,6 @@ def require_plain(setting: Setting) -> None:
     plain, ours = 0.5 * np.sum(tau**2, axis=1), problem.ld.lagrangian.value(q, v, a)
     if np.max(np.abs(plain - ours) / np.maximum(plain, 1.0)) > SAME:
         raise UnmeasurableError(
-            "other methods know rigid bodies, gravity and armature, and this scene has more in its "
+            "reference tools know rigid bodies, gravity and armature, and this scene has more in its "
             "torques or in its cost; they are left out."
         )
