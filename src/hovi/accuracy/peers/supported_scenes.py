@@ -29,6 +29,6 @@ def require_plain(setting: Setting) -> None:
     plain, ours = 0.5 * np.sum(tau**2, axis=1), problem.ld.lagrangian.value(q, v, a)
     if np.max(np.abs(plain - ours) / np.maximum(plain, 1.0)) > SAME:
         raise UnmeasurableError(
-            "reference tools know rigid bodies, gravity and armature, and this scene has more in its "
-            "torques or in its cost; they are left out."
+            "reference tools know rigid bodies, gravity and armature, and this scene has more in "
+            "its torques or in its cost; they are left out."
         )
