@@ -1,10 +1,17 @@
-"""What a first plan imports: not what it does not use, which takes a quarter of a second."""
+"""What importing hovi offers, and what a first plan imports: nothing that it does not use."""
 
 from __future__ import annotations
 
+import os
+import pkgutil
 import subprocess
 import sys
 
+import pytest
+
+import hovi
+
+SUBPACKAGES = {"accuracy", "effects", "schemes"}
 FIRST_PLAN = """
 import sys
 import hovi
@@ -14,16 +21,55 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 """
 
 
+def python(code: str, **environment: str) -> list[str]:
+    """The words that a program prints in a process of its own."""
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(
+        run, capture_output=True, text=True, check=True, env=os.environ | environment
+    )
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize("name", hovi.__all__)
+def test_a_public_name_is_there(name: str) -> None:
+    assert getattr(hovi, name) is not None
+    assert name in dir(hovi)
+
+
+def test_a_module_does_not_hide_a_public_name() -> None:
+    """Importing hovi.robot binds that package to the name `robot` of hovi."""
+    modules = {module.name for module in pkgutil.iter_modules(hovi.__path__)}
+    assert modules & set(hovi.__all__) == SUBPACKAGES
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    unknown = "plann"
+    with pytest.raises(AttributeError, match=unknown):
+        getattr(hovi, unknown)
+    with pytest.raises(ImportError, match=unknown):
+        exec(f"from hovi import {unknown}")
+
+
+def test_all_public_names_can_be_imported_at_once() -> None:
+    """Imports in a circle, that a first name would hide, show when all names are loaded eagerly."""
+    assert python("import hovi; print('plan' in dir(hovi))", EAGER_IMPORT="1") == ["True"]
+
+
+def test_importing_hovi_imports_no_other_module_of_it() -> None:
+    code = "import sys; before = {*sys.modules}; import hovi; print(*{*sys.modules} - before)"
+    loaded = python(code)
+    assert "hovi" in loaded
+    assert not [name for name in loaded if name.startswith("hovi.")]
+    assert not {"numpy", "importlib.metadata"} & set(loaded)
+
+
 def test_a_first_plan_imports_nothing_that_it_does_not_use() -> None:
-    run = [sys.executable, "-c", FIRST_PLAN]
-    loaded = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
+    loaded = python(FIRST_PLAN)
     assert "pinocchio" in loaded
     assert not {"scipy", "joblib", "matplotlib", "meshcat", "typer"} & set(loaded)
 
 
 def test_a_report_in_the_terminal_draws_nothing() -> None:
-    code = "import sys, hovi.cli.reports.plan; print(*sys.modules)"
-    run = [sys.executable, "-c", code]
-    loaded = subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()
+    loaded = python("import sys, hovi.cli.reports.plan; print(*sys.modules)")
     assert "hovi.cli.reports.plan" in loaded
     assert not {"matplotlib", "meshcat", "scipy"} & set(loaded)

@@ -19,9 +19,9 @@ from pathlib import Path
 
 import casadi as ca
 
-from hovi import __version__
 from hovi.errors import HoviError
 from hovi.system.files import reason, whole_file
+from hovi.version import __version__
 
 COMPILERS = ("cc", "gcc")
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-s")
