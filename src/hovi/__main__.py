@@ -26,7 +26,7 @@ def run() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
         signal.signal(signal.SIGINT, _interrupt)
     try:
-        from hovi.cli import main
+        from hovi.cli.application import main
 
         code = main()
     except KeyboardInterrupt:

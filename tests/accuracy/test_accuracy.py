@@ -27,7 +27,7 @@ from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.picture import work_precision_figure
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.tables import as_csv
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.errors import InputError, UnmeasurableError
 from hovi.planning.problem.frame_goal import FrameGoal

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.bundled_models import example, example_scenes
 
@@ -512,7 +512,10 @@ def test_a_file_that_is_no_motion_is_refused(content: bytes, run: Run, tmp_path:
 
 
 def test_the_version_is_printed_without_loading_a_robot_library() -> None:
-    script = "import sys, hovi.cli; hovi.cli.main(['--version']); print('pinocchio' in sys.modules)"
+    script = (
+        "import sys; from hovi.cli.application import main; main(['--version'])\n"
+        "print('pinocchio' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     version, loaded = done.stdout.splitlines()
     assert version.startswith("hovi ")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.effects import Gravity
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity, Payload, ViscousFriction

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import TrajectoryFileError
 from hovi.system.files import whole_file
@@ -292,11 +292,11 @@ def test_without_a_browser_the_address_is_printed(motion: Path) -> None:
 def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
     """Raised while a class names its cached properties it arrives as a RuntimeError."""
     program = (
-        "import hovi.cli\n"
+        "import hovi.cli.application\n"
         "class Naming:\n"
         "    def __set_name__(self, owner, name): raise KeyboardInterrupt\n"
         "def main(): type('Owner', (), {'each': Naming()})\n"
-        "hovi.cli.main = main\n"
+        "hovi.cli.application.main = main\n"
         "from hovi.__main__ import run\n"
         "run()\n"
     )
@@ -306,7 +306,7 @@ def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
 
 
 def test_an_interrupt_that_a_module_swallows_as_it_is_imported_is_one(tmp_path: Path) -> None:
-    (tmp_path / "deaf.py").write_text(
+    (tmp_path / "deaf").with_suffix(".py").write_text(
         "import os, signal\n"
         "try: os.kill(os.getpid(), signal.SIGINT)\n"
         "except KeyboardInterrupt: pass\n"
@@ -315,9 +315,9 @@ def test_an_interrupt_that_a_module_swallows_as_it_is_imported_is_one(tmp_path: 
     program = (
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "import hovi.cli\n"
+        "import hovi.cli.application\n"
         "def main(): print('begun'); import deaf\n"
-        "hovi.cli.main = main\n"
+        "hovi.cli.application.main = main\n"
         "from hovi.__main__ import run\n"
         "run()\n"
     )

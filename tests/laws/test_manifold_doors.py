@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from typer.testing import CliRunner
 
-from hovi.cli import app
+from hovi.cli.application import app
 from hovi.cli.reports.peaks import peaks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid

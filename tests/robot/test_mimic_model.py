@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 from hovi.accuracy.effect_study.study import study_effects
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.torque_model import CasadiTorque

@@ -1,12 +1,14 @@
-"""The commands of `hovi`, put together."""
+"""The command `hovi`: its subcommands put together; an error is a sentence and an exit code."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
+from typer.exceptions import TyperException
 
-from hovi import __version__
 from hovi.cli.commands import accuracy as accuracy_command
 from hovi.cli.commands import effects as effects_command
 from hovi.cli.commands import export as export_command
@@ -16,6 +18,10 @@ from hovi.cli.commands import plot as plot_command
 from hovi.cli.commands import replay as replay_command
 from hovi.cli.commands import schema as schema_command
 from hovi.cli.commands import simulate as simulate_command
+from hovi.errors import HoviError
+from hovi.system.files import reason
+
+BAD_INPUT = 2
 
 app = typer.Typer(
     help="Least-torque motions of URDF robots by higher-order variational integrators.",
@@ -27,6 +33,8 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
+        from hovi.version import __version__
+
         print(f"hovi {__version__}")
         raise typer.Exit
 
@@ -52,3 +60,29 @@ app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)
 app.command("schema")(schema_command.schema)
 app.command("info")(info_command.info)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code.
+
+    arguments: what follows `hovi` on the command line; sys.argv when not given.
+    """
+    try:
+        code = app(args=arguments, prog_name="hovi", standalone_mode=False)
+    except HoviError as refused:
+        return _refuse(str(refused))
+    except TyperException as misuse:
+        return _refuse(misuse.format_message())
+    except (typer.Abort, KeyboardInterrupt):
+        return 130
+    except MemoryError:
+        return _refuse("this takes more memory than there is: fewer intervals or starts take less.")
+    except OSError as refused:
+        return _refuse(f"the operating system refuses: {reason(refused)}.")
+    return code if isinstance(code, int) else 0
+
+
+def _refuse(sentence: str) -> int:
+    if sentence:  # empty when the help has been printed instead
+        print(f"error: {sentence}", file=sys.stderr)
+    return BAD_INPUT

@@ -13,7 +13,7 @@ import pytest
 from hovi.accuracy.effect_study.candidates import effect_candidates
 from hovi.accuracy.effect_study.study import EffectStudy, study_effects
 from hovi.accuracy.effect_study.tables import COLUMNS, study_figure, study_json, study_rows
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.effects import Armature, Gravity, Payload, VelocityCost, ViscousFriction
 from hovi.errors import SceneError

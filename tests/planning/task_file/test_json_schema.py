@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from hovi.cli import main
+from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.effects import REGISTRY
 from hovi.planning.task_file.json_schema import json_schema
