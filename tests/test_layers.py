@@ -1,115 +1,90 @@
-"""The packages are floors of a house: a file imports only from the floors below its own."""
+"""The packages are floors of a house: a module imports only from the floors below its own."""
 
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
+from collections import Counter
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-import hovi
+from oracles.packages import FILES, FLOORS, INSIDE, NAMES, PACKAGES, TOP, Module, folder, imports
 
-SOURCE = Path(hovi.__file__).parent
-
-# From the ground up. A package may import within itself, in the order that INSIDE gives.
-FLOORS = [
-    {"errors", "system", "_native"},
-    {"schemes", "optimize", "robot"},
-    {"dynamics"},
-    {"effects"},
-    {"scene"},
-    {"discrete"},
-    {"flows"},
-    {"planning"},
-    {"viewing"},
-    {"accuracy", "exchange"},
-    {"cli"},
-    {"__main__"},
-]
-# "" stands for the files of the package itself.
-INSIDE = {
-    "robot": [{"space", "urdf"}, {""}],
-    "effects": [{"expressions"}, {""}],
-    "planning": [
-        {"clearance"},
-        {"problem"},
-        {"solver"},
-        {"refinement"},
-        {"search"},
-        {"task_file"},
-    ],
-    "accuracy": [{""}, {"peers", "effect_study"}],
-    "cli": [{"reports"}, {"commands"}, {""}],
-}
-FLOOR_OF = {package: floor for floor, packages in enumerate(FLOORS) for package in packages}
-FOLDER_OF = {
-    (package, folder): floor
+FLOOR = {package: floor for floor, packages in enumerate(FLOORS) for package in packages}
+INNER_FLOOR = {
+    (package, inner): floor
     for package, floors in INSIDE.items()
     for floor, folders in enumerate(floors)
-    for folder in folders
+    for inner in folders
 }
-FILES = sorted(path for path in SOURCE.rglob("*.py") if path != SOURCE / "__init__.py")
+PUBLIC = {("accuracy",), ("effects",), ("schemes",)}
+MOST_LINES = 400
+MOST_FILES = 15
+FAMILIES = {("effects",)}
+"""A file per member, with nothing else to read: these may be many."""
 
 
-def parts_of(path: Path) -> tuple[str, ...]:
-    """A file's module below hovi; a package's __init__ is the package."""
-    parts = path.relative_to(SOURCE).with_suffix("").parts
-    return parts[:-1] if parts[-1] == "__init__" else parts
+def is_below(imported: Module, module: Module) -> bool:
+    """Whether a module may import the other one."""
+    package, inner = module[0], folder(module)
+    if imported[0] != package:
+        return FLOOR[imported[0]] < FLOOR[package]
+    if folder(imported) == inner:
+        return True
+    return INNER_FLOOR[package, folder(imported)] < INNER_FLOOR[package, inner]
 
 
-MODULES = {parts_of(path): path for path in FILES}
+def dotted(module: Module) -> str:
+    return ".".join(module)
 
 
-def imports_of(path: Path) -> set[tuple[str, ...]]:
-    """The modules of hovi that a file imports, wherever in it, for types alone too."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}, line {node.lineno}: relative import"
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    found = set()
-    for name in names:
-        first, *parts = name.split(".")
-        if first == "hovi" and parts != ["__version__"]:
-            found.add(next(p for k in (0, 1) if (p := tuple(parts[: len(parts) - k])) in KNOWN))
-    return found
+def test_every_package_has_a_floor() -> None:
+    assert {module[0] for module in NAMES} == set(FLOOR)
 
 
-KNOWN = set(MODULES) | {("_native",)}
-KNOWN |= {("_native", path.stem) for path in (SOURCE / "_native").glob("*.pyi")}
+@pytest.mark.parametrize("package", sorted(FLOOR))
+def test_every_folder_of_a_package_has_its_place(package: str) -> None:
+    modules = [module for module in NAMES - PACKAGES if module[0] == package]
+    ordered = set().union(*INSIDE.get(package, [{""}]))
+    assert {folder(module) for module in modules} == ordered
 
 
-def folder(module: tuple[str, ...]) -> str:
-    """The folder of its package that a module stands in; "" for the package itself."""
-    is_folder = module in MODULES and MODULES[module].name == "__init__.py"
-    return module[1] if len(module) > 2 or (len(module) == 2 and is_folder) else ""
+@pytest.mark.parametrize("module", FILES, ids=dotted)
+def test_a_module_imports_only_from_lower_floors(module: Module) -> None:
+    above = [dotted(other) for other in imports(module) if not is_below(other, module)]
+    assert not above
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(SOURCE)))
-def test_a_file_imports_only_from_lower_floors(path: Path) -> None:
-    module = parts_of(path)
-    assert module[0] in FLOOR_OF, f"{module[0]} has no floor: give it one in {Path(__file__).name}"
-    for imported in imports_of(path):
-        here, there = FLOOR_OF[module[0]], FLOOR_OF[imported[0]]
-        if imported[0] != module[0]:
-            assert there < here, f"{'.'.join(module)} imports {'.'.join(imported)} from above"
-        elif module[0] in INSIDE and folder(module) != folder(imported):
-            here = FOLDER_OF[module[0], folder(module)]
-            there = FOLDER_OF[module[0], folder(imported)]
-            assert there < here, f"{'.'.join(module)} imports {'.'.join(imported)} from above"
-
-
-def test_no_files_import_each_other_in_a_circle() -> None:
-    graph = {module: imports_of(path) for module, path in MODULES.items()}
+def test_no_modules_import_each_other_in_a_circle() -> None:
     try:
-        TopologicalSorter(graph).prepare()
+        TopologicalSorter({module: imports(module) for module in FILES}).prepare()
     except CycleError as circle:
-        pytest.fail(" -> ".join(".".join(module) for module in circle.args[1]))
+        pytest.fail(" -> ".join(map(dotted, circle.args[1])))
 
 
-def test_no_floor_is_empty() -> None:
-    packages = {module[0] for module in KNOWN}
-    assert set(FLOOR_OF) == packages
+@pytest.mark.parametrize("package", sorted(PACKAGES - PUBLIC), ids=dotted)
+def test_a_package_holds_its_docstring_alone(package: Module) -> None:
+    """So that what is imported is what is used, and no circle can hide behind a package."""
+    tree = ast.parse(FILES[package].read_text())
+    assert ast.get_docstring(tree)
+    assert len(tree.body) == 1
+
+
+@pytest.mark.parametrize("module", FILES, ids=dotted)
+def test_a_file_can_be_read_in_one_go(module: Module) -> None:
+    lines = len(FILES[module].read_text().splitlines())
+    assert lines <= MOST_LINES
+
+
+def test_a_folder_can_be_taken_in_at_a_glance() -> None:
+    files = Counter(module[:-1] for module in FILES.keys() - PACKAGES)
+    assert {folder for folder, count in files.items() if count > MOST_FILES} <= FAMILIES
+
+
+def test_the_map_in_the_docs_is_up_to_date() -> None:
+    """Otherwise run `python docs/package_graph.py --write`."""
+    draw = [sys.executable, str(TOP / "docs" / "package_graph.py")]
+    drawn = subprocess.run(draw, capture_output=True, text=True, check=True).stdout
+    assert drawn.strip() in (TOP / "docs" / "design.md").read_text()

@@ -1,0 +1,88 @@
+"""The packages of hovi, the floors that they stand on, and which module imports which."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+Module = tuple[str, ...]
+"""A module's name below hovi: ("planning", "solver", "status")."""
+
+TOP = Path(__file__).resolve().parents[2]
+SOURCE = TOP / "src" / "hovi"
+
+# From the ground up: a package imports only packages of the floors below its own.
+FLOORS = [
+    {"_native", "errors", "system", "version"},
+    {"optimize", "robot", "schemes"},
+    {"dynamics"},
+    {"effects"},
+    {"scene"},
+    {"discrete"},
+    {"flows"},
+    {"planning"},
+    {"viewing"},
+    {"accuracy"},
+    {"cli"},
+    {"__main__"},
+]
+# The folders inside a package, in the same order; "" stands for the files of the package itself.
+INSIDE = {
+    "robot": [{"space", "urdf"}, {""}],
+    "effects": [{"expressions"}, {""}],
+    "planning": [
+        {"clearance"},
+        {"problem"},
+        {"solver"},
+        {"refinement"},
+        {"search"},
+        {"task_file"},
+    ],
+    "accuracy": [{""}, {"effect_study", "peers"}],
+    "cli": [{"reports"}, {"commands"}, {""}],
+}
+
+
+def _module(path: Path) -> Module:
+    """The name of a file's module; the `__init__` of a package is the package."""
+    parts = path.relative_to(SOURCE).with_suffix("").parts
+    return parts[:-1] if parts[-1] == "__init__" else parts
+
+
+FILES = {
+    _module(path): path
+    for path in sorted(SOURCE.rglob("*.py"))
+    if path != SOURCE / "__init__.py"  # which imports what it is asked for
+}
+PACKAGES = {module for module, path in FILES.items() if path.name == "__init__.py"}
+COMPILED = {_module(path) for path in (SOURCE / "_native").glob("*.pyi")}
+NAMES = {*FILES, *COMPILED}
+
+
+def folder(module: Module) -> str:
+    """The folder of its package that a module is in; "" is the package itself."""
+    home = module if module in PACKAGES else module[:-1]
+    return "/".join(home[1:])
+
+
+def imports(module: Module) -> set[Module]:
+    """The modules of hovi that a module imports, inside functions and for types alone too."""
+    return {_known(name, module) for name in _imported(FILES[module]) if name[0] == "hovi"}
+
+
+def _imported(path: Path) -> Iterator[Module]:
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (tuple(alias.name.split(".")) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert not node.level, f"{path}:{node.lineno}: relative import"
+            yield from ((*node.module.split("."), alias.name) for alias in node.names)
+
+
+def _known(name: Module, importer: Module) -> Module:
+    """The module that `import a.b.c` or `from a.b import c` asks for, or that has the name c."""
+    for found in (name[1:], name[1:-1]):
+        if found in NAMES:
+            return found
+    raise AssertionError(f"{'.'.join(importer)} imports {'.'.join(name)}, which is no module")
