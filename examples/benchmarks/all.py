@@ -1,6 +1,6 @@
 """Run every benchmark, one after the other, and put what they print into the docs.
 
-Each script prints Markdown; it goes to docs/tables/NAME.md, from which the docs include it. The
+Each script prints Markdown; it goes to docs/tables/<name>.md, from which the docs include it. The
 table of swing_up goes into the README as well, between two comments that name it.
 """
 

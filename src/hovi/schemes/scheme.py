@@ -51,7 +51,7 @@ class Scheme:
 
     @property
     def derivatives(self) -> int:
-        """Order k of the Lagrangians that the table discretises: 2 but for what jets.py makes.
+        """Order k of the Lagrangians that the table discretises: 2 except for `galerkin(r, k)`.
 
         The table of any k has shape (Q, k + 1, 2 k - 1 + r), with the columns of `jet_rows`.
         """

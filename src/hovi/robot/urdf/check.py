@@ -2,9 +2,9 @@
 
 Pinocchio takes "1,5" for a mass of 0, loads negative masses, explains a broken tree on stderr
 only and needs memory that grows with the cube of the degrees of freedom. So the text is counted
-first, then parsed without entities, then held against a table of rules (urdf_rules.py). The first
+first, then parsed without entities, then held against a table of rules (rules.py). The first
 rule that is broken raises one sentence that names the link or joint. What passes reaches Pinocchio
-as plain_urdf.py writes it again, never as it came.
+as normalize.py writes it again, never as it came.
 """
 
 from __future__ import annotations
