@@ -81,9 +81,15 @@ def _folder(package: Module) -> Iterator[str]:
     files = sorted(module[-1] for module in NAMES - PACKAGES if module[:-1] == package)
     indent = "  " * (depth + 3)
     yield from textwrap.wrap("  ".join(files), 96, initial_indent=indent, subsequent_indent=indent)
-    for folders in INSIDE.get(package[0], []) if depth == 0 else []:
-        for folder in sorted(folders - {""}):
-            yield from _folder((*package, folder))
+    for inner in _inner(package):
+        yield from _folder(inner)
+
+
+def _inner(package: Module) -> list[Module]:
+    """The folders of a package, in the order that INSIDE gives, or of a folder, by name."""
+    order = [folder for folders in INSIDE.get(package[0], []) for folder in sorted(folders)]
+    inner = [module for module in PACKAGES if module[:-1] == package]
+    return sorted(inner, key=lambda module: (order.index(module[1]), module))
 
 
 def _entry(depth: int, name: str, docstring: str) -> str:

@@ -17,7 +17,7 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import Limits, as_limits
-from hovi.planning.solver.bounded_action import LimitedAction
+from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.solver import guess_path
 
 SCENES = ("ur5_reach_limited", "panda_reach_limited")
@@ -54,7 +54,7 @@ def measure(scene: str) -> list[dict[str, object]]:
     path = guess_path(problem, "cubic")
 
     def first() -> object:
-        return minimize_bounded(LimitedAction(problem, problem.limits), path, Options())
+        return minimize_bounded(BoundedAction(problem, problem.limits), path, Options())
 
     outcome = first()
     assert outcome.feasible, outcome.stop

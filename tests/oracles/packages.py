@@ -61,9 +61,9 @@ NAMES = {*FILES, *COMPILED}
 
 
 def folder(module: Module) -> str:
-    """The folder of its package that a module is in; "" is the package itself."""
+    """The folder of its package that a module is in, at any depth; "" is the package itself."""
     home = module if module in PACKAGES else module[:-1]
-    return "/".join(home[1:])
+    return home[1] if len(home) > 1 else ""
 
 
 def imports(module: Module) -> set[Module]:
@@ -81,7 +81,7 @@ def _imported(path: Path) -> Iterator[Module]:
 
 
 def _known(name: Module, importer: Module) -> Module:
-    """The module that `import a.b.c` or `from a.b import c` asks for, or that has the name c."""
+    """The module imported: `from a.b import c` names the module a.b.c or something in a.b."""
     for found in (name[1:], name[1:-1]):
         if found in NAMES:
             return found
