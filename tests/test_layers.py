@@ -19,6 +19,7 @@ INNER_FLOOR = {
     for floor, folders in enumerate(floors)
     for inner in folders
 }
+EFFORT = {("scene", name) for name in ("cost_terms", "effort_lagrangian", "squared_effort")}
 PUBLIC = {("accuracy",), ("effects",), ("schemes",)}
 MOST_LINES = 400
 TO_SPLIT = {("planning", "search", "planner")}
@@ -87,6 +88,12 @@ def test_a_file_can_be_read_in_one_go(module: Module) -> None:
 def test_a_folder_can_be_taken_in_at_a_glance() -> None:
     files = Counter(module[:-1] for module in FILES.keys() - PACKAGES)
     assert {folder for folder, count in files.items() if count > MOST_FILES} <= FAMILIES
+
+
+@pytest.mark.parametrize("module", FILES, ids=dotted)
+def test_the_optimiser_knows_a_lagrangian_and_no_effort(module: Module) -> None:
+    if module[0] in ("discrete", "optimize", "planning"):
+        assert not imports(module) & EFFORT
 
 
 def test_the_map_in_the_docs_is_up_to_date() -> None:

@@ -76,6 +76,7 @@ def is_path(path: str) -> bool:
     return is_file or (TOP / path).is_dir() or path.startswith(BUILT)
 
 
+@pytest.mark.filterwarnings("ignore:.*:DeprecationWarning")  # old names that still resolve
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_what_a_text_names_exists(page: Path) -> None:
     text = (TOP / page).read_text()

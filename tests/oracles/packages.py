@@ -23,7 +23,7 @@ FLOORS = [
     {"flows"},
     {"planning"},
     {"viewing"},
-    {"accuracy"},
+    {"accuracy", "exchange"},
     {"cli"},
     {"__main__"},
 ]

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.motion_error import MotionError, relative_difference, sliding_coordinates
+from hovi.discrete.motion_error import MotionError, relative_difference
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -71,7 +71,7 @@ class ReferenceMotion:
             q_at_nodes=q[1:],
             tip_at_nodes=tip[1:],
             frame=self.robot.tip_frame,
-            sliding=sliding_coordinates(self.robot),
+            sliding=self.robot.sliding,
         )
 
     def _distances(self, own: tuple[Array, Array], q: Array) -> tuple[Array, Array]:
