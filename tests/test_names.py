@@ -88,4 +88,4 @@ def test_what_a_text_names_exists(page: Path) -> None:
 def test_ctrl_c_finds_what_it_calls() -> None:
     """A signal handler has to find these in sys.modules: what is not there it does without."""
     assert callable(import_module(EXTENSION).ignore_leaks)
-    assert callable(import_module(MEMORY).remember)
+    assert callable(import_module(MEMORY).record_interrupt)

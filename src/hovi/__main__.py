@@ -56,7 +56,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     if asking is None:
         memory = sys.modules.get(MEMORY)
         if memory is not None:
-            memory.remember()
+            memory.record_interrupt()
         raise KeyboardInterrupt
     if not any(map(_of_a_run, _outward(asking))):
         os._exit(_flushed(INTERRUPTED))  # nothing is there to finish

@@ -17,7 +17,12 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
-from hovi.system.interruption import go_on, interrupted, interruptible, remember
+from hovi.system.interruption import (
+    interrupted,
+    interruptible,
+    raise_if_interrupted,
+    record_interrupt,
+)
 
 HANG = np.array([-np.pi / 2, 0.0])
 REACH = np.array([0.3, 0.7])
@@ -40,7 +45,7 @@ SEARCHES: dict[str, dict[str, Any]] = {
 @interruptible
 def swallowing() -> bool:
     with contextlib.suppress(KeyboardInterrupt):
-        remember()
+        record_interrupt()
         raise KeyboardInterrupt
     return interrupted()
 
@@ -59,7 +64,7 @@ def test_a_call_that_raises_leaves_no_interrupt_to_the_next() -> None:
     @interruptible
     def ended() -> None:
         swallowing()
-        go_on()
+        raise_if_interrupted()
 
     with pytest.raises(KeyboardInterrupt):
         ended()
@@ -67,9 +72,9 @@ def test_a_call_that_raises_leaves_no_interrupt_to_the_next() -> None:
 
 
 def test_outside_of_calls_nothing_is_remembered() -> None:
-    remember()
+    record_interrupt()
     assert not interrupted()
-    go_on()
+    raise_if_interrupted()
 
 
 @pytest.mark.parametrize("dropped", [False, True])
@@ -89,7 +94,7 @@ def test_an_interrupt_anywhere_ends_every_search(
         nonlocal calls
         calls += 1
         if calls == evaluations:
-            remember()
+            record_interrupt()
             if not dropped:
                 raise KeyboardInterrupt
         return jets(self, path)

@@ -6,7 +6,7 @@ import math
 import time
 
 from hovi.errors import InputError
-from hovi.system.interruption import go_on
+from hovi.system.interruption import raise_if_interrupted
 
 
 class Budget:
@@ -40,5 +40,5 @@ class Budget:
 
         Raises KeyboardInterrupt where a person ended the work before it.
         """
-        go_on()
+        raise_if_interrupted()
         return self.spent + seconds <= share * self.seconds

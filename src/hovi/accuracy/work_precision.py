@@ -20,7 +20,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
-from hovi.system.interruption import go_on, interruptible
+from hovi.system.interruption import interruptible, raise_if_interrupted
 
 SEARCHING = 0.3
 """Share of the budget in which the motion may be found and resolved."""
@@ -98,7 +98,7 @@ def work_precision(
         seed=task.seed,
         time_limit=SEARCHING * budget,
     )
-    go_on()
+    raise_if_interrupted()
     if not found.success or found.problem is None:
         raise UnmeasurableError(f"no motion of {task.name} to measure against: {found.message}")
     report("resolving the motion", time.fraction)

@@ -35,7 +35,7 @@ from hovi.optimize.trust_region import (
     solve_subproblem,
 )
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import go_on, remember
+from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -160,7 +160,7 @@ def minimize_bounded(
     try:
         _Iteration(objective, outcome, options, density, report).run()
     except KeyboardInterrupt:
-        remember()
+        record_interrupt()
         outcome.stop = Stop.INTERRUPTED
     except ArithmeticError:
         outcome.stop = Stop.DIVERGED
@@ -190,11 +190,11 @@ class _Iteration(Generic[X]):
 
     def run(self) -> None:
         """Until stationary, or a budget ends it."""
-        go_on()
+        raise_if_interrupted()
         deadline = Deadline(self.options.time_limit)
         model = self._model()
         while self.outcome.iterations < self.options.max_iterations:
-            go_on()
+            raise_if_interrupted()
             if deadline.passed:
                 self.outcome.stop = Stop.TIME_LIMIT
                 return

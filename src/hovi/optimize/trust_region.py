@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import go_on, remember
+from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -155,7 +155,7 @@ def minimize(
     try:
         _iterate(objective, outcome, options, report)
     except KeyboardInterrupt:
-        remember()
+        record_interrupt()
         outcome.stop = Stop.INTERRUPTED
     except ArithmeticError:
         outcome.stop = Stop.DIVERGED
@@ -168,12 +168,12 @@ def _iterate(
     options: Options,
     report: Callable[[int, float], None] | None,
 ) -> None:
-    go_on()
+    raise_if_interrupted()
     deadline = Deadline(options.time_limit)
     radius, shift = options.radius, 0.0
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
-        go_on()
+        raise_if_interrupted()
         if deadline.passed:
             outcome.stop = Stop.TIME_LIMIT
             return

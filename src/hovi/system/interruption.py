@@ -43,7 +43,7 @@ def interruptible(function: Callable[Arguments, Result]) -> Callable[Arguments, 
     return remembering
 
 
-def remember() -> None:
+def record_interrupt() -> None:
     """An interrupt came; for whoever catches KeyboardInterrupt. Nothing outside of a call."""
     call = _outermost.get()
     if call is not None:
@@ -56,7 +56,7 @@ def interrupted() -> bool:
     return call is not None and call.interrupted
 
 
-def go_on() -> None:
+def raise_if_interrupted() -> None:
     """Raise KeyboardInterrupt again where one came."""
     if interrupted():
         raise KeyboardInterrupt

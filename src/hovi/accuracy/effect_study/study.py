@@ -21,7 +21,7 @@ from hovi.planning.task_file.task_plan import plan_task
 from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import go_on, interruptible, remember
+from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -137,7 +137,7 @@ def study_effects(
                 break
             trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
     except KeyboardInterrupt:
-        remember()
+        record_interrupt()
     untried = tried[len(trials) :]
     return EffectStudy(task, solution, own_seconds, again, tuple(trials), untried)
 
@@ -180,7 +180,7 @@ def _plan(
 ) -> Solution:
     changed = dataclasses.replace(task, scene=scene)
     solution = plan_task(changed, starts=starts, guess=guess, time_limit=limit)
-    go_on()  # with the other plans, unless a person ended this one
+    raise_if_interrupted()  # with the other plans, unless a person ended this one
     return solution
 
 

@@ -24,7 +24,12 @@ from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import go_on, interrupted, interruptible, remember
+from hovi.system.interruption import (
+    interrupted,
+    interruptible,
+    raise_if_interrupted,
+    record_interrupt,
+)
 
 Told = Callable[[Round], None]
 """What is told how far a search is."""
@@ -111,7 +116,7 @@ class _Search:
         try:
             reason = self._refine(solution)
         except KeyboardInterrupt:
-            remember()
+            record_interrupt()
             reason = "it was interrupted"
         return self._finished(self.best, reason)
 
@@ -135,7 +140,7 @@ class _Search:
 
     def _judged(self, solution: Solution) -> Candidate:
         """A solution with what is known of its error, as a round of its own."""
-        go_on()
+        raise_if_interrupted()
         began = time.perf_counter()
         candidate = Candidate.of(solution, self.tolerance)
         grid = solution.trajectory.grid
@@ -150,7 +155,7 @@ class _Search:
 
     def _ended(self, candidate: Candidate, stalled: int) -> str:
         """Why no finer grid is tried, or ""."""
-        go_on()
+        raise_if_interrupted()
         solution = candidate.solution
         if not solution.success:
             return f"the last solve ended in {solution.status}"

@@ -20,7 +20,7 @@ from hovi.planning.search.job import Job, Progress
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import remember
+from hovi.system.interruption import record_interrupt
 
 WAYS: dict[str, Way] = {
     "inertia": lighter_rotors,
@@ -78,7 +78,7 @@ def climb(
         try:
             found = ladder.go_on(best) if name == STEPS else ladder.climb(WAYS[name](job))
         except KeyboardInterrupt:
-            remember()
+            record_interrupt()
             found, ladder.ended = None, Status.INTERRUPTED
         if ladder.rungs > 0:
             tried.append(name)

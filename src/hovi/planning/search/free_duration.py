@@ -24,7 +24,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.tolerance import Round
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
-from hovi.system.interruption import remember
+from hovi.system.interruption import record_interrupt
 
 SolveFor = Callable[[float, Trajectory], Solution]
 """The solution for a duration in [s], from a guess."""
@@ -149,7 +149,7 @@ class _Search:
             except _FailedError as failed:
                 return self.unfinished(failed.solution)
             except KeyboardInterrupt:  # between two solves, each of which hears its own
-                remember()
+                record_interrupt()
                 self.ending = "The search for a better one was interrupted; the last duration is"
                 return dataclasses.replace(self.best, success=False, status=Status.INTERRUPTED)
             T, slope = further, next_slope

@@ -27,7 +27,7 @@ from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import remember
+from hovi.system.interruption import record_interrupt
 
 Array = npt.NDArray[np.float64]
 
@@ -135,7 +135,7 @@ def explore(
     except KeyboardInterrupt:
         if not solutions:
             raise
-        remember()
+        record_interrupt()
         interrupted = True
     interrupted = interrupted or any(s.status is Status.INTERRUPTED for s in solutions)
     return Exploration(distinct(solutions), len(solutions), interrupted)

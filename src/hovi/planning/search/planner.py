@@ -44,7 +44,12 @@ from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name, galerkin
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import go_on, interrupted, interruptible, remember
+from hovi.system.interruption import (
+    interrupted,
+    interruptible,
+    raise_if_interrupted,
+    record_interrupt,
+)
 
 COARSE_INTERVALS = 60
 """Grids with more than twice as many intervals are first solved on a grid of this many."""
@@ -212,17 +217,17 @@ class _Search:
         try:
             found = self._climbed(job, found, guess)
             if self.tolerance is not None and self.free is None:
-                go_on()
+                raise_if_interrupted()
                 found = self._refine_to(self.tolerance, found)
             elif job is not self.fine:
-                go_on()
+                raise_if_interrupted()
                 found = self._climbed(self.fine, self._refine(found), guess)
             found = [self._in_charts(found[0]), *found[1:]]
             if self.free is not None:
-                go_on()
+                raise_if_interrupted()
                 found = self._freed(self.free, found[:REFINED])
         except KeyboardInterrupt:
-            remember()
+            record_interrupt()
             found = _interrupted(found[:1])
         best = found[0]
         if search.done < starts:

@@ -27,7 +27,7 @@ from hovi.planning.solver.warm_start import follow
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
-from hovi.system.interruption import interruptible, remember
+from hovi.system.interruption import interruptible, record_interrupt
 
 CORRECTIONS = 6
 """Quasi-Newton steps that may correct the guess of a motion between other states."""
@@ -159,7 +159,7 @@ def solve(
     try:
         answer = method.minimize(problem, path, options, report)
     except KeyboardInterrupt:  # outside of the iterations, which keep what they have
-        remember()
+        record_interrupt()
         answer = _interrupted(problem, path)
     return _solution(answer, started - began, time.perf_counter() - started)
 

@@ -12,7 +12,7 @@ from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.method import Answer, Method, Report
 from hovi.planning.solver.methods.tightening import tightened, usable
 from hovi.planning.solver.status import Status, unfinished
-from hovi.system.interruption import remember
+from hovi.system.interruption import record_interrupt
 
 
 class InteriorPoint(Method):
@@ -43,7 +43,7 @@ class InteriorPoint(Method):
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, each of which hears its own
-            remember()
+            record_interrupt()
             return _interrupted(search)
 
 
