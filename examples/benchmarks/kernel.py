@@ -11,9 +11,18 @@ import numpy as np
 from measuring import alone, best_time, print_machine, print_table
 
 import hovi
+from hovi.dynamics.extension import archive
 from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import CasadiTorque
+
+try:
+    from hovi._native import pinocchio_calls
+except ImportError as error:
+    raise SystemExit(
+        "Pinocchio's own derivatives are not compiled: run `pip install -C "
+        "cmake.define.HOVI_BENCHMARKS=ON .` in hovi's folder, which needs 3 GB of free memory."
+    ) from error
 
 ROBOTS = {
     "UR5": ("ur5", ()),
@@ -34,7 +43,8 @@ def measure(robot: str, threads: int) -> dict[str, float]:
     curvature = weight * kernel.torque(q, v, a)
     ours = best_time(lambda: kernel.expand(q, v, a, weight, curvature, threads), seconds=1.0)
     result = {"n": n, "hovi": 1e6 * ours / POINTS}
-    yardsticks = [kernel.time_pinocchio_calls(q, v, a, 4) for _ in range(20)]
+    text = archive(model)
+    yardsticks = [pinocchio_calls.time_calls(text, q, v, a, 4) for _ in range(20)]
     result["Pinocchio"] = 1e6 * min(yardsticks)
     if threads == 1:
         result |= _casadi(model, kernel, (q[:64], v[:64], a[:64]))

@@ -13,7 +13,7 @@ from types import FrameType
 INTERRUPTED = 130
 IMPORTING = "<frozen importlib"
 """What the file names of Python's own frames begin with while a module is imported."""
-EXTENSION = "hovi._native._core"
+EXTENSION = "hovi._native.dynamics"
 """What counts its objects at the end; those of a program that was interrupted are no leaks."""
 MEMORY = "hovi.system.interruption"
 """What remembers an interrupt that comes where Python drops exceptions, as in a destructor."""

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi._native import _packed
+from hovi._native import intervals as native
 from hovi.discrete.contraction import contract
 
 Array = npt.NDArray[np.float64]
@@ -71,6 +71,6 @@ def test_any_processor_contracts_alike(shape: tuple[int, int, int, int]) -> None
     batch = random_batch(*shape)
     fast = contract(*batch)
     slow = tuple(np.empty_like(array) for array in fast)
-    _packed.contract(*batch, *slow, portable=True)
+    native.contract(*batch, *slow, portable=True)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-14 * np.abs(other).max())

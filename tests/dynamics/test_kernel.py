@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hovi._native import _core
-from hovi.dynamics.extension import archive
+from hovi._native import dynamics as native
 from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel, joints_without_kernel
+from hovi.dynamics.joint_tree import read_joint_tree
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, ModelError
 
@@ -152,7 +152,7 @@ def test_branching_trees_of_every_kind_of_joint_agree_with_casadi(joints, roots,
     assert_kernel_matches_oracle(random_tree(joints, seed, roots), points=5)
 
 
-def core_expansion(core: _core.InverseDynamicsKernel, n: int, points: int) -> list[np.ndarray]:
+def core_expansion(core: native.InverseDynamicsKernel, n: int, points: int) -> list[np.ndarray]:
     q, v, a, curvature = random_points(n, points)
     shapes = (points, n), (points, n, 3 * n), (points, 3 * n, 3 * n)
     out = [np.empty(shape) for shape in shapes]
@@ -162,9 +162,9 @@ def core_expansion(core: _core.InverseDynamicsKernel, n: int, points: int) -> li
 
 @pytest.mark.parametrize("model", [chain(7), random_tree(12, 5, 2)], ids=["chain", "tree"])
 def test_both_instruction_sets_give_the_same_to_rounding(model) -> None:
-    text, n = archive(model), model.nv
-    fast = core_expansion(_core.InverseDynamicsKernel(text), n, 7)
-    portable = core_expansion(_core.InverseDynamicsKernel(text, portable=True), n, 7)
+    tree, n = read_joint_tree(model), model.nv
+    fast = core_expansion(tree.compiled(), n, 7)
+    portable = core_expansion(tree.compiled(portable=True), n, 7)
     for one, other in zip(fast, portable, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
 
@@ -188,7 +188,7 @@ def test_all_methods_and_thread_counts_give_the_same_bytes(load_model, name, loc
 @pytest.mark.parametrize("points", range(1, 10))
 @pytest.mark.parametrize("portable", [False, True])
 def test_a_point_has_the_same_bytes_in_every_batch(load_model, points, portable) -> None:
-    core = _core.InverseDynamicsKernel(archive(load_model("panda")), portable)
+    core = read_joint_tree(load_model("panda")).compiled(portable)
     q, v, a, curvature = random_points(9, 9)
 
     def expand(rows: slice) -> list[np.ndarray]:

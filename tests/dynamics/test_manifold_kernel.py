@@ -10,9 +10,8 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi._native import _core
-from hovi.dynamics.extension import archive
 from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel, joints_without_kernel
+from hovi.dynamics.joint_tree import read_joint_tree
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import CasadiTorque
 from hovi.errors import InputError, ModelError
@@ -134,12 +133,12 @@ def test_batches_methods_and_thread_counts_give_the_same_bytes(base: str) -> Non
 @pytest.mark.parametrize("base", BASES)
 def test_both_instruction_sets_give_the_same_to_rounding(base: str) -> None:
     robot = load_robot(with_arm(base))
-    n, text = robot.nv, archive(robot.model)
+    n, tree = robot.nv, read_joint_tree(robot.model)
     q, v, a, curvature = jets(robot, 7)
     shapes = (7, n), (7, n, 3 * n), (7, 3 * n, 3 * n)
     fast, portable = ([np.empty(shape) for shape in shapes] for _ in range(2))
     for out, portably in ((fast, False), (portable, True)):
-        core = _core.InverseDynamicsKernel(text, portable=portably)
+        core = tree.compiled(portable=portably)
         core.expand(q, v, a, np.ones_like(v), curvature, *out, 1)
     for one, other in zip(fast, portable, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())

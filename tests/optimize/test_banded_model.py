@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi._native import _packed
+from hovi._native import band as native
 from hovi.optimize.banded_model import PANEL, BandLayout, BandModel
 from samples.interval_problems import SIZES, IntervalProblem, random_problem
 
@@ -102,8 +102,8 @@ def test_any_processor_solves_arms_of_any_size(n: int) -> None:
     expected = problem.newton_step(0.0)
     for portable in (False, True):
         factor, step = np.empty_like(band), np.empty_like(expected)
-        assert _packed.factor(band, band, 0.0, layout.rows, layout.size, factor, portable)
-        _packed.solve(factor, layout.rows, -model.gradient, step, portable)
+        assert native.factor(band, band, 0.0, layout.rows, layout.size, factor, portable)
+        native.solve(factor, layout.rows, -model.gradient, step, portable)
         np.testing.assert_allclose(step, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 

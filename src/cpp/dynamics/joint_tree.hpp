@@ -1,16 +1,17 @@
-// A robot as a tree of joints that turn about and slide along their z axis, with or without a base
-// that moves: numbers only.
+// A robot as a tree of joints that rotate about and translate along their z axis, with or without a
+// base that moves: numbers only.
 #pragma once
 
 #include <vector>
 
 #include "tree_view.hpp"
 
-namespace hovi {
+namespace hovi::dynamics {
 
 class JointTree {
  public:
-  // nq, base, gravity: see TreeView.
+  // nq, base, gravity: see TreeView. Throws std::invalid_argument for what is no tree, or would
+  // make a kernel read or write out of bounds.
   JointTree(std::vector<TreeJoint> joints, int nq, const TreeBase& base, const double* gravity);
 
   JointTree(JointTree&&) = default;
@@ -21,15 +22,19 @@ class JointTree {
  private:
   using RunLists = std::vector<std::vector<Run>>;
 
+  void check() const;
+  void check_base() const;
+  void add_subtree_masses();
   void relate();
+  void list_relatives();
 
   std::vector<TreeJoint> joints_;
   int nq_;
   TreeBase base_;
   double gravity_[6];
-  std::vector<int> meeting_;
-  RunLists related_runs_, carrier_runs_;
-  std::vector<JointSet> related_, carriers_;  // views of these lists
+  std::vector<int> common_ancestor_;
+  RunLists relative_runs_, ancestor_runs_;
+  std::vector<JointSet> relatives_, ancestors_;  // views of these lists
 };
 
-}  // namespace hovi
+}  // namespace hovi::dynamics

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace hovi {
+namespace hovi::dynamics {
 
 // A batch of points; row-major, q of shape (count, nq), v and a (count, n).
 struct Points {
@@ -27,4 +27,4 @@ struct Multipliers {
   const double* curvature;
 };
 
-}  // namespace hovi
+}  // namespace hovi::dynamics

@@ -1,22 +1,22 @@
-// What the packed algorithms read of a robot. Joint k comes after its parent.
+// What the kernels read of a robot. Joint k comes after its parent.
 #pragma once
 
-namespace hovi {
+namespace hovi::dynamics {
 
 // The frame of a joint has the joint's axis as its z axis.
 struct TreeJoint {
   int parent;             // -1: the world
-  int q;                  // where its coordinate stands in a configuration
+  int q;                  // index of its coordinate in a configuration
   bool continuous;        // instead of the angle, (cos, sin) stand there
   double rotation[9];     // of this frame in the parent's, at q = 0, by columns
   double translation[3];  // [m]
-  double turn;            // angle about z per unit of q: 1, or 0 for a sliding joint
-  double slide;           // displacement along z per unit of q [m]
+  double angular;         // angle about z per unit of q: 1, or 0 for a prismatic joint
+  double linear;          // displacement along z per unit of q [m]
   double mass;            // of the body [kg]
   double center[3];       // its center of mass in this frame [m]
   double moment[6];       // integral of x x^T dm about the center [kg m^2]: xx xy xz yy yz zz
   double armature;        // [kg m^2] or [kg]
-  double subtree_mass;    // of this body and all that it carries [kg]
+  double subtree_mass;    // of this body and all of its descendants [kg]
 };
 
 // The joints [begin, end).
@@ -31,12 +31,12 @@ struct JointSet {
 };
 
 // A base that moves on SE(3), SO(3) or SE(2). The components of its velocity, in its own frame, are
-// the first joints of the tree, each carrying the next.
+// the first joints of the tree, each the parent of the next.
 struct TreeBase {
-  int size;       // how many; 0: there is no such base
-  int places[6];  // of each in a twist: linear x y z, angular x y z
-  int q;          // where its quaternion (x, y, z, w) stands in a configuration
-  bool planar;    // instead of a quaternion, (cos, sin) of the angle about z stand there
+  int size;              // how many; 0: there is no such base
+  int twist_indices[6];  // of each in a twist: linear x y z, angular x y z
+  int q;                 // index of its quaternion (x, y, z, w) in a configuration
+  bool planar;           // instead of a quaternion, (cos, sin) of the angle about z stand there
 };
 
 struct TreeView {
@@ -44,11 +44,11 @@ struct TreeView {
   int nq;  // numbers in a configuration
   const TreeJoint* joints;
   TreeBase base;
-  double gravity[6];         // spatial acceleration of free fall: linear, angular. Where a base
-                             // moves, in the axes that it has at the neutral configuration.
-  const int* meeting;        // (n, n): the last joint that carries both, or -1
-  const JointSet* related;   // (n,): the joints that carry i, i, and those that i carries
-  const JointSet* carriers;  // (n,): the joints that carry i, and i
+  double gravity[6];           // spatial acceleration of free fall: linear, angular. Where a base
+                               // moves, in the axes that it has at the neutral configuration.
+  const int* common_ancestor;  // (n, n): the last joint that moves both, or -1
+  const JointSet* relatives;   // (n,): the ancestors of i, i, and its descendants
+  const JointSet* ancestors;   // (n,): the ancestors of i, and i
 };
 
-}  // namespace hovi
+}  // namespace hovi::dynamics

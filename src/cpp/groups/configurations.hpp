@@ -3,9 +3,9 @@
 // Quaternions are (x, y, z, w), angles of SO(2) and SE(2) (cos, sin).
 #pragma once
 
-#include "doors.hpp"
+#include "kernels.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 
 // What has unit norm leaves with unit norm. result may be q.
 void integrate(const Space& space, const double* q, const double* x, double* result);
@@ -15,4 +15,4 @@ void integrate(const Space& space, const double* q, const double* x, double* res
 void difference(const Space& space, const double* q0, const double* q1, const double* expected,
                 double* result);
 
-}  // namespace hovi
+}  // namespace hovi::groups

@@ -1,7 +1,7 @@
 #include "configurations.hpp"
-#include "plane_and_space.hpp"
+#include "quaternions.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 namespace {
 
 constexpr double no_turn = 1e-9;      // turn, in [rad], below which its axis says nothing
@@ -108,4 +108,4 @@ void difference(const Space& space, const double* q0, const double* q1, const do
   }
 }
 
-}  // namespace hovi
+}  // namespace hovi::groups

@@ -5,7 +5,7 @@
 
 #include "point_chart.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 namespace {
 
 struct EndVariation {
@@ -15,7 +15,7 @@ struct EndVariation {
 
   explicit EndVariation(const Vector<Curve>& x) : at_end(x) {
     inverse_J = inverse(at_end.J);
-    x_by[0] = -1.0 * (inverse_J * at_end.back), x_by[1] = inverse_J;
+    x_by[0] = -1.0 * (inverse_J * at_end.inverse_adjoint), x_by[1] = inverse_J;
     for (std::size_t i = 0; i < 2; ++i) dx_by[i] = -1.0 * (inverse_J * (at_end.K * x_by[i]));
   }
 };
@@ -42,18 +42,20 @@ struct EndBend {
     const Vector<Dual> force_q = back * (n_x - transposed(end.at_end.K) * force_v);
     const PointBend bend(end.at_end, force_q, force_v, Vector<Dual>{});
     const Matrix<Dual> zero{}, *const x_by[] = {&end.x_by[0], &end.x_by[1], &zero},
-                                *const dx_by[] = {&end.dx_by[0], &end.dx_by[1], &end.inverse_J};
+                                      *const dx_by[] = {&end.dx_by[0], &end.dx_by[1],
+                                                        &end.inverse_J};
     for (std::size_t j = 0; j < 3; ++j) {
       const Matrix<Dual> x = bend.x_x * *x_by[j] + bend.x_dx * *dx_by[j];
       const Matrix<Dual> dx = transposed(bend.x_dx) * *x_by[j] + bend.dx_dx * *dx_by[j];
       for (std::size_t i = 0; i <= j; ++i)
         at[i][j] = -1.0 * (transposed(*x_by[i]) * x + transposed(*dx_by[i]) * dx);
     }
-    at[0][1] = at[0][1] + 0.5 * (transposed(end.at_end.back) * cross(force_q, identity()));
+    at[0][1] =
+        at[0][1] + 0.5 * (transposed(end.at_end.inverse_adjoint) * cross(force_q, identity()));
     for (std::size_t j = 0; j < 3; ++j)
       for (std::size_t i = 0; i < j; ++i) at[j][i] = transposed(at[i][j]);
   }
 };
 
 }  // namespace
-}  // namespace hovi
+}  // namespace hovi::groups

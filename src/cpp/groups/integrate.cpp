@@ -1,7 +1,7 @@
 #include "configurations.hpp"
-#include "plane_and_space.hpp"
+#include "quaternions.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 namespace {
 
 double sinc(double x) { return x == 0.0 ? 1.0 : std::sin(x) / x; }
@@ -77,4 +77,4 @@ void integrate(const Space& space, const double* q, const double* x, double* res
   }
 }
 
-}  // namespace hovi
+}  // namespace hovi::groups

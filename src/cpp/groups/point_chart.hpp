@@ -5,10 +5,10 @@
 // z = J dx + (dJ . dx) dx / 2.
 #pragma once
 
-#include "group_places.hpp"
+#include "group_coordinates.hpp"
 #include "right_jacobian.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 namespace {
 
 template <typename Group>
@@ -47,7 +47,7 @@ struct Motion {
   }
 
   // Ad of exp(-x).
-  Matrix<Dual> carried_back() const {
+  Matrix<Dual> adjoint_of_inverse() const {
     return identity() + -1.0 * cross(coefficient<0>(turning.x), J);
   }
 };
@@ -55,9 +55,11 @@ struct Motion {
 // First variations of (q, v, a), blocks of one group: z = J dx, and K = J' + [v, J] is how v
 // depends on x.
 struct Variation : Motion {
-  Matrix<Dual> J1, J2, K, K1, back;  // the rates of J, K and its rate, and carried_back
+  Matrix<Dual> J1, J2, K, K1;  // the rates of J, K and its rate
+  Matrix<Dual> inverse_adjoint;
 
-  explicit Variation(const Vector<Curve>& x) : Motion(x), back(carried_back()) {
+  explicit Variation(const Vector<Curve>& x)
+      : Motion(x), inverse_adjoint(adjoint_of_inverse()) {
     const auto slope = [](const Curve& number) { return rate(number); };
     const Matrix<Truncated<2>> bent = each(jacobian, slope) + cross(v_along, J_along);
     J1 = coefficient<1>(jacobian), J2 = 2.0 * coefficient<2>(jacobian);
@@ -67,15 +69,15 @@ struct Variation : Motion {
 
 // The blocks of the Jacobian, rows (q, v, a), columns (q0, x, x', x''):
 //
-//     carried_back   J    0      0
-//     0              K    J      0
-//     0              K1   J1+K   J
+//     inverse_adjoint   J    0      0
+//     0                 K    J      0
+//     0                 K1   J1+K   J
 template <typename Group>
 struct PointJacobian {
-  Square<Group> carried_back, J, K, K1, J1_K;
+  Square<Group> inverse_adjoint, J, K, K1, J1_K;
 
   explicit PointJacobian(const Variation& by)
-      : carried_back(linear<Group>(by.back)),
+      : inverse_adjoint(linear<Group>(by.inverse_adjoint)),
         J(linear<Group>(by.J)),
         K(linear<Group>(by.K)),
         K1(linear<Group>(by.K1)),
@@ -114,9 +116,9 @@ struct PointBend {
     x_dx = J_T * (Q * by.J + 2.0 * (R * by.J1)) + coefficient<1>(M);
     x_ddx = J_T * (R * by.J) + 0.5 * coefficient<0>(M);
     dx_dx = coefficient<0>(M);
-    base_x = -0.5 * (transposed(by.back) * cross(n_q, by.J));
+    base_x = -0.5 * (transposed(by.inverse_adjoint) * cross(n_q, by.J));
   }
 };
 
 }  // namespace
-}  // namespace hovi
+}  // namespace hovi::groups

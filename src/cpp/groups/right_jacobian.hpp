@@ -8,9 +8,9 @@
 // [Barfoot2024, section 8.1.5].
 #pragma once
 
-#include "truncated.hpp"
+#include "dual_numbers.hpp"
 
-namespace hovi {
+namespace hovi::groups {
 namespace {
 
 constexpr std::size_t series_terms = 21;  // exact to rounding for angles up to 2 pi
@@ -118,4 +118,4 @@ inline Matrix<Curve> bending(const Turning& turning, const Vector<Curve>& n) {
 }
 
 }  // namespace
-}  // namespace hovi
+}  // namespace hovi::groups

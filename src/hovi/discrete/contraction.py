@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _packed
+from hovi._native import intervals as native
 
 Array = npt.NDArray[np.float64]
 
@@ -29,7 +29,7 @@ def contract(
     H = np.ascontiguousarray(hessian.reshape(P, 3 * n, 3 * n))
     columns_gradient = np.empty((len(steps), m, n))
     columns_hessian = np.empty((len(steps), m, m, n, n))
-    _packed.contract(
+    native.contract(
         np.ascontiguousarray(table), weights, steps, g, H, columns_gradient, columns_hessian
     )
     return columns_gradient, columns_hessian

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _packed
+from hovi._native import intervals as native
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -26,7 +26,7 @@ def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) 
     """
     q, v, z, inner = path
     out = np.empty((3, len(steps) * len(table), v.shape[1]))
-    _packed.interpolate(table, steps, intervals, q, v, z, inner, out)
+    native.interpolate(table, steps, intervals, q, v, z, inner, out)
     return out
 
 
@@ -39,7 +39,7 @@ def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays
     """
     _, v, z, inner = path
     after = np.empty_like(v), np.empty_like(v), np.empty_like(z), np.empty_like(inner)
-    _packed.move(step, steps, nodal, v, z, inner, *after)
+    native.move(step, steps, nodal, v, z, inner, *after)
     return after
 
 
@@ -49,4 +49,4 @@ def misfit(path: PathArrays, steps: Array) -> float:
     The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q|
     or to one; not a number where the path has one that is not finite. steps: h, shape (N,).
     """
-    return _packed.misfit(steps, *path)
+    return native.misfit(steps, *path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _packed
+from hovi._native import intervals as native
 
 Array = npt.NDArray[np.float64]
 
@@ -27,5 +27,5 @@ def carried_momenta(derivatives: Array) -> Array:
     """
     N = len(derivatives)
     momenta = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
-    _packed.carry(derivatives[:, 0] + derivatives[:, 2], ROUNDING * N, momenta)
+    native.replace_by_prefix_sums(derivatives[:, 0] + derivatives[:, 2], ROUNDING * N, momenta)
     return momenta

@@ -19,7 +19,7 @@ class BuildMismatchError(HoviError):
 
 
 try:
-    from hovi._native import _core
+    from hovi._native import symbolic
 except ImportError as error:
     raise BuildMismatchError(
         f"hovi's compiled extension does not load beside pin {pin.__version__} and casadi "
@@ -34,7 +34,7 @@ def archive(model: pin.Model) -> str:
 
     Raises BuildMismatchError when the extension was compiled against another version.
     """
-    check_version(pin.__version__, _core.pinocchio_version)
+    check_version(pin.__version__, symbolic.pinocchio_version)
     text: str = model.saveToString()
     return text
 

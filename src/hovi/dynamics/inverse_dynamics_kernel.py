@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi._native import _core
-from hovi.dynamics.extension import archive
+from hovi.dynamics.joint_tree import JointTree, read_joint_tree
 from hovi.errors import InputError, ModelError
 from hovi.robot.space.joint_kinds import kind_of
 
@@ -58,18 +57,18 @@ class InverseDynamicsKernel:
                 f"that carries all others, not for {', '.join(map(repr, unsupported))}; use "
                 "hovi.dynamics.symbolic_dynamics.casadi_functions, or lock these joints."
             )
-        self.__setstate__(archive(model))
+        self.__setstate__(read_joint_tree(model))
 
-    def __getstate__(self) -> str:
-        """Pickled as Pinocchio's archive: the kernel is built again on the other side."""
-        return self._text
+    def __getstate__(self) -> JointTree:
+        """Pickled as the joint tree: the kernel is built again on the other side."""
+        return self._tree
 
-    def __setstate__(self, text: str) -> None:
+    def __setstate__(self, tree: JointTree) -> None:
         """Builds the kernel again from what `__getstate__` gave."""
-        self._text = text
-        self._core = _core.InverseDynamicsKernel(text)
-        self._nq = int(self._core.nq)
-        self._n = int(self._core.n)
+        self._tree = tree
+        self._compiled = tree.compiled()
+        self._nq = int(self._compiled.nq)
+        self._n = int(self._compiled.n)
 
     @property
     def n(self) -> int:
@@ -87,7 +86,7 @@ class InverseDynamicsKernel:
         q, v, a = self._points(q, v, a)
         _check_threads(threads)
         tau = np.empty_like(v)
-        self._core.torque(q, v, a, tau, threads)
+        self._compiled.torque(q, v, a, tau, threads)
         return tau
 
     def linearize(self, q: Array, v: Array, a: Array, threads: int = 1) -> tuple[Array, Array]:
@@ -103,7 +102,7 @@ class InverseDynamicsKernel:
         _check_threads(threads)
         tau = np.empty_like(v)
         J = np.empty((*v.shape, 3 * self._n))
-        self._core.linearize(q, v, a, tau, J, threads)
+        self._compiled.linearize(q, v, a, tau, J, threads)
         return tau, J
 
     def expand(
@@ -137,15 +136,8 @@ class InverseDynamicsKernel:
         tau = np.empty_like(v)
         J = np.empty((*v.shape, 3 * self._n))
         H = np.empty((len(q), 3 * self._n, 3 * self._n))
-        self._core.expand(q, v, a, weight, curvature, tau, J, H, threads)
+        self._compiled.expand(q, v, a, weight, curvature, tau, J, H, threads)
         return tau, J, H
-
-    def time_pinocchio_calls(self, q: Array, v: Array, a: Array, repeats: int) -> float:
-        """Seconds per point that Pinocchio's two calls take in C++: the yardstick of `expand`.
-
-        The calls are computeRNEADerivatives and ComputeRNEASecondOrderDerivatives, one thread.
-        """
-        return _core.time_pinocchio_calls(self._text, *self._points(q, v, a), repeats)
 
     def _points(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         points = np.shape(q)[:1] or (1,)

@@ -10,7 +10,7 @@ from typing import Any
 import casadi
 import pinocchio as pin
 
-from hovi._native import _core
+from hovi._native import symbolic as native
 from hovi.dynamics.extension import archive
 from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import Pull, uncoupled
@@ -94,8 +94,8 @@ class RigidBodyFunctions:
         return casadi.Function(whole.name(), inputs, made, names, outputs)
 
     @cached_property
-    def _model(self) -> _core.SymbolicModel:
-        return _core.SymbolicModel(self.text)
+    def _model(self) -> native.SymbolicModel:
+        return native.SymbolicModel(self.text)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as the archive: the functions are built again on the other side."""

@@ -12,13 +12,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _packed
+from hovi._native import band as native
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-PANEL: int = _packed.panel_columns
+PANEL: int = native.panel_columns
 """Columns of the band that are factored together."""
 _FIXED = np.zeros(1)
 """How columns change that are fixed: what index -1 finds behind a step."""
@@ -106,7 +106,7 @@ class BandLayout:
         """
         band = np.empty((PANEL * len(self.rows), max(self.rows, default=0)))
         runs = self.runs
-        _packed.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
+        native.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
         return band
 
 
@@ -133,7 +133,7 @@ class BandFactor:
     def solve(self, rhs: Array) -> Array:
         """(H + shift D)^-1 rhs."""
         solution = np.empty_like(rhs)
-        _packed.solve(self.factor, self.rows, rhs, solution)
+        native.solve(self.factor, self.rows, rhs, solution)
         return solution
 
 
@@ -162,7 +162,7 @@ class BandModel(QuadraticModel):
     def metric_product(self, s: Array) -> Array:
         """D s."""
         product = np.empty_like(s)
-        _packed.product(self._metric_band, self.layout.rows, s, product)
+        native.product(self._metric_band, self.layout.rows, s, product)
         return product
 
     def descend(self, factor: Factor) -> tuple[Array, float, float]:
@@ -170,7 +170,7 @@ class BandModel(QuadraticModel):
         if not isinstance(factor, BandFactor):
             return super().descend(factor)
         s = np.empty_like(self.gradient)
-        slope, length = _packed.descend(
+        slope, length = native.descend(
             factor.factor, factor.rows, self.gradient, self._metric_band, s
         )
         return s, slope, length
@@ -181,7 +181,7 @@ class BandModel(QuadraticModel):
             self._band = self.layout.assemble(self.intervals.hessian)
         factor = np.empty_like(self._band)
         rows = self.layout.rows
-        definite = _packed.factor(
+        definite = native.factor(
             self._band, self._metric_band, shift, rows, self.layout.size, factor
         )
         return BandFactor(factor, rows) if definite else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _packed
+from hovi._native import intervals as native
 
 Array = npt.NDArray[np.float64]
 
@@ -15,7 +15,7 @@ def weighted_square(residuals: Array, metric: Array, weights: Array) -> float:
 
     residuals: r at the points, shape (P, n). metric: R, shape (n,). weights: w, shape (P,).
     """
-    return _packed.weighted_square(residuals, metric, weights)
+    return native.weighted_square(residuals, metric, weights)
 
 
 def expand_squares(
@@ -28,7 +28,7 @@ def expand_squares(
     """
     points, _, k = jacobian.shape
     values, gradient = np.empty(points), np.empty((points, k))
-    _packed.expand_squares(residuals, metric, jacobian, force, values, gradient)
+    native.expand_squares(residuals, metric, jacobian, force, values, gradient)
     return values, gradient
 
 
@@ -38,5 +38,5 @@ def predict(residuals: Array, metric: Array, jacobian: Array, change: Array) -> 
     change: dx, shape (P, k); the others as for `expand_squares`.
     """
     predicted = np.empty(residuals.shape)
-    _packed.predict(residuals, metric, jacobian, change, predicted)
+    native.predict(residuals, metric, jacobian, change, predicted)
     return predicted

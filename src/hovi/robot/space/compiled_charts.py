@@ -11,22 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _charts
+from hovi._native import groups as native
 from hovi.robot.space.groups import Layout
 
 Array = npt.NDArray[np.float64]
 
 
 def rates(
-    layout: Layout, x: Array, carried: Array | None = None, portable: bool = False
+    layout: Layout, x: Array, base_rates: Array | None = None, portable: bool = False
 ) -> tuple[Array, Array]:
     """v = J(x) x' and a = J(x) x'' + J' x', each (P, n), of curves exp(x(t)).
 
-    x: (x, x', x''), shape (3, P, n). carried: v and a of curves q(t), shape (2, P, n), for the
-    rates of q(t) (+) x(t).
+    x: (x, x', x''), shape (3, P, n). base_rates: v and a of curves q(t), shape (2, P, n), for
+    the rates of q(t) (+) x(t).
     """
     out = np.empty((2, *x.shape[1:]))
-    _charts.rates(layout, np.ascontiguousarray(x), carried, out, portable)
+    native.rates(layout, np.ascontiguousarray(x), base_rates, out, portable)
     return out[0], out[1]
 
 
@@ -36,7 +36,7 @@ def local_rates(
     """(x', x'') of curves that are at x with velocities v and accelerations a, all (P, n)."""
     out = np.empty((2, *x.shape))
     rows = np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
-    _charts.local_rates(layout, *rows, out, portable)
+    native.local_rates(layout, *rows, out, portable)
     return out[0], out[1]
 
 
@@ -66,21 +66,21 @@ class CompiledCharts:
         H = np.ascontiguousarray(hessian.reshape(-1, 3 * n, 3 * n))
         gradients, hessians = np.empty((B, m, n)), np.empty((B, m, m, n, n))
         g = self._at_points(gradient)
-        _charts.expand(*self._arrays, g, H, gradients, hessians, self.portable)
+        native.expand(*self._arrays, g, H, gradients, hessians, self.portable)
         return gradients, hessians
 
     def pull_gradient(self, gradient: Array, regular: bool) -> Array:
         """The gradient alone, (B, m, n). regular: the table is over (q0, h v0, Z0, Z1, c)."""
         pulled = np.empty(self._size)
         g = self._at_points(gradient)
-        _charts.pull_gradient(*self._arrays, g, regular, pulled, self.portable)
+        native.pull_gradient(*self._arrays, g, regular, pulled, self.portable)
         return pulled
 
     def push_steps(self, step: Array) -> Array:
         """Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n)."""
         B, _, n = self._size
         change = np.empty((B, len(self.weights), 3, n))
-        _charts.push_steps(*self._arrays, np.ascontiguousarray(step), change, self.portable)
+        native.push_steps(*self._arrays, np.ascontiguousarray(step), change, self.portable)
         return change
 
     def _at_points(self, gradient: Array) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi._native import _charts
+from hovi._native import groups as native
 from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -81,7 +81,7 @@ def integrated(layout: Layout, q: Array, dq: Array) -> Array:
     _check_numbers("tangent vector", nv, dq)
     lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
     result = np.empty((*lead, nq))
-    _charts.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
+    native.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
     return result
 
 
@@ -97,7 +97,7 @@ def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = N
     lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
     result = np.empty((*lead, nv))
     near = None if expected is None else _rows(expected, lead)
-    _charts.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
+    native.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
     return result
 
 

@@ -1,0 +1,30 @@
+// The functions that are compiled once per instruction set: see simd/dispatch.hpp.
+#pragma once
+
+#include <cstddef>
+
+namespace hovi::intervals {
+
+// A scheme's table over a batch of intervals.
+struct Contraction {
+  std::size_t intervals, points, columns, dof;  // B, Q, m, n
+  const double* table;                          // (Q, 3, m)
+  const double* weights;                        // (Q)
+  const double* steps;                          // (B)
+};
+
+struct Kernels {
+  // Doubles that `contract` works in.
+  std::size_t (*workspace_size)(const Contraction& shape);
+
+  // Derivatives of an interval in its m columns from those in (q, v, a) at its points: with
+  // A_q = table_q / (1, h, h^2) the sums over q of h w_q A_q^T g_q and h w_q A_q^T H_q A_q.
+  // gradient: (B, Q, 3, n). hessian: (B, Q, 3, n, 3, n), symmetric.
+  // columns_gradient: (B, m, n). columns_hessian: (B, m, m, n, n).
+  void (*contract)(const Contraction& shape, const double* gradient, const double* hessian,
+                   double* workspace, double* columns_gradient, double* columns_hessian);
+
+  static const Kernels baseline, avx2;
+};
+
+}  // namespace hovi::intervals

@@ -1,0 +1,222 @@
+"""A robot as the compiled kernel reads it: joints of one axis each, and what they move, as arrays.
+
+Every joint rotates about and translates along the z axis of its own frame: so one formula serves
+revolute, prismatic and helical joints about any axis. A joint of several coordinates becomes as
+many joints, of which the last moves its body. A free-flyer, spherical or planar joint that is the
+first is the base: its components are the first joints of the tree and have no axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi._native import dynamics as native
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+_UPPER = np.triu_indices(3)
+
+
+@dataclass(frozen=True, eq=False)
+class JointTree:
+    """A tree of n joints, each after its parent; one row of each array for each joint.
+
+    nq: numbers in a configuration.
+    gravity: spatial acceleration of free fall, linear and angular, shape (6,), in [m/s^2]; where a
+        base moves, in the axes that it has at the neutral configuration.
+    parents: shape (n,); -1 is the world.
+    coordinates: index of each joint's coordinate in a configuration, shape (n,).
+    continuous: where (cos, sin) of the angle stand there instead of the angle, shape (n,).
+    rotations: of each frame in its parent's at q = 0, shape (n, 3, 3).
+    translations: of each frame in its parent's, shape (n, 3), in [m].
+    angular: angle about z per unit of q, shape (n,): 1, or 0 for a prismatic joint.
+    linear: displacement along z per unit of q, shape (n,), in [m].
+    masses: of each joint's body, shape (n,), in [kg]; 0 where it has none.
+    centers: of mass, in the joint's frame, shape (n, 3), in [m].
+    moments: integrals of x x^T dm about the center of mass, xx xy xz yy yz zz, shape (n, 6), in
+        [kg m^2].
+    armatures: shape (n,), in [kg m^2] or [kg].
+    base_twist_indices: of the components of a base that moves in a twist (linear, angular), shape
+        (6,) or (3,); (0,) where there is none.
+    base_coordinate: index of the base's quaternion in a configuration.
+    planar_base: whether (cos, sin) stand there instead of a quaternion.
+    """
+
+    nq: int
+    gravity: Array
+    parents: Index
+    coordinates: Index
+    continuous: npt.NDArray[np.bool_]
+    rotations: Array
+    translations: Array
+    angular: Array
+    linear: Array
+    masses: Array
+    centers: Array
+    moments: Array
+    armatures: Array
+    base_twist_indices: Index
+    base_coordinate: int
+    planar_base: bool
+
+    def compiled(self, portable: bool = False) -> native.InverseDynamicsKernel:
+        """The kernel of this tree. portable: without the instructions that few processors have.
+
+        Raises ValueError for arrays that do not fit each other or are no tree.
+        """
+        return native.InverseDynamicsKernel(**vars(self), portable=portable)
+
+
+@dataclass(frozen=True)
+class _Base:
+    """A joint that carries all others and enters through gravity alone: see JointTree."""
+
+    twist_indices: tuple[int, ...] = ()
+    coordinate: int = 0
+    planar: bool = False
+
+
+BASES = {
+    "JointModelFreeFlyer": _Base((0, 1, 2, 3, 4, 5), 3),
+    "JointModelSpherical": _Base((3, 4, 5)),
+    "JointModelPlanar": _Base((0, 1, 5), 2, planar=True),
+}
+"""By Pinocchio's names of the joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """One joint of the tree. axis: linear and angular, in Pinocchio's frame of the joint."""
+
+    parent: int
+    coordinate: int
+    continuous: bool
+    axis: Array
+    placement: pin.SE3
+    body: pin.Inertia | None
+
+
+def read_joint_tree(model: pin.Model) -> JointTree:
+    """The tree of a model all of whose joints have axes that are fixed in their frames.
+
+    model: may have a base, which must carry all other joints.
+    """
+    base = _base_of(model)
+    rows = _rows(model, base)
+    parents = np.array([row.parent for row in rows], dtype=np.int64)
+    axes = np.array([row.axis for row in rows]).reshape(-1, 6)
+    turning = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
+    frames = _frames_along(np.where(turning[:, None], axes[:, 3:], axes[:, :3]))
+    frames[: len(base.twist_indices)] = np.eye(3)
+    parent_frames = np.concatenate([frames, np.eye(3)[None]])[parents]
+    rotations = np.array([row.placement.rotation for row in rows]).reshape(-1, 3, 3)
+    translations = np.array([row.placement.translation for row in rows]).reshape(-1, 3, 1)
+    return JointTree(
+        nq=model.nq,
+        gravity=_gravity(model, base),
+        parents=parents,
+        coordinates=np.array([row.coordinate for row in rows], dtype=np.int64),
+        continuous=np.array([row.continuous for row in rows], dtype=bool),
+        rotations=_in_frames(parent_frames, rotations, frames),
+        translations=_product(parent_frames.transpose(0, 2, 1), translations)[..., 0],
+        angular=np.where(turning, 1.0, 0.0),
+        linear=_dot(frames[:, :, 2], axes[:, :3]),
+        **_bodies(rows, frames),
+        armatures=np.array(model.armature, dtype=np.float64),
+        base_twist_indices=np.array(base.twist_indices, dtype=np.int64),
+        base_coordinate=base.coordinate,
+        planar_base=base.planar,
+    )
+
+
+def _base_of(model: pin.Model) -> _Base:
+    kind = model.joints[1].shortname() if model.njoints > 1 else ""
+    return BASES.get(kind, _Base())
+
+
+def _gravity(model: pin.Model, base: _Base) -> Array:
+    gravity = model.gravity
+    if base.twist_indices:
+        gravity = model.jointPlacements[1].actInv(gravity)
+    return np.array(gravity.vector, dtype=np.float64)
+
+
+def _rows(model: pin.Model, base: _Base) -> list[_Row]:
+    """The joints of the tree in the order of the velocities."""
+    nowhere = pin.SE3.Identity()
+    rows = []
+    last = [-1]  # the row of each of Pinocchio's joints that moves its body
+    for index in range(1, model.njoints):
+        joint = model.joints[index]
+        is_base = index == 1 and bool(base.twist_indices)
+        axes = np.zeros((6, 6))[: joint.nv] if is_base else _axes(joint)
+        parent, placement = last[model.parents[index]], model.jointPlacements[index]
+        for k, axis in enumerate(axes):
+            body = model.inertias[index] if k + 1 == len(axes) else None
+            coordinate = 0 if is_base else joint.idx_q + k
+            rows.append(_Row(parent, coordinate, joint.nq > len(axes), axis, placement, body))
+            parent, placement = len(rows) - 1, nowhere
+        last.append(parent)
+    return rows
+
+
+def _axes(joint: pin.JointModel) -> Array:
+    """One row (linear, angular) for each coordinate, shape (nv, 6), whatever the configuration."""
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.idx_q + joint.nq))
+    return np.asarray(data.S, dtype=np.float64).reshape(6, -1).T
+
+
+def _frames_along(axes: Array) -> Array:
+    """Rotations that take z to each axis, shape (n, 3, 3): permutations where that is x, y or z."""
+    z = _normalized(axes)
+    least = np.argmin(np.abs(z), axis=1)
+    x = _normalized(np.eye(3)[least] - z[np.arange(len(z)), least][:, None] * z)
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def _bodies(rows: list[_Row], frames: Array) -> dict[str, Array]:
+    """Masses, centers and moments in the joints' frames."""
+    bodies = [pin.Inertia.Zero() if row.body is None else row.body for row in rows]
+    inertias = np.array([body.inertia for body in bodies]).reshape(-1, 3, 3)
+    levers = np.array([body.lever for body in bodies]).reshape(-1, 3, 1)
+    trace = inertias[:, 0, 0] + (inertias[:, 1, 1] + inertias[:, 2, 2])
+    second = (0.5 * trace)[:, None, None] * np.eye(3) - inertias
+    moments = _in_frames(frames, second, frames)
+    return {
+        "masses": np.array([body.mass for body in bodies], dtype=np.float64),
+        "centers": _product(frames.transpose(0, 2, 1), levers)[..., 0],
+        "moments": np.ascontiguousarray(moments[:, *_UPPER]),
+    }
+
+
+def _in_frames(left: Array, A: Array, right: Array) -> Array:
+    """left^T A right, shape (n, 3, 3)."""
+    half = _product(left.transpose(0, 2, 1), A)
+    whole = _product(half, right)
+    # In Eigen's order, by which motions were planned before: they stay the same to the last bit.
+    whole[:, 2] = half[:, 2, :1] * right[:, 0] + (
+        half[:, 2, 1:2] * right[:, 1] + half[:, 2, 2:] * right[:, 2]
+    )
+    return whole
+
+
+# BLAS would add in an order, and fuse products, that differ from one processor to another.
+def _product(A: Array, B: Array) -> Array:
+    """Products of matrices of three columns and of three rows."""
+    first, second, third = (A[:, :, k, None] * B[:, k, None, :] for k in range(3))
+    return np.asarray(first + second + third)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
+
+
+def _normalized(axes: Array) -> Array:
+    size = np.sqrt(_dot(axes, axes))[:, None]
+    return np.divide(axes, size, out=np.zeros_like(axes), where=size > 0.0)
