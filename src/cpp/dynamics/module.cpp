@@ -104,11 +104,13 @@ NB_MODULE(dynamics, m) {
   // What is alive as an interrupted program ends is no leak.
   m.def("ignore_leaks", [] { nb::set_leak_warnings(false); });
 
+  const auto exact = [](const char* name) { return nb::arg(name).noconvert(); };
   nb::class_<InverseDynamicsKernel>(m, "InverseDynamicsKernel")
-      .def("__init__", &construct, "nq"_a, "gravity"_a, "parents"_a, "coordinates"_a,
-           "continuous"_a, "rotations"_a, "translations"_a, "angular"_a, "linear"_a, "masses"_a,
-           "centers"_a, "moments"_a, "armatures"_a, "base_twist_indices"_a, "base_coordinate"_a,
-           "planar_base"_a, "portable"_a = false)
+      .def("__init__", &construct, "nq"_a, exact("gravity"), exact("parents"),
+           exact("coordinates"), exact("continuous"), exact("rotations"), exact("translations"),
+           exact("angular"), exact("linear"), exact("masses"), exact("centers"), exact("moments"),
+           exact("armatures"), exact("base_twist_indices"), "base_coordinate"_a, "planar_base"_a,
+           "portable"_a = false)
       .def_prop_ro("nq", &InverseDynamicsKernel::nq)
       .def_prop_ro("n", &InverseDynamicsKernel::n)
       .def("torque", &torque, "q"_a, "v"_a, "a"_a, "tau"_a, "threads"_a)

@@ -1,7 +1,7 @@
 // Truncated polynomials in t and e, with e^2 = 0, over packs of numbers; vectors and matrices of
 // them.
 //
-// Powers of t carry derivatives along a curve: the coefficient of t^i is the i-th derivative over
+// Powers of t hold derivatives along a curve: the coefficient of t^i is the i-th derivative over
 // i!. The part in e makes a rotation a rigid motion: with turn w and translation v, w + e v obeys
 // the rules of SO(3), and SE(3) is SO(3) over these numbers [Study1903].
 #pragma once

@@ -1,4 +1,4 @@
-"""The door to the compiled part: loads it, and hands it models it can read.
+"""Loads the compiled part that needs the libraries of others, and hands it models it can read.
 
 `casadi` and `pinocchio` are imported before it, because its shared libraries are theirs and are
 found by name once they are in the process.
@@ -19,14 +19,14 @@ class BuildMismatchError(HoviError):
 
 
 try:
-    from hovi._native import symbolic
+    from hovi._native.symbolic import SymbolicModel, pinocchio_version
 except ImportError as error:
     raise BuildMismatchError(
         f"hovi's compiled extension does not load beside pin {pin.__version__} and casadi "
         f"{version('casadi')} ({error}): reinstall hovi so that it is compiled again."
     ) from error
 
-__all__ = ["BuildMismatchError", "archive"]
+__all__ = ["BuildMismatchError", "SymbolicModel", "archive"]
 
 
 def archive(model: pin.Model) -> str:
@@ -34,7 +34,7 @@ def archive(model: pin.Model) -> str:
 
     Raises BuildMismatchError when the extension was compiled against another version.
     """
-    check_version(pin.__version__, symbolic.pinocchio_version)
+    check_version(pin.__version__, pinocchio_version)
     text: str = model.saveToString()
     return text
 

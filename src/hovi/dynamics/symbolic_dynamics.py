@@ -10,8 +10,7 @@ from typing import Any
 import casadi
 import pinocchio as pin
 
-from hovi._native import symbolic as native
-from hovi.dynamics.extension import archive
+from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import Pull, uncoupled
 
@@ -94,8 +93,8 @@ class RigidBodyFunctions:
         return casadi.Function(whole.name(), inputs, made, names, outputs)
 
     @cached_property
-    def _model(self) -> native.SymbolicModel:
-        return native.SymbolicModel(self.text)
+    def _model(self) -> SymbolicModel:
+        return SymbolicModel(self.text)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled as the archive: the functions are built again on the other side."""
