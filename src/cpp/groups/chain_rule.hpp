@@ -16,7 +16,7 @@ template <typename Group>
 [[gnu::always_inline]] inline void add_pulled(const Pack* n, std::size_t spacing,
                                               const Square<Group>& L, Pack (&sum)[Group::k]) {
   for (std::size_t i = 0; i < Group::k; ++i)
-    for (std::size_t j = i < Group::slides ? 0 : Group::slides; j < Group::k; ++j)
+    for (std::size_t j = i < Group::translations ? 0 : Group::translations; j < Group::k; ++j)
       sum[j] += n[i * spacing] * L.at[i][j];
 }
 
@@ -25,7 +25,7 @@ template <typename Group>
 [[gnu::always_inline]] inline void add_pushed(const Square<Group>& L, const Pack* x,
                                               Pack (&sum)[Group::k]) {
   for (std::size_t i = 0; i < Group::k; ++i)
-    for (std::size_t j = i < Group::slides ? 0 : Group::slides; j < Group::k; ++j)
+    for (std::size_t j = i < Group::translations ? 0 : Group::translations; j < Group::k; ++j)
       sum[i] += L.at[i][j] * x[j];
 }
 

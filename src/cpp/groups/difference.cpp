@@ -83,13 +83,13 @@ void difference_se3(const double* q0, const double* q1, const double* w, double*
 void difference_of(Kind kind, const double* q0, const double* q1, const double* expected,
                    double* result) {
   const bool spatial = kind == Kind::so3 || kind == Kind::se3;
-  const int slides = kind == Kind::se2 ? 2 : kind == Kind::se3 ? 3 : 0;
-  double* const w = result + slides;
+  const int translations = kind == Kind::se2 ? 2 : kind == Kind::se3 ? 3 : 0;
+  double* const w = result + translations;
   if (spatial)
-    turn_between(q0 + slides, q1 + slides, w);
+    turn_between(q0 + translations, q1 + translations, w);
   else
-    w[0] = angle_between(q0 + slides, q1 + slides);
-  if (expected) add_turns(expected + slides, spatial ? 3 : 1, w);
+    w[0] = angle_between(q0 + translations, q1 + translations);
+  if (expected) add_turns(expected + translations, spatial ? 3 : 1, w);
   if (kind == Kind::se2) difference_se2(q0, q1, w[0], result);
   if (kind == Kind::se3) difference_se3(q0, q1, w, result);
 }

@@ -8,20 +8,21 @@ namespace {
 
 // Indices of a group's tangent vectors in those (v, w) of SE(3); translations come first.
 struct SE2 {
-  static constexpr std::size_t k = 3, slides = 2;
+  static constexpr std::size_t k = 3, translations = 2;
   static constexpr std::size_t twist_indices[k] = {0, 1, 5};
 };
 struct SO3 {
-  static constexpr std::size_t k = 3, slides = 0;
+  static constexpr std::size_t k = 3, translations = 0;
   static constexpr std::size_t twist_indices[k] = {3, 4, 5};
 };
 struct SE3 {
-  static constexpr std::size_t k = 6, slides = 3;
+  static constexpr std::size_t k = 6, translations = 3;
   static constexpr std::size_t twist_indices[k] = {0, 1, 2, 3, 4, 5};
 };
 constexpr std::size_t largest_group = 6;
 
-// A matrix of the group's tangent space. Linear maps have zeros where slides follow from turns.
+// A matrix of the group's tangent space. Linear maps have zeros where rotations would depend on
+// translations.
 template <typename Group>
 struct Square {
   Pack at[Group::k][Group::k];

@@ -74,7 +74,7 @@ class JointTree:
 
 @dataclass(frozen=True)
 class _Base:
-    """A joint that carries all others and enters through gravity alone: see JointTree."""
+    """A first joint that all others stand on, which enters through gravity alone: see JointTree."""
 
     twist_indices: tuple[int, ...] = ()
     coordinate: int = 0
@@ -104,14 +104,14 @@ class _Row:
 def read_joint_tree(model: pin.Model) -> JointTree:
     """The tree of a model all of whose joints have axes that are fixed in their frames.
 
-    model: may have a base, which must carry all other joints.
+    model: may have a base, on which all other joints must stand.
     """
     base = _base_of(model)
     rows = _rows(model, base)
     parents = np.array([row.parent for row in rows], dtype=np.int64)
     axes = np.array([row.axis for row in rows]).reshape(-1, 6)
-    turning = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
-    frames = _frames_along(np.where(turning[:, None], axes[:, 3:], axes[:, :3]))
+    rotating = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
+    frames = _frames_along(np.where(rotating[:, None], axes[:, 3:], axes[:, :3]))
     frames[: len(base.twist_indices)] = np.eye(3)
     parent_frames = np.concatenate([frames, np.eye(3)[None]])[parents]
     rotations = np.array([row.placement.rotation for row in rows]).reshape(-1, 3, 3)
@@ -124,7 +124,7 @@ def read_joint_tree(model: pin.Model) -> JointTree:
         continuous=np.array([row.continuous for row in rows], dtype=bool),
         rotations=_in_frames(parent_frames, rotations, frames),
         translations=_product(parent_frames.transpose(0, 2, 1), translations)[..., 0],
-        angular=np.where(turning, 1.0, 0.0),
+        angular=np.where(rotating, 1.0, 0.0),
         linear=_dot(frames[:, :, 2], axes[:, :3]),
         **_bodies(rows, frames),
         armatures=np.array(model.armature, dtype=np.float64),
@@ -159,7 +159,8 @@ def _rows(model: pin.Model, base: _Base) -> list[_Row]:
         for k, axis in enumerate(axes):
             body = model.inertias[index] if k + 1 == len(axes) else None
             coordinate = 0 if is_base else joint.idx_q + k
-            rows.append(_Row(parent, coordinate, joint.nq > len(axes), axis, placement, body))
+            continuous = joint.nq == 2 and joint.nv == 1
+            rows.append(_Row(parent, coordinate, continuous, axis, placement, body))
             parent, placement = len(rows) - 1, nowhere
         last.append(parent)
     return rows
