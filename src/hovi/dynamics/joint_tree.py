@@ -15,6 +15,8 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi._native import dynamics as native
+from hovi.robot.space.groups import SE2, SO2, Group
+from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -72,23 +74,6 @@ class JointTree:
         return native.InverseDynamicsKernel(**vars(self), portable=portable)
 
 
-@dataclass(frozen=True)
-class _Base:
-    """A first joint that all others stand on, which enters through gravity alone: see JointTree."""
-
-    twist_indices: tuple[int, ...] = ()
-    coordinate: int = 0
-    planar: bool = False
-
-
-BASES = {
-    "JointModelFreeFlyer": _Base((0, 1, 2, 3, 4, 5), 3),
-    "JointModelSpherical": _Base((3, 4, 5)),
-    "JointModelPlanar": _Base((0, 1, 5), 2, planar=True),
-}
-"""By Pinocchio's names of the joints."""
-
-
 @dataclass(frozen=True, eq=False)
 class _Row:
     """One joint of the tree. axis: linear and angular, in Pinocchio's frame of the joint."""
@@ -112,7 +97,8 @@ def read_joint_tree(model: pin.Model) -> JointTree:
     axes = np.array([row.axis for row in rows]).reshape(-1, 6)
     rotating = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
     frames = _frames_along(np.where(rotating[:, None], axes[:, 3:], axes[:, :3]))
-    frames[: len(base.twist_indices)] = np.eye(3)
+    twist_indices = base.places if base else ()
+    frames[: len(twist_indices)] = np.eye(3)
     parent_frames = np.concatenate([frames, np.eye(3)[None]])[parents]
     rotations = np.array([row.placement.rotation for row in rows]).reshape(-1, 3, 3)
     translations = np.array([row.placement.translation for row in rows]).reshape(-1, 3, 1)
@@ -128,38 +114,37 @@ def read_joint_tree(model: pin.Model) -> JointTree:
         linear=_dot(frames[:, :, 2], axes[:, :3]),
         **_bodies(rows, frames),
         armatures=np.array(model.armature, dtype=np.float64),
-        base_twist_indices=np.array(base.twist_indices, dtype=np.int64),
-        base_coordinate=base.coordinate,
-        planar_base=base.planar,
+        base_twist_indices=np.array(twist_indices, dtype=np.int64),
+        base_coordinate=base.unit[0] if base else 0,
+        planar_base=base is SE2,
     )
 
 
-def _base_of(model: pin.Model) -> _Base:
-    kind = model.joints[1].shortname() if model.njoints > 1 else ""
-    return BASES.get(kind, _Base())
+def _base_of(model: pin.Model) -> Group | None:
+    """The group of a first joint that all others stand on; None where there is none such."""
+    kind = kind_of(model.joints[1]) if model.njoints > 1 else None
+    return kind.group if kind and kind.kernel == "as base" else None
 
 
-def _gravity(model: pin.Model, base: _Base) -> Array:
-    gravity = model.gravity
-    if base.twist_indices:
-        gravity = model.jointPlacements[1].actInv(gravity)
+def _gravity(model: pin.Model, base: Group | None) -> Array:
+    gravity = model.jointPlacements[1].actInv(model.gravity) if base else model.gravity
     return np.array(gravity.vector, dtype=np.float64)
 
 
-def _rows(model: pin.Model, base: _Base) -> list[_Row]:
+def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
     """The joints of the tree in the order of the velocities."""
     nowhere = pin.SE3.Identity()
     rows = []
     last = [-1]  # the row of each of Pinocchio's joints that moves its body
     for index in range(1, model.njoints):
         joint = model.joints[index]
-        is_base = index == 1 and bool(base.twist_indices)
-        axes = np.zeros((6, 6))[: joint.nv] if is_base else _axes(joint)
+        is_base = index == 1 and base is not None
+        axes = np.zeros((joint.nv, 6)) if is_base else _axes(joint)
         parent, placement = last[model.parents[index]], model.jointPlacements[index]
+        continuous = kind_of(joint).group is SO2
         for k, axis in enumerate(axes):
             body = model.inertias[index] if k + 1 == len(axes) else None
             coordinate = 0 if is_base else joint.idx_q + k
-            continuous = joint.nq == 2 and joint.nv == 1
             rows.append(_Row(parent, coordinate, continuous, axis, placement, body))
             parent, placement = len(rows) - 1, nowhere
         last.append(parent)
