@@ -8,7 +8,7 @@
 
 namespace hovi {
 
-// Takes a compiler 13 s: for one unit of a module.
+// Takes a compiler 13 s: for one unit of a module alone.
 inline pinocchio::Model read_archive(const std::string& archive) {
   pinocchio::Model model;
   model.loadFromString(archive);
