@@ -37,8 +37,8 @@ def plan(task: Task) -> hovi.Solution:
         task.start,
         task.goal,
         task.duration,
-        scheme=task.scheme,
-        intervals=task.intervals,
+        scheme=task.options.scheme,
+        intervals=task.options.intervals,
     )
 
 
@@ -55,7 +55,7 @@ for duration in (1.0, 0.5, 0.25, 0.125):
 # A changed task becomes a file of its own, its URDF beside it, so that the folder can be
 # given away as it is.
 
-slower = dataclasses.replace(task, duration=1.5, intervals=24)
+slower = dataclasses.replace(task, duration=1.5).with_options(intervals=24)
 path = save_task(slower, folder / "slower_reach.toml")
 print(path.read_text())
 assert load_task(path).duration == 1.5

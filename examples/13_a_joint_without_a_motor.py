@@ -23,7 +23,12 @@ print(scene.describe())
 # Plan: first the hinge is helped a little, then less and less.
 
 solution = hovi.plan(
-    scene, task.start, task.goal, task.duration, intervals=task.intervals, limits=task.limits
+    scene,
+    task.start,
+    task.goal,
+    task.duration,
+    intervals=task.options.intervals,
+    limits=task.options.limits,
 )
 motion = solution.trajectory
 print(solution.message)

@@ -59,7 +59,7 @@ for feedback in ("none", "pd", "computed-torque"):
 # %%
 # Which effect is to blame? Each one alone: what it changes against what it costs.
 
-task = Task(simple, start, goal, 1.0, limits="none", name="two_link_reach")
+task = Task(simple, start, goal, 1.0, hovi.PlanOptions(limits="none"), "two_link_reach")
 study = study_effects(task, rich.effects[1:])
 for trial in study.trials:
     loose, held = 1e3 * (trial.open_loop or 0.0), 1e3 * (trial.held or 0.0)

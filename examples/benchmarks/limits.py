@@ -27,7 +27,7 @@ SCHEME, INTERVALS = "galerkin-2", 16
 def reach(scene: str, **changes: object) -> hovi.TrajectoryProblem:
     """The problem of a scene file, with other limits, start or duration."""
     task = hovi.load_task(hovi.example(scene))
-    limits = as_limits(task.scene.robot, changes.get("limits", task.limits))
+    limits = as_limits(task.scene.robot, changes.get("limits", task.options.limits))
     start = hovi.State(changes["start"]) if "start" in changes else task.start
     return _problem(task.scene, start, task.goal, changes.get("duration", task.duration), limits)
 

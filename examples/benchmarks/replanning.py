@@ -19,7 +19,9 @@ LAPS = 40
 def solved(scene: str) -> tuple[hovi.Solution, Array]:
     """The scene's own motion and its goal's configuration."""
     task = hovi.load_task(hovi.example(scene))
-    grid = hovi.Grid.uniform(task.duration, task.intervals, hovi.schemes.by_name(task.scheme))
+    grid = hovi.Grid.uniform(
+        task.duration, task.options.intervals, hovi.schemes.by_name(task.options.scheme)
+    )
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
     solution = hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal))
     return solution, np.asarray(task.goal.q, dtype=float)

@@ -17,7 +17,9 @@ FLAGS = (
 
 def main() -> None:
     task = hovi.load_task(hovi.example("panda_reach_limited"))
-    solution = hovi.plan(task.scene, task.start, task.goal, task.duration, limits=task.limits)
+    solution = hovi.plan(
+        task.scene, task.start, task.goal, task.duration, limits=task.options.limits
+    )
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "panda.html"
         hovi.replay(solution.trajectory, html=page)

@@ -27,16 +27,10 @@ def solve(name: str, scheme: str = "", intervals: int = 0) -> tuple[hovi.Solutio
     """The scene's own solution, or with another scheme and grid; and the seconds it took."""
     task = hovi.load_task(hovi.example(name))
     began = time.perf_counter()
-    solution = hovi.plan(
-        task.scene,
-        task.start,
-        task.goal,
-        task.duration,
-        scheme=scheme or task.scheme,
-        intervals=intervals or task.intervals,
-        limits=task.limits,
-        starts=task.starts,
-        seed=task.seed,
+    solution = hovi.plan_task(
+        task,
+        scheme=scheme or task.options.scheme,
+        intervals=intervals or task.options.intervals,
     )
     return solution, time.perf_counter() - began
 

@@ -31,6 +31,7 @@ from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.errors import InputError, UnmeasurableError
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
@@ -167,7 +168,7 @@ def test_what_a_tolerance_chooses_is_within_it(reach: Diagram) -> None:
 
 def test_a_goal_of_a_frame_has_a_diagram_too(arm_scene: Scene) -> None:
     goal = FrameGoal(arm_scene.robot.tip_frame, position=(1.5, 0.0, 1.0))
-    task = Task(arm_scene, State(paper_arm.HANG), goal, 1.0, limits="none")
+    task = Task(arm_scene, State(paper_arm.HANG), goal, 1.0, PlanOptions(limits="none"))
     diagram = work_precision(task, schemes=["galerkin-3"], repeats=1, budget=10.0)
     assert min(run.error.cost for run in diagram.runs) < 1e-9
 

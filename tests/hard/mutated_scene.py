@@ -6,7 +6,6 @@ solution or in a sentence.
 
 from __future__ import annotations
 
-import dataclasses
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -100,12 +99,14 @@ def objection(task: Task) -> str:
     ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
     if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
         return "it holds numbers that are not finite"
-    if not (task.duration > 0 and 1 <= task.intervals <= 10**6 and task.starts >= 1):
+    if not (
+        task.duration > 0 and 1 <= task.options.intervals <= 10**6 and task.options.starts >= 1
+    ):
         return "its duration, intervals or starts are not positive"
     task.scene.describe()
-    if task.intervals > MOST_INTERVALS:
+    if task.options.intervals > MOST_INTERVALS:
         return ""
-    once = dataclasses.replace(task, starts=1, tolerance=None)
+    once = task.with_options(starts=1, tolerance=None)
     solution = plan_task(once, max_iterations=2, time_limit=2.0, processes=1)
     if solution.success and not np.isfinite(solution.cost):
         return f"a minimum of cost {solution.cost} was reported"

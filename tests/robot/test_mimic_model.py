@@ -23,6 +23,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box
 from hovi.planning.problem.limits import urdf_limits
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
@@ -423,7 +424,9 @@ def test_what_follows_stands_out_with_its_leader(tmp_path: Path) -> None:
 
 def test_a_study_of_effects_takes_what_follows_along(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
-    task = Task(Scene(robot, [Gravity()]), State([0.0]), State([0.5]), 0.5, limits="none")
+    task = Task(
+        Scene(robot, [Gravity()]), State([0.0]), State([0.5]), 0.5, PlanOptions(limits="none")
+    )
     study = study_effects(task, [Payload("right", 0.5), ViscousFriction(0.3)])
     assert all(trial.success and trial.held is not None for trial in study.trials)
     rubbed = study.trials[1]

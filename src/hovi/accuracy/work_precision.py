@@ -76,7 +76,7 @@ def work_precision(
     Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
     resolved.
     """
-    if task.via:
+    if task.options.via:
         raise InputError(
             f"{task.name} has via points, and a diagram is of a motion between two ends: leave "
             "them out."
@@ -90,12 +90,11 @@ def work_precision(
         task.start,
         task.goal,
         task.duration,
-        time_weight=task.time_weight,
-        scheme=task.scheme,
-        intervals=task.intervals,
+        options=task.options,
         limits="none",
-        starts=task.starts,
-        seed=task.seed,
+        obstacles=(),
+        self_collision=False,
+        tolerance=None,
         time_limit=SEARCHING * budget,
     )
     raise_if_interrupted()
@@ -117,7 +116,10 @@ def work_precision(
     try:
         measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
         report("what a tolerance chooses", time.fraction)
-        chosen = choices(problem, curve, resolved.reference, time, task.intervals, repeats, clock)
+        measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
+        report("what a tolerance chooses", time.fraction)
+        intervals = task.options.intervals
+        chosen = choices(problem, curve, resolved.reference, time, intervals, repeats, clock)
     finally:
         for method in methods:
             method.close()
@@ -136,7 +138,7 @@ def work_precision(
 
 def _left_out(task: Task) -> Sequence[str]:
     """What the diagram does not show of the task."""
-    if not as_limits(task.scene.robot, task.limits).bounded.any():
+    if not as_limits(task.scene.robot, task.options.limits).bounded.any():
         return ()
     return (
         "The scene has limits; the diagram is of its motion without them: under limits the error "

@@ -18,6 +18,7 @@ from hovi.discrete.state import State
 from hovi.effects import Armature, Gravity, Payload, VelocityCost, ViscousFriction
 from hovi.errors import SceneError
 from hovi.flows.tracking import play
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
 from hovi.robot.loading import load_robot
@@ -32,7 +33,7 @@ CANDIDATES = (ViscousFriction(0.3), Armature(0.0), VelocityCost(2.0), Gravity())
 def task(two_link: Robot) -> Task:
     scene = Scene(two_link, [Gravity(9.8)])
     ends = State([-0.5, 0.2]), State([-0.2, 0.4])
-    return Task(scene, *ends, 0.4, intervals=8, limits="none", name="a reach")
+    return Task(scene, *ends, 0.4, PlanOptions(intervals=8, limits="none"), "a reach")
 
 
 @pytest.fixture(scope="module")
@@ -145,7 +146,7 @@ def test_a_motion_that_runs_away_is_called_lost(task: Task) -> None:
 def test_a_task_without_a_motion_has_no_study(task: Task, two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity(9.8)])
     limits = {"base": "none", "v": 0.1}
-    stuck = Task(scene, task.start, task.goal, 0.4, limits=limits, name="stuck")
+    stuck = Task(scene, task.start, task.goal, 0.4, PlanOptions(limits=limits), "stuck")
     with pytest.raises(SceneError, match="the effects of 'stuck' cannot be compared"):
         study_effects(stuck, CANDIDATES)
 
@@ -196,7 +197,9 @@ def test_a_study_of_continuous_joints_is_that_of_their_revolute_twins(
         State(robot.integrate(robot.neutral(), np.asarray(end.q)))
         for end in (task.start, task.goal)
     )
-    turning = Task(Scene(robot, [Gravity(9.8)]), *ends, 0.4, intervals=8, limits="none")
+    turning = Task(
+        Scene(robot, [Gravity(9.8)]), *ends, 0.4, PlanOptions(intervals=8, limits="none")
+    )
     for ours, theirs in zip(study_effects(turning, CANDIDATES).trials, study.trials, strict=True):
         for key in ("torque", "cost", "tip", "open_loop", "held"):
             assert getattr(ours, key) == pytest.approx(getattr(theirs, key), rel=1e-6, abs=1e-9)

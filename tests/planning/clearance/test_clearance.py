@@ -148,11 +148,11 @@ def test_a_start_in_which_links_overlap_is_infeasible_and_names_them(ur5: hovi.R
 
 def test_the_shipped_scene_keeps_its_margin_at_ten_thousand_samples(ur5: hovi.Robot) -> None:
     task = hovi.load_task(hovi.example("ur5_around_sphere"))
-    kept, ends = task.clearance, (task.start, task.goal, task.duration)
-    free = hovi.plan(task.scene, *ends, limits=task.limits)
+    kept, ends = task.options.clearance, (task.start, task.goal, task.duration)
+    free = hovi.plan(task.scene, *ends, limits=task.options.limits)
     assert least_distance(free.trajectory, ur5, kept) < -0.05
     solution = hovi.plan(
-        task.scene, *ends, limits=task.limits, obstacles=kept.obstacles, margin=kept.margin
+        task.scene, *ends, limits=task.options.limits, obstacles=kept.obstacles, margin=kept.margin
     )
     assert solution.success, solution.message
     assert solution.n_neg == 0

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
-from hovi.planning.problem.limits import as_limits, no_limits
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.search.continuation import climb, may_help
 from hovi.planning.search.job import Job
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
@@ -36,8 +35,14 @@ def light_hand(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def job(light_hand: Scene) -> Job:
-    grid, limits = Grid.uniform(3.0, 16, galerkin(2)), no_limits(light_hand.robot)
-    return Job(light_hand, (1.0, 1.0), grid, State(HANG), State(-HANG), STEPS, limits)
+    grid = Grid.uniform(3.0, 16, galerkin(2))
+    return Job(
+        light_hand,
+        grid,
+        State(HANG),
+        State(-HANG),
+        PlanOptions(max_iterations=STEPS, limits="none"),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +132,7 @@ def test_an_interrupt_ends_the_climb_with_the_best_so_far(
 
 
 def test_a_climb_that_leads_nowhere_names_the_ways(job: Job) -> None:
-    hurried = dataclasses.replace(job, max_iterations=2)
+    hurried = job.with_options(max_iterations=2)
     failed = solve(hurried.problem(), max_iterations=2)
     found = climb(hurried, failed)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
@@ -140,7 +145,9 @@ def test_a_climb_that_leads_nowhere_names_the_ways(job: Job) -> None:
 def test_what_no_step_can_change_is_not_climbed_for(arm_scene: Scene) -> None:
     limits = as_limits(arm_scene.robot, {"base": "none", "v": 0.1})
     grid = Grid.uniform(1.0, 8, galerkin(2))
-    job = Job(arm_scene, (1.0, 1.0), grid, State(HANG), State(-HANG), 50, limits)
+    job = Job(
+        arm_scene, grid, State(HANG), State(-HANG), PlanOptions(max_iterations=50, limits=limits)
+    )
     contradiction = solve(job.problem())
     assert contradiction.status is Status.INFEASIBLE
     assert not may_help(contradiction)

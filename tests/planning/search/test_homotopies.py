@@ -11,7 +11,7 @@ import pytest
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
-from hovi.planning.problem.limits import as_limits, no_limits
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.search.homotopies import (
     HeavierRotors,
     WeakerGravity,
@@ -22,6 +22,7 @@ from hovi.planning.search.homotopies import (
     other_durations,
 )
 from hovi.planning.search.job import Job
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.solver import solve
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -34,14 +35,14 @@ POINTS = np.random.default_rng(0).normal(size=(3, 5, 2))
 @pytest.fixture(scope="module")
 def job(arm_scene: Scene) -> Job:
     grid = Grid.uniform(1.0, 50, by_name("taylor-midpoint"))
-    limits = no_limits(arm_scene.robot)
-    return Job(arm_scene, (1.0, 1.0), grid, State(HANG), State(REACH_Q, REACH_V), 200, limits)
+    options = PlanOptions(max_iterations=200, limits="none")
+    return Job(arm_scene, grid, State(HANG), State(REACH_Q, REACH_V), options)
 
 
 @pytest.fixture(scope="module")
 def limited(job: Job) -> Job:
     limits = as_limits(job.scene.robot, {"base": "none", "v": 5.0, "tau": 20.0})
-    return dataclasses.replace(job, limits=limits)
+    return job.with_options(limits=limits)
 
 
 def test_heavier_rotors_add_the_same_inertia_to_every_joint(arm_scene: Scene) -> None:

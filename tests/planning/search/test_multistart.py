@@ -10,9 +10,9 @@ import pytest
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
-from hovi.planning.problem.limits import no_limits
 from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import SAME_COST, Pool, default_processes, distinct, explore
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
@@ -27,7 +27,7 @@ def job(arm_scene: Scene) -> Job:
     """A swing-up in three seconds: it has many minima."""
     grid = Grid.uniform(3.0, 12, by_name("galerkin-1"))
     ends = State(HANG), State(-HANG)
-    return Job(arm_scene, (1.0, 1.0), grid, *ends, 500, no_limits(arm_scene.robot))
+    return Job(arm_scene, grid, *ends, PlanOptions(limits="none"))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def search(
 
 
 def test_a_job_is_the_problem_it_describes(job: Job, arm_scene: Scene) -> None:
-    weighted = dataclasses.replace(job, weight=(1.0, 5.0)).problem()
+    weighted = job.with_options(weight=(1.0, 5.0)).problem()
     assert weighted.scene is arm_scene
     assert weighted.grid is job.grid
     np.testing.assert_array_equal(weighted.ld.lagrangian.weight, [1.0, 5.0])  # type: ignore[attr-defined]

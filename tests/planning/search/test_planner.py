@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,9 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
-from hovi.planning.search.planner import COARSE_INTERVALS, REFINED, plan
+from hovi.planning.search.planner import plan
+from hovi.planning.search.refining import REFINED
+from hovi.planning.search.search import COARSE_INTERVALS
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
@@ -293,7 +294,11 @@ def test_an_interrupt_before_the_grid_that_was_asked_for_is_no_success(arm_scene
             r"start\.v is inf at joint 'shou",
         ),
         ({"goal": State([0.0, 0.0], [0.0])}, InputError, r"goal\.v has shape \(1,\), expected"),
-        ({"intervals": 0}, InputError, "number of intervals must be 1 or more, got 0"),
+        (
+            {"intervals": 0},
+            InputError,
+            "intervals must be a whole number from 1 to 1,000,000, got 0",
+        ),
         ({"scheme": "galerkin"}, SchemeError, "no scheme 'galerkin': did you mean"),
         ({"scheme": "mean-difference"}, SchemeError, "'mean-difference' is not regular"),
         ({"guess": "cubik"}, InputError, "no guess 'cubik': did you mean 'cubic'"),
@@ -347,8 +352,6 @@ def test_what_is_no_scene_or_no_via_point_is_refused(two_link: Robot) -> None:
 
 def test_a_task_is_planned_with_all_that_it_says() -> None:
     task = load_task(example("ur5_around_sphere"))
-    solution = plan_task(
-        dataclasses.replace(task, intervals=8), max_iterations=2, continuation=False
-    )
+    solution = plan_task(task.with_options(intervals=8), max_iterations=2, continuation=False)
     assert [each.name for each in solution.problem.clearance.obstacles] == ["ball"]
-    assert solution.problem.clearance.margin == task.clearance.margin
+    assert solution.problem.clearance.margin == task.options.clearance.margin

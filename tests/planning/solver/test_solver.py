@@ -145,7 +145,12 @@ def test_a_reach_in_a_millisecond_solves_pontryagins_equations(arm_scene: Scene)
 def test_ipopt_finds_the_same_minimum(name: str) -> None:
     task = load_task(example(name))
     problem = problem_on(
-        task.scene, task.start, task.goal, duration=task.duration, intervals=8, scheme=task.scheme
+        task.scene,
+        task.start,
+        task.goal,
+        duration=task.duration,
+        intervals=8,
+        scheme=task.options.scheme,
     )
     solution = solve(problem)
     assert solution.status is Status.MINIMUM

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import shutil
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 import hovi.effects
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.writing import save_task
 from hovi.robot.bundled_models import example, example_scenes
@@ -50,15 +52,21 @@ COMPARED = {"two_link_swing_up", "two_link_reach", "two_link_elbow", "ur5_reach"
 def test_every_shipped_scene_loads(name: str) -> None:
     task = load_task(example(name))
     assert task.name == name
-    assert task.limits == "none" or name not in COMPARED
+    assert task.options.limits == "none" or name not in COMPARED
 
 
 @pytest.mark.parametrize("name", sorted(example_scenes()))
 def test_a_saved_task_is_read_back_as_the_same_task(name: str, tmp_path: Path) -> None:
     task = load_task(example(name))
     again = load_task(save_task(task, tmp_path / f"{name}.toml"))
-    for key in ("duration", "scheme", "intervals", "starts", "seed", "limits", "name"):
-        assert getattr(again, key) == getattr(task, key)
+    assert (again.duration, again.name) == (task.duration, task.name)
+    shaped = ("via", "obstacles")
+    for key in fields(PlanOptions):
+        one, other = (getattr(each.options, key.name) for each in (task, again))
+        assert one == other or key.name in shaped
+    for via, read in zip(task.options.via, again.options.via, strict=True):
+        assert via.time == read.time
+    assert again.options.clearance.to_dict() == task.options.clearance.to_dict()
     for end in ("start", "goal"):
         ends = [getattr(each, end).on(each.scene.robot, end) for each in (task, again)]
         for expected, found in zip(*ends, strict=True):
@@ -93,8 +101,13 @@ def test_ends_may_be_given_by_joint_in_any_order(folder: Path) -> None:
 def test_a_scene_without_effects_or_choices_takes_the_defaults(folder: Path) -> None:
     text = 'robot = "two_link.urdf"\nduration = 2\nstart.q = [0, 0]\ngoal.q = [1, 1]\n'
     task = load_task(write(folder, text))
-    assert (task.scheme, task.intervals, task.starts, task.seed) == ("galerkin-2", 16, 1, 0)
-    assert task.limits == "urdf"
+    assert (
+        task.options.scheme,
+        task.options.intervals,
+        task.options.starts,
+        task.options.seed,
+    ) == ("galerkin-2", 16, 1, 0)
+    assert task.options.limits == "urdf"
     assert tuple(task.scene.effects) == ()
 
 
@@ -247,9 +260,8 @@ def test_an_effect_takes_its_own_defaults(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "error"),
     [
-        ({"duration": math.nan}, InputError),
-        ({"duration": 0.0}, InputError),
         ({"intervals": 0}, InputError),
+        ({"intervalls": 8}, InputError),
         ({"starts": 0}, InputError),
         ({"seed": -1}, InputError),
         ({"scheme": "simpson"}, SchemeError),
@@ -257,9 +269,17 @@ def test_an_effect_takes_its_own_defaults(folder: Path) -> None:
         ({"limits": {"v": -1.0}}, InputError),
     ],
 )
-def test_a_task_is_valid_once_built(change: dict[str, Any], error: type[HoviError]) -> None:
+def test_options_of_a_task_are_valid_once_built(
+    change: dict[str, Any], error: type[HoviError]
+) -> None:
     with pytest.raises(error):
-        dataclasses.replace(load_task(example("two_link_reach")), **change)
+        load_task(example("two_link_reach")).with_options(**change)
+
+
+@pytest.mark.parametrize("duration", [math.nan, 0.0])
+def test_a_task_takes_a_positive_time(duration: float) -> None:
+    with pytest.raises(InputError, match="duration"):
+        dataclasses.replace(load_task(example("two_link_reach")), duration=duration)
 
 
 LIMITS = """
@@ -280,7 +300,7 @@ def limited(table: str = LIMITS) -> str:
 
 def test_limits_are_a_number_a_list_pairs_or_by_joint(folder: Path) -> None:
     task = load_task(write(folder, limited(LIMITS.replace("margin = 0.25", ""))))
-    limits = as_limits(task.scene.robot, task.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     np.testing.assert_array_equal(limits.lower, [[-3, 0], [-3, -3], [-40, -50], [-20, -10]])
     np.testing.assert_array_equal(limits.upper, [[3, 2], [3, 3], [40, np.inf], [20, 10]])
     assert limits.tolerance == 1e-5
@@ -288,7 +308,7 @@ def test_limits_are_a_number_a_list_pairs_or_by_joint(folder: Path) -> None:
 
 def test_a_list_may_hold_numbers_and_pairs(folder: Path) -> None:
     task = load_task(write(folder, limited("[limits]\nq = [3.0, [0.0, 2.0]]\n")))
-    limits = as_limits(task.scene.robot, task.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     np.testing.assert_array_equal([limits.lower[0], limits.upper[0]], [[-3, 0], [3, 2]])
 
 
@@ -300,13 +320,13 @@ def test_a_list_of_pairs_of_the_wrong_length_is_refused(folder: Path) -> None:
 
 def test_a_margin_is_taken_on_every_side(folder: Path) -> None:
     task = load_task(write(folder, limited()))
-    limits = as_limits(task.scene.robot, task.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     np.testing.assert_array_equal([limits.lower[0], limits.upper[0]], [[-1.5, 0.5], [1.5, 1.5]])
 
 
 def test_a_table_of_limits_starts_from_the_urdf(folder: Path) -> None:
     task = load_task(write(folder, limited("[limits.v]\nelbow = 2.0\n")))
-    limits = as_limits(task.scene.robot, task.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     np.testing.assert_array_equal(limits.upper[1], [1000.0, 2.0])
     np.testing.assert_array_equal(limits.upper[3], [1000.0, 1000.0])
 
@@ -314,11 +334,11 @@ def test_a_table_of_limits_starts_from_the_urdf(folder: Path) -> None:
 @pytest.mark.parametrize("table", [LIMITS, "[limits.v]\nelbow = 2.0\n"])
 def test_saved_limits_are_read_back(table: str, folder: Path) -> None:
     task = load_task(write(folder, limited(table)))
-    imposed = as_limits(task.scene.robot, task.limits)
-    for given in (task.limits, imposed):
-        changed = dataclasses.replace(task, limits=given)
+    imposed = as_limits(task.scene.robot, task.options.limits)
+    for given in (task.options.limits, imposed):
+        changed = task.with_options(limits=given)
         again = load_task(save_task(changed, folder / "again.toml"))
-        assert as_limits(again.scene.robot, again.limits).to_dict() == imposed.to_dict()
+        assert as_limits(again.scene.robot, again.options.limits).to_dict() == imposed.to_dict()
 
 
 WRONG_LIMITS = {
@@ -376,8 +396,8 @@ def test_an_end_may_be_the_name_of_a_pose(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("tolerance", [1e-6, "0.1 mm", "0.01 deg"])
 def test_a_tolerance_survives_a_file(folder: Path, tolerance: float | str) -> None:
     task = load_task(write(folder, REACH))
-    wanted = dataclasses.replace(task, tolerance=tolerance)
-    assert load_task(save_task(wanted, folder / "again.toml")).tolerance == tolerance
+    wanted = task.with_options(tolerance=tolerance)
+    assert load_task(save_task(wanted, folder / "again.toml")).options.tolerance == tolerance
 
 
 BALL = """
@@ -402,11 +422,11 @@ def with_obstacles(text: str) -> str:
 
 def test_obstacles_are_read_and_written(folder: Path, tmp_path: Path) -> None:
     task = load_task(write(folder, with_obstacles(REACH)))
-    assert [each.kind for each in task.clearance.obstacles] == ["sphere", "box"]
-    assert [each.name for each in task.clearance.obstacles] == ["ball", "box 2"]
-    assert task.clearance.margin == 0.03
+    assert [each.kind for each in task.options.clearance.obstacles] == ["sphere", "box"]
+    assert [each.name for each in task.options.clearance.obstacles] == ["ball", "box 2"]
+    assert task.options.clearance.margin == 0.03
     again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
-    assert again.clearance.to_dict() == task.clearance.to_dict()
+    assert again.options.clearance.to_dict() == task.options.clearance.to_dict()
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ def study_effects(
     tell = progress or (lambda text, share: None)
     deadline, began = Deadline(time_limit), time.perf_counter()
     tell("planning the scene as it is", 0.0)
-    solution = _plan(task, task.scene, "cubic", task.starts, deadline.seconds_left)
+    solution = _plan(task, task.scene, "cubic", task.options.starts, deadline.seconds_left)
     if not solution.success:
         raise SceneError(
             f"the effects of {task.name!r} cannot be compared, as no motion was found to compare "

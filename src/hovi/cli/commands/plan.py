@@ -20,6 +20,7 @@ MOST_CERTIFIED = 2000
 
 
 def plan(
+    context: typer.Context,
     scene: Annotated[
         str,
         typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
@@ -61,42 +62,51 @@ def plan(
     Exit code 0 for a minimum, 1 when none was found, 2 for bad input.
     """
     from hovi.cli.commands.files import check_output
-    from hovi.errors import InputError, nearest
 
-    if tolerance is not None and (scheme is not None or intervals is not None):
-        raise InputError("--tolerance chooses the scheme and the intervals: leave them out.")
-    if time_limit is not None and not 0 < time_limit < float("inf"):
-        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
-    if limits not in (None, *LIMITS):
-        hint = nearest(limits, LIMITS)
-        raise InputError(f"--limits {limits!r}: {hint} Others are given in the scene file.")
     if out is not None:
         check_output(out, ".npz")
-    chosen = {
-        "scheme": scheme,
-        "intervals": intervals,
-        "starts": starts,
-        "seed": seed,
-        "limits": limits,
-        "tolerance": tolerance,
-    }
-    overrides: dict[str, Any] = {k: value for k, value in chosen.items() if value is not None}
-    if scheme is not None or intervals is not None:
-        overrides["tolerance"] = None
-    task = _task(scene, overrides, compile)
-    raise typer.Exit(_plan(task, _guess(guess), time_limit, out, json, certificate))
+    task = _task(scene, _options(context.params), compile)
+    raise typer.Exit(_plan(task, out, json, certificate))
 
 
-def _task(scene: str, overrides: dict[str, Any], compile: bool) -> Task:
+def _options(flags: dict[str, Any]) -> dict[str, Any]:
+    """What the flags say of the options of a plan. Raises InputError."""
+    from hovi.errors import InputError, nearest
+    from hovi.planning.search.option_fields import about
+    from hovi.planning.search.options import PlanOptions
+
+    said = {name: value for name, value in flags.items() if value is not None}
+    given: dict[str, Any] = {name: said[name] for name in about(PlanOptions) if name in said}
+    limits, time_limit = given.get("limits", "none"), given.get("time_limit", 1.0)
+    if not 0 < time_limit < float("inf"):
+        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    if limits not in LIMITS:
+        hint = nearest(limits, LIMITS)
+        raise InputError(f"--limits {limits!r}: {hint} Others are given in the scene file.")
+    return given | {"guess": _guess(given["guess"])} | _either(given)
+
+
+def _either(given: dict[str, Any]) -> dict[str, Any]:
+    """A grid that is named takes the place of the scene's tolerance; both together are refused."""
+    from hovi.errors import InputError
+
+    if "scheme" not in given and "intervals" not in given:
+        return {}
+    if "tolerance" in given:
+        raise InputError("--tolerance chooses the scheme and the intervals: leave them out.")
+    return {"tolerance": None}
+
+
+def _task(scene: str, options: dict[str, Any], compile: bool) -> Task:
     import dataclasses
 
     from hovi.cli.commands.files import find_scene
     from hovi.planning.task_file.reading import load_task
 
-    task = load_task(find_scene(scene))
-    if compile:
-        overrides["scene"] = dataclasses.replace(task.scene, compile=True)
-    return dataclasses.replace(task, **overrides)
+    task = load_task(find_scene(scene)).with_options(**options)
+    if not compile:
+        return task
+    return dataclasses.replace(task, scene=dataclasses.replace(task.scene, compile=True))
 
 
 def _guess(guess: str) -> str | Trajectory:
@@ -112,14 +122,7 @@ def _guess(guess: str) -> str | Trajectory:
     )
 
 
-def _plan(
-    task: Task,
-    guess: str | Trajectory,
-    time_limit: float | None,
-    out: Path | None,
-    json: bool,
-    certified: bool,
-) -> int:
+def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     """Plan, write, print; returns the exit code."""
     from hovi.cli.commands.progress import progress
     from hovi.cli.reports.plan import as_json, print_report
@@ -127,7 +130,7 @@ def _plan(
     from hovi.planning.task_file.task_plan import plan_task
 
     with progress(quiet=json) as report:
-        solution = plan_task(task, guess=guess, time_limit=time_limit, progress=report)
+        solution = plan_task(task, report)
     written, refused = out if solution.trajectory is not None else None, None
     if written is not None:
         try:

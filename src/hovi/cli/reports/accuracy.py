@@ -8,14 +8,15 @@ import numpy as np
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.motion_error import MotionError
+from hovi.planning.problem.tolerance import as_said
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
 
 def scheme_in_words(task: Task, grid: Grid) -> str:
     """The scheme of a motion: the task's, or those that a tolerance chose."""
-    if task.tolerance is None:
-        return task.scheme
+    if task.options.tolerance is None:
+        return task.options.scheme_name
     names = [scheme.name for scheme, _ in grid.groups]
     modes = sorted(scheme.inner_modes for scheme, _ in grid.groups)
     return names[0] if len(names) == 1 else f"galerkin-{modes[0]} to galerkin-{modes[-1]}"
@@ -38,7 +39,7 @@ def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
         for done in accuracy.rounds
     ]
     return {
-        "tolerance": task.tolerance,
+        "tolerance": as_said(task.options.tolerance),
         "tolerance_reached": accuracy.reached,
         "tolerance_reason": accuracy.reason or None,
         "errors": None if accuracy.estimate is None else errors_json(accuracy.estimate),

@@ -41,8 +41,8 @@ def as_json(
         "n_neg": solution.n_neg,
         "setup_seconds": solution.setup_seconds,
         "solve_seconds": solution.solve_seconds,
-        "starts": task.starts,
-        "seed": task.seed,
+        "starts": task.options.starts,
+        "seed": task.options.seed,
         "minima": list(solution.minima),
         "peaks": _peaks_json(peaks(trajectory)),
         "limits": None if room is None else room.by_kind(),
@@ -72,7 +72,7 @@ def print_report(
             print("! beyond a limit of the URDF: the motion was planned without it.")
     distance = least_distance(solution)
     if distance is not None:
-        kept = task.clearance.margin
+        kept = task.options.clearance.margin
         print(f"distance {distance:.4g} m at the nearest approach, the margin is {kept:g} m")
     if certificate is not None:
         for label, text in certificate_lines(certificate):
@@ -116,9 +116,9 @@ def _caveat(solution: Solution) -> str:
 
 def _intervals(solution: Solution, task: Task) -> str:
     taken = solution.trajectory.grid.intervals
-    if task.tolerance is not None:
+    if task.options.tolerance is not None:
         return f"{taken} intervals{steps_in_words(solution.trajectory.grid)}"
-    asked = "" if taken == task.intervals else f" ({task.intervals} asked for)"
+    asked = "" if taken == task.options.intervals else f" ({task.options.intervals} asked for)"
     return f"{taken} intervals{asked}"
 
 

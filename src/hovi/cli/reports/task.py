@@ -16,16 +16,18 @@ if TYPE_CHECKING:
 
 def describe_task(task: Task) -> str:
     """The ends, the scheme, the scene and the robot of a task."""
-    robot = task.scene.robot
-    how = f"{task.scheme} on {task.intervals} intervals"
-    if task.tolerance is not None:
-        how = f"tolerance {task.tolerance}"
+    from hovi.planning.problem.tolerance import as_said
+
+    robot, options = task.scene.robot, task.options
+    how = f"{options.scheme_name} on {options.intervals} intervals"
+    if options.tolerance is not None:
+        how = f"tolerance {as_said(options.tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
-    lines.append(f"starts {task.starts}, seed {task.seed}, limits {_limits(task)}")
-    if task.clearance.wanted:
-        lines.append(f"keeps {task.clearance.margin:g} m from {_kept_from(task)}")
+    lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
+    if options.clearance.wanted:
+        lines.append(f"keeps {options.clearance.margin:g} m from {_kept_from(task)}")
     lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)
-    for via in task.via:
+    for via in options.via:
         lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
     return "\n".join([*lines, "", task.scene.describe(), "", robot.describe()])
 
@@ -34,7 +36,7 @@ def _duration(task: Task) -> str:
     """How long the motion takes, in words."""
     if isinstance(task.duration, tuple):
         low, high = task.duration
-        return f"{low:g} to {high:g} s, {task.time_weight:g} per second"
+        return f"{low:g} to {high:g} s, {task.options.time_weight:g} per second"
     return f"{task.duration:g} s"
 
 
@@ -65,19 +67,19 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
 
 
 def _kept_from(task: Task) -> str:
-    names = [repr(each.name) for each in task.clearance.obstacles]
-    return ", ".join(names + (["itself"] if task.clearance.self_collision else []))
+    names = [repr(each.name) for each in task.options.clearance.obstacles]
+    return ", ".join(names + (["itself"] if task.options.clearance.self_collision else []))
 
 
 def _limits(task: Task) -> str:
     from hovi.planning.problem.limits import Limits
 
-    if isinstance(task.limits, str):
-        return task.limits
-    if isinstance(task.limits, Limits):
+    if isinstance(task.options.limits, str):
+        return task.options.limits
+    if isinstance(task.options.limits, Limits):
         return "given"
-    base = task.limits.get("base", "urdf")
-    given = [f"{key} = {value}" for key, value in task.limits.items() if key != "base"]
+    base = task.options.limits.get("base", "urdf")
+    given = [f"{key} = {value}" for key, value in task.options.limits.items() if key != "base"]
     return "; ".join([base, *given])
 
 

@@ -113,6 +113,18 @@ class Tolerance:
         return f"{size / LENGTHS[unit]:.2g} {unit} at {at}"
 
 
+def as_said(tolerance: float | str | Tolerance | None) -> float | str | None:
+    """A number or a text that `Tolerance.of` takes for the same tolerance; None for None."""
+    if not isinstance(tolerance, Tolerance):
+        return tolerance
+    size = float(tolerance.size)
+    if tolerance.quantity is Quantity.COST:
+        return size
+    if tolerance.quantity is Quantity.JOINTS:
+        return f"{size!r} rad"
+    return f"{size!r} m" if tolerance.frame is None else f"{size!r} m at {tolerance.frame}"
+
+
 def _expected(tolerance: object) -> str:
     return (
         "a tolerance is a number, relative in the cost, or a text such as '0.1 mm', "

@@ -159,7 +159,7 @@ class _Ladder:
             self.progress(text, first + share * (last - first))
         left = self.deadline.seconds_left
         try:
-            problem, most = rung.job.problem(), self.job.max_iterations
+            problem, most = rung.job.problem(), self.job.options.max_iterations
             solution = solve(problem, guess, max_iterations=most, time_limit=left)
         except HoviError:
             return None

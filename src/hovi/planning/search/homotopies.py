@@ -115,7 +115,7 @@ def finer_grids(job: Job) -> list[Rung]:
                 grid = grid.with_nodes([via.time for via in job.via])
             except InputError:  # too few nodes for the via points
                 break
-        rungs.append(Rung(f"{N} intervals", dataclasses.replace(job, grid=grid)))
+        rungs.append(Rung(f"{N} intervals", job.on(grid)))
     return rungs[::-1]
 
 
@@ -126,7 +126,7 @@ def narrowing_limits(job: Job) -> list[Rung]:
     return [
         Rung(
             f"limits {share:g} times as wide",
-            dataclasses.replace(job, limits=_widened(job.limits, share)),
+            job.with_options(limits=_widened(job.limits, share)),
         )
         for share in ROOM
     ]
@@ -139,7 +139,7 @@ def _eased(scene: Scene, effect: Effect) -> Scene:
 def _without_torque_limits(job: Job) -> Job:
     lower, upper = job.limits.lower.copy(), job.limits.upper.copy()
     lower[3], upper[3] = -np.inf, np.inf
-    return dataclasses.replace(job, limits=Limits(lower, upper, job.limits.tolerance))
+    return job.with_options(limits=Limits(lower, upper, job.limits.tolerance))
 
 
 def _widened(limits: Limits, share: float) -> Limits:
@@ -153,7 +153,7 @@ def _lasting(job: Job, share: float) -> Job:
     grid = Grid(share * job.grid.steps, job.grid.schemes)
     via = tuple(Via(share * each.time, _passed(each.goal, share)) for each in job.via)
     start, goal = _passed(job.start, share), _passed(job.goal, share)
-    return dataclasses.replace(job, grid=grid, start=start, goal=goal, via=via)
+    return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
 
 
 def _passed(state: Goal, share: float) -> Goal:

@@ -4,40 +4,69 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
-from hovi.planning.clearance.clearance import Clearance
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import ChartError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.search.options import PlanOptions
+from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 
 Progress = Callable[[str, float], None]
 """What is told how far a search is: a line of text and the fraction done."""
+MOST_INTERVALS = 2000
+"""To which intervals are halved so that their charts hold the orientations of the first guess."""
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
     """What a worker process needs to solve a problem: it builds its own functions.
 
-    weight: R of the effort, one number per joint. max_iterations: of one solve.
+    grid: on which it is solved; the scheme and the intervals of the options do not count.
+    options: of the plan, with limits and tolerance of the scene's robot.
     """
 
     scene: Scene
-    weight: tuple[float, ...]
     grid: Grid
     start: State
     goal: State | FrameGoal
-    max_iterations: int
-    limits: Limits
-    via: tuple[Via, ...] = ()
-    clearance: Clearance | None = None
+    options: PlanOptions = field(default_factory=PlanOptions)
+
+    @property
+    def limits(self) -> Limits:
+        """Bounds along the motion."""
+        return as_limits(self.scene.robot, self.options.limits)
+
+    @property
+    def via(self) -> tuple[Via, ...]:
+        """What the motion passes through, in the order of time."""
+        return tuple(sorted(self.options.via, key=lambda each: each.time))
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """The largest error that is allowed; None where the grid is given."""
+        given = self.options.tolerance
+        return None if given is None else Tolerance.of(given, self.scene.robot)
+
+    def with_options(self, **changes: Any) -> Self:
+        """The job with some of its options changed."""
+        return dataclasses.replace(self, options=self.options.with_changes(**changes))
+
+    def on(self, grid: Grid) -> Self:
+        """The job on another grid."""
+        return dataclasses.replace(self, grid=grid)
 
     def problem(self) -> TrajectoryProblem:
         """The trajectory problem, built once."""
@@ -45,10 +74,29 @@ class Job:
 
     @cached_property
     def _problem(self) -> TrajectoryProblem:
-        lagrangian = self.scene.effort_lagrangian(self.weight)
+        lagrangian = self.scene.effort_lagrangian(self.options.weight)
         ld = DiscreteLagrangian(lagrangian, self.grid)
-        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, self.clearance)
+        clearance = self.options.clearance
+        return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, clearance)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the problem, so that worker processes build their own."""
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        """Without the problem, so that worker processes build their own, and without the guess."""
+        kept = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
+        return kept | {"options": self.options.with_changes(guess="cubic")}
+
+
+def with_room(job: Job, guess: str | Trajectory) -> Job:
+    """The job on a grid whose charts hold the orientations of the guess: intervals are halved.
+
+    Raises ChartError where that would take more than MOST_INTERVALS.
+    """
+    if job.scene.robot.space.flat:
+        return job
+    while True:
+        try:
+            guess_path(job.problem(), guess)
+            return job
+        except ChartError:
+            if 2 * job.grid.intervals > MOST_INTERVALS:
+                raise
+        job = job.on(job.grid.halved(np.ones(job.grid.intervals, dtype=bool)))

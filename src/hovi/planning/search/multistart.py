@@ -92,7 +92,7 @@ def _solve_chunk(
     solutions = []
     for guess in guesses:
         left = deadline.seconds_left
-        solution = solve(problem, guess, max_iterations=job.max_iterations, time_limit=left)
+        solution = solve(problem, guess, max_iterations=job.options.max_iterations, time_limit=left)
         solutions.append(dataclasses.replace(solution, problem=None))
         if solution.status is Status.INTERRUPTED:
             break

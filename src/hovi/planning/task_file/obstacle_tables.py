@@ -1,7 +1,9 @@
-"""The tables [[obstacles]], and the keys `margin` and `self_collision`."""
+"""The tables [[obstacles]]."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 from hovi.errors import HoviError
@@ -9,20 +11,24 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import distances_between
 from hovi.planning.clearance.obstacles import Obstacle, obstacle_from_dict
 from hovi.planning.task_file.messages import TomlText
-from hovi.planning.task_file.schema import TaskTable
 from hovi.robot.robot import Robot
 
 
-def read_clearance(table: TaskTable, robot: Robot, toml: TomlText) -> Clearance:
-    """What the motion keeps away from, checked against the robot's shapes."""
-    obstacles = [_obstacle(each, i, toml) for i, each in enumerate(table.obstacles)]
+def read_obstacles(
+    tables: list[dict[str, Any]], kept: Clearance, robot: Robot, toml: TomlText
+) -> Sequence[Obstacle]:
+    """What stands in the world, checked against the robot's shapes.
+
+    kept: the margin that is kept from it, and whether links keep it from each other.
+    """
+    obstacles = [_obstacle(each, i, toml) for i, each in enumerate(tables)]
     try:
-        clearance = Clearance(obstacles, table.margin, table.self_collision)
+        clearance = dataclasses.replace(kept, obstacles=obstacles)
         if clearance.wanted:
             distances_between(robot, clearance)
     except HoviError as wrong:
         raise toml.error(("obstacles",), str(wrong)) from None
-    return clearance
+    return clearance.obstacles
 
 
 def _obstacle(table: dict[str, Any], number: int, toml: TomlText) -> Obstacle:

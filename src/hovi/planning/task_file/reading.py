@@ -12,12 +12,13 @@ from pydantic import ValidationError
 
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via
 from hovi.planning.task_file.limit_tables import read_limits
 from hovi.planning.task_file.messages import TomlText, first_sentence
-from hovi.planning.task_file.obstacle_tables import read_clearance
-from hovi.planning.task_file.schema import TaskTable
+from hovi.planning.task_file.obstacle_tables import read_obstacles
+from hovi.planning.task_file.schema import PLAIN, ShapedTable, TaskTable
 from hovi.planning.task_file.task import Task
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -45,21 +46,28 @@ def load_task(path: str | Path) -> Task:
         scene=_scene(table, robot, toml),
         start=read_state(table.start, ("start",), robot, toml),
         goal=read_goal(table.goal, ("goal",), robot, toml),
-        via=read_via(table.via, duration, robot, toml),
         duration=duration,
-        time_weight=table.time_weight,
-        scheme=table.scheme.name,
-        intervals=table.scheme.intervals,
-        starts=table.starts,
-        seed=table.seed,
-        limits=read_limits(table.limits, robot, toml),
-        clearance=read_clearance(table, robot, toml),
-        tolerance=_read_tolerance(table.tolerance, robot, toml),
+        options=_options(table, duration, robot, toml),
         name=toml.path.stem,
     )
 
 
-def _scene(table: TaskTable, robot: Robot, toml: TomlText) -> Scene:
+def _options(
+    table: ShapedTable, duration: float | tuple[float, float], robot: Robot, toml: TomlText
+) -> PlanOptions:
+    """The options that the file names: those of one value as they are, the others from tables."""
+    options = PlanOptions(**{name: getattr(table, name) for name in PLAIN})
+    return options.with_changes(
+        via=read_via(table.via, duration, robot, toml),
+        scheme=table.scheme.name,
+        intervals=table.scheme.intervals,
+        limits=read_limits(table.limits, robot, toml),
+        obstacles=read_obstacles(table.obstacles, options.clearance, robot, toml),
+        tolerance=_read_tolerance(table.tolerance, robot, toml),
+    )
+
+
+def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:
     effects = read_effects(table.effects, robot, toml)
     try:
         return Scene(robot, effects=effects, passive=table.passive)
@@ -88,7 +96,7 @@ def _read_text(path: Path) -> TomlText:
         raise SceneError(f"{path} cannot be read: {reason(refused)}.") from None
 
 
-def _validated(toml: TomlText) -> TaskTable:
+def _validated(toml: TomlText) -> ShapedTable:
     for number, line in enumerate(toml.text.splitlines(), start=1):
         if line.count(".") > MAXIMUM_DOTS:
             raise SceneError(f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots.")
@@ -114,7 +122,7 @@ def _syntax_sentence(toml: TomlText, reason: str) -> str:
     return f"{toml.path}, line {line}, column {column}: not valid TOML: {reason[: place.start()]}."
 
 
-def _check_names(table: TaskTable, toml: TomlText) -> None:
+def _check_names(table: ShapedTable, toml: TomlText) -> None:
     """What can be refused before a robot is loaded."""
     try:
         by_name(table.scheme.name)
@@ -122,7 +130,7 @@ def _check_names(table: TaskTable, toml: TomlText) -> None:
         raise toml.error(("scheme", "name"), str(unknown)) from None
 
 
-def _load_robot(table: TaskTable, toml: TomlText) -> Robot:
+def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
     folder = toml.path.parent
     is_file = table.robot.endswith(".urdf")
     try:

@@ -1,15 +1,17 @@
 """The keys of a task file and what each of them must be.
 
-The description of a field ends the sentence "`key` must be ...".
+The description of a field ends the sentence "`key` must be ...". Options of a plan that are one
+number, truth value or text are keys by themselves; those of a shape of their own stand here.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
-from hovi.planning.clearance.clearance import MARGIN
+from hovi.planning.search.option_fields import SceneKey, about
+from hovi.planning.search.options import MOST_INTERVALS, PlanOptions
 
 
 def _kind(value: object) -> str:
@@ -131,10 +133,13 @@ class SchemeTable(Table):
     """[scheme]."""
 
     name: str = Field(
-        default="galerkin-2", description='the name of a scheme, such as "galerkin-2"'
+        default=str(PlanOptions.scheme), description='the name of a scheme, such as "galerkin-2"'
     )
     intervals: int = Field(
-        default=16, ge=1, le=1_000_000, description="a whole number from 1 to 1,000,000"
+        default=PlanOptions.intervals,
+        ge=1,
+        le=MOST_INTERVALS,
+        description=f"a whole number from 1 to {MOST_INTERVALS:,}",
     )
 
 
@@ -152,8 +157,8 @@ class LimitsTable(Table):
     tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="a positive share of the range")
 
 
-class TaskTable(Table):
-    """The whole file."""
+class ShapedTable(Table):
+    """The whole file but the options that are one value each."""
 
     robot: str = Field(
         description="the path of a .urdf relative to this file, or a name of example-robot-data"
@@ -169,17 +174,8 @@ class TaskTable(Table):
     duration: Duration = Field(
         description="a positive number of seconds, or a list [lower, upper] of two"
     )
-    time_weight: FiniteFloat = Field(
-        default=0.0, ge=0, description="a number, 0 or more: the cost of a second"
-    )
     limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
     obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
-    margin: FiniteFloat = Field(
-        default=MARGIN, ge=0, description="a length of 0 or more, in metres"
-    )
-    self_collision: bool = Field(default=False, description="true or false")
-    starts: int = Field(default=1, ge=1, description="a whole number, 1 or more")
-    seed: int = Field(default=0, ge=0, description="a whole number, 0 or more")
     start: StartTable = Field(description="a table [start] with q and, if moving, v")
     goal: GoalTable = Field(
         description="a table [goal] with q and, if moving, v, or with a frame and where it is to be"
@@ -192,3 +188,23 @@ class TaskTable(Table):
         default=None, description='a number, or a text such as "0.1 mm" or "0.01 deg"'
     )
     effects: dict[str, dict[str, Any]] = Field(default={}, description="tables [effects.NAME]")
+
+
+PLAIN: dict[str, SceneKey] = {
+    name: known.key for name, known in about(PlanOptions).items() if known.key is not None
+}
+"""The options that a file holds as one value each."""
+
+
+def _plain_field(name: str) -> tuple[Any, Any]:
+    """The field of an option: of its default's type, with its bounds."""
+    default, known = getattr(PlanOptions, name), about(PlanOptions)[name]
+    kind = FiniteFloat if isinstance(default, float) else type(default)
+    must_be, least, most = PLAIN[name].must_be, known.least, known.most
+    return kind, Field(default=default, description=must_be, ge=least, le=most)
+
+
+_PLAIN_FIELDS: dict[str, Any] = {name: _plain_field(name) for name in PLAIN}
+TaskTable: type[ShapedTable] = create_model(
+    "TaskTable", __base__=ShapedTable, __doc__="The whole file.", **_PLAIN_FIELDS
+)

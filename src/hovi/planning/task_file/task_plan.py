@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+from hovi.planning.search.job import Progress
+from hovi.planning.search.option_fields import spell_out
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
 
-def plan_task(task: Task, **options: Any) -> Solution:
+def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> Solution:
     """The motion that a task asks for: `plan` with all that it says.
 
-    task: what is planned. options: of `plan`, in place of what the task says or besides.
-    Raises what `plan` raises.
+    task: what is planned.
+    progress: called with a line of text and the fraction done.
+    The options of `plan` take the place of what the task says. Raises what `plan` raises.
     """
-    clearance = task.clearance
-    said: dict[str, Any] = {
-        "time_weight": task.time_weight,
-        "via": task.via,
-        "scheme": task.scheme,
-        "intervals": task.intervals,
-        "tolerance": task.tolerance,
-        "limits": task.limits,
-        "obstacles": clearance.obstacles,
-        "margin": clearance.margin,
-        "self_collision": clearance.self_collision,
-        "starts": task.starts,
-        "seed": task.seed,
-    }
-    return plan(task.scene, task.start, task.goal, task.duration, **(said | options))
+    options = task.options.with_changes(**changes)
+    return plan(task.scene, task.start, task.goal, task.duration, progress, options)
+
+
+spell_out(plan_task, PlanOptions)

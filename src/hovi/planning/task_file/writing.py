@@ -4,22 +4,28 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 import tomlkit
-from tomlkit.items import Table
 
-from hovi.errors import SceneError
+from hovi.errors import SceneError, SchemeError
+from hovi.planning.problem.tolerance import as_said
+from hovi.planning.search.option_fields import about
+from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
 from hovi.planning.task_file.goal_tables import goal_table, state_table, via_table
 from hovi.planning.task_file.limit_tables import limits_value
+from hovi.planning.task_file.schema import PLAIN
 from hovi.planning.task_file.task import Task
 from hovi.robot.example_robots import example_robot
 from hovi.robot.source import RobotSource
 from hovi.robot.srdf import read_srdf_file
+from hovi.schemes import by_name
 from hovi.system.files import reason, whole_file
+
+_TABLES = ("limits", "start", "goal", "via", "obstacles", "scheme")
+"""Keys that may hold tables, in the order in which those are written."""
+_NOTHING: tuple[Any, ...] = (None, [], {})
 
 
 def save_task(task: Task, path: str | Path) -> Path:
@@ -42,67 +48,111 @@ def save_task(task: Task, path: str | Path) -> Path:
 
 
 def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
-    source = task.scene.robot.source
+    """The task as TOML, which wants tables behind what is none."""
+    robot = task.scene.robot
+    said = {
+        **_robot_keys(task, folder),
+        "duration": _duration(task.duration),
+        **_option_keys(task),
+        "start": state_table(task.start, robot, "start"),
+        "goal": goal_table(task.goal, robot),
+    }
+    plain = {key: value for key, value in said.items() if not _is_table(value)}
+    tables = {key: said[key] for key in _TABLES if _is_table(said.get(key))}
     document = tomlkit.document()
-    document["robot"] = source.reference
-    if source.locked:
-        document["locked"] = list(source.locked)
-    if source.package_dirs:
-        document["package_dirs"] = _relative(source, folder)
-    if _own_srdf(source) is not None:
-        document["srdf"] = _srdf_name(source)
-    if source.free_flyer:
-        document["free_flyer"] = True
-    if source.mimic:
-        document["mimic"] = True
-    if task.scene.passive:
-        document["passive"] = list(task.scene.passive)
-    free = isinstance(task.duration, tuple)
-    document["duration"] = _floats(task.duration) if free else float(cast(float, task.duration))
-    if task.time_weight:
-        document["time_weight"] = float(task.time_weight)
-    limits = limits_value(task.limits, task.scene.robot)
-    if isinstance(limits, str):
-        document["limits"] = limits
-    document["starts"] = task.starts
-    document["seed"] = task.seed
-    if task.tolerance is not None:
-        document["tolerance"] = task.tolerance
-    if task.clearance.wanted:
-        document["margin"] = float(task.clearance.margin)
-        document["self_collision"] = task.clearance.self_collision
-    if isinstance(limits, dict):
-        document["limits"] = _table(limits)
-    document["start"] = _table(state_table(task.start, task.scene.robot, "start"))
-    document["goal"] = _table(goal_table(task.goal, task.scene.robot))
-    if task.via:
-        tables = tomlkit.aot()
-        for via in task.via:
-            tables.append(_table(via_table(via, task.scene.robot)))
-        document["via"] = tables
-    if task.clearance.obstacles:
-        obstacles = tomlkit.aot()
-        for obstacle in task.clearance.obstacles:
-            obstacles.append(_table(obstacle.to_dict()))
-        document["obstacles"] = obstacles
-    document["scheme"] = _table({"name": task.scheme, "intervals": task.intervals})
+    for key, value in (plain | tables).items():
+        if value not in _NOTHING:
+            document[key] = _item(value)
     if task.scene.effects:
         effects = tomlkit.table(is_super_table=True)
         for effect in task.scene.effects:
-            effects[effect.key] = _table(effect_table(effect))
+            effects[effect.key] = _item(effect_table(effect))
         document["effects"] = effects
     return document
 
 
-def _table(values: dict[str, Any]) -> Table:
+def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
+    """The robot, how it is loaded, and which of its joints are passive."""
+    source = task.scene.robot.source
+    return {
+        "robot": source.reference,
+        "locked": list(source.locked),
+        "package_dirs": _relative(source, folder),
+        "srdf": None if _own_srdf(source) is None else _srdf_name(source),
+        "free_flyer": source.free_flyer or None,
+        "mimic": source.mimic or None,
+        "passive": list(task.scene.passive),
+    }
+
+
+def _option_keys(task: Task) -> dict[str, Any]:
+    """The options by key: plain ones by the rule of each, the others by code of their own."""
+    options, robot = task.options, task.scene.robot
+    plain = {name: _plain(name, options) for name in PLAIN}
+    shaped = {
+        "limits": limits_value(options.limits, robot),
+        "tolerance": as_said(options.tolerance),
+        "via": [via_table(each, robot) for each in options.via],
+        "obstacles": [each.to_dict() for each in options.obstacles],
+        "scheme": {"name": _scheme_name(options), "intervals": options.intervals},
+        "intervals": None,
+    }
+    said = plain | shaped
+    for name in about(PlanOptions):
+        if name not in said and not _is_default(name, options):
+            raise SceneError(
+                f"a scene file cannot say {name!r}: give it to hovi.plan_task, and save the task "
+                "without it."
+            )
+    return {name: said[name] for name in about(PlanOptions) if name in said}
+
+
+def _plain(name: str, options: PlanOptions) -> Any:
+    """The value that a file names; None where it leaves it out."""
+    key, default = PLAIN[name], getattr(PlanOptions, name)
+    named = not _is_default(name, options) if key.written is None else key.written(options)
+    return type(default)(getattr(options, name)) if named else None
+
+
+def _is_default(name: str, options: PlanOptions) -> bool:
+    value, default = getattr(options, name), getattr(PlanOptions, name)
+    return value is default or (isinstance(value, str | float | int) and value == default)
+
+
+def _scheme_name(options: PlanOptions) -> str:
+    """Raises SceneError for a scheme that no name stands for."""
+    name = options.scheme_name
+    try:
+        known = by_name(name).key == options.table.key
+    except SchemeError:
+        known = False
+    if not known:
+        raise SceneError(f"a scene file cannot hold the numbers of a scheme of your own, {name!r}.")
+    return name
+
+
+def _duration(duration: float | tuple[float, float]) -> float | list[float]:
+    return [float(each) for each in duration] if isinstance(duration, tuple) else float(duration)
+
+
+def _is_table(value: Any) -> bool:
+    """Whether TOML calls it a table, or a list of tables."""
+    return isinstance(value[0] if isinstance(value, list) and value else value, dict)
+
+
+def _item(value: Any) -> Any:
+    """A value as TOML holds it."""
+    if not _is_table(value):
+        return value
+    if isinstance(value, list):
+        tables = tomlkit.aot()
+        for each in value:
+            tables.append(_item(each))
+        return tables
     table = tomlkit.table()
-    for key, value in values.items():
-        table[key] = value
+    for key, each in value.items():
+        table[key] = each
     return table
-
-
-def _floats(values: npt.ArrayLike) -> list[float]:
-    return [float(each) for each in np.asarray(values)]
 
 
 def _relative(source: RobotSource, folder: Path) -> list[str]:

@@ -78,13 +78,13 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
         task.start,
         task.goal,
         task.duration,
-        scheme=task.scheme,
-        intervals=task.intervals,
-        limits=task.limits,
+        scheme=task.options.scheme,
+        intervals=task.options.intervals,
+        limits=task.options.limits,
     )
     assert solution.status is Status.MINIMUM, solution.message
     assert solution.n_neg == 0
-    limits = as_limits(task.scene.robot, task.limits)
+    limits = as_limits(task.scene.robot, task.options.limits)
     assert largest_excess(solution.trajectory, limits) <= limits.tolerance
 
 
