@@ -194,8 +194,8 @@ free = ["wrist_3_joint"]
         assert each.goal.frame == "tool0"
         np.testing.assert_allclose(each.goal.position, [0.4, 0.3, 0.4])
         assert each.goal.free_velocity == ("wrist_3_joint",)
-        assert each.via[0].goal.free == ("wrist_3_joint",)
-        assert each.via[0].time == 0.7
+        assert each.options.via[0].goal.free == ("wrist_3_joint",)
+        assert each.options.via[0].time == 0.7
 
 
 def test_a_bad_via_point_is_named_by_its_number_and_line(tmp_path, models) -> None:
