@@ -46,6 +46,7 @@ from .planning.problem.tolerance import Tolerance as Tolerance
 from .planning.refinement.certificate import Certificate as Certificate
 from .planning.refinement.certificate import certify as certify
 from .planning.refinement.error_estimate import estimate_error as estimate_error
+from .planning.search.options import PlanOptions as PlanOptions
 from .planning.search.planner import plan as plan
 from .planning.solver.solver import Solution as Solution
 from .planning.solver.solver import solve as solve

@@ -116,8 +116,6 @@ def work_precision(
     try:
         measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
         report("what a tolerance chooses", time.fraction)
-        measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
-        report("what a tolerance chooses", time.fraction)
         intervals = task.options.intervals
         chosen = choices(problem, curve, resolved.reference, time, intervals, repeats, clock)
     finally:
