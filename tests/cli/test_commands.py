@@ -246,9 +246,10 @@ def test_a_motion_is_a_guess_for_another_grid(run: Run, motion: Path) -> None:
     assert fields["nit"] < 5
 
 
-def test_a_time_limit_returns_the_best_so_far(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("time_limit", ["0.01", "10 ms"])
+def test_a_time_limit_returns_the_best_so_far(run: Run, tmp_path: Path, time_limit: str) -> None:
     motion = tmp_path / "best.npz"
-    limit = ("--time-limit", "0.01", "--out", motion, "--json")
+    limit = ("--time-limit", time_limit, "--out", motion, "--json")
     code, out, _ = run("plan", "two_link_swing_up", *limit)
     fields = only_object(out)
     assert code == (0 if fields["success"] else 1)
@@ -469,6 +470,12 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "guess": (["plan", "two_link_reach", "--guess", "cubik"], ["'cubic'"]),
     "limits": (["plan", "two_link_reach", "--limits", "urd"], ["--limits", "'urdf'"]),
     "no such guess": (["plan", "two_link_reach", "--guess", "no.npz"], ["no.npz"]),
+    "unit of a time limit": (
+        ["plan", "two_link_reach", "--time-limit", "2 sec"],
+        ["--time-limit '2 sec' has the unit 'sec'", "'s'"],
+    ),
+    "unit of a duration": (["simulate", "two_link_reach", "--duration", "2 mn"], ["'min'"]),
+    "no time": (["effects", "two_link_reach", "--time-limit", "soon"], ["--time-limit", "'soon'"]),
     "time limit": (["plan", "two_link_reach", "--time-limit", "nan"], ["--time-limit"]),
     "ending": (["plan", "two_link_reach", "--out", "motion.toml"], [".npz"]),
     "folder": (["plan", "two_link_reach", "--out", "/nowhere/m.npz"], ["/nowhere"]),

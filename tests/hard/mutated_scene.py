@@ -54,6 +54,8 @@ STRANGE_VALUES = (
         "taylor-midpoint",
         "galerkin-0",
     ),
+    *("2 s", "500 ms", "0 s", "-1 s", "1e999 s", "1.5 mn", "2 mm", ".. s", "5e-324 us"),
+    *("1 h " * 5_000, ["1 s", "2 s"], ["1 s", 2.0], ["2 s", "1 s"], [1.0, "2 sec"]),
     *("galerkin-9", "galerkin-99999999", "mean-difference", "a" * 10_000, "a\nb", "\x9b", 0.3, 2.5),
 )
 
@@ -99,12 +101,11 @@ def objection(task: Task) -> str:
     ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
     if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
         return "it holds numbers that are not finite"
-    if not (
-        task.duration > 0 and 1 <= task.options.intervals <= 10**6 and task.options.starts >= 1
-    ):
+    intervals, starts = task.options.intervals, task.options.starts
+    if not (np.min(task.duration) > 0 and 1 <= intervals <= 10**6 and starts >= 1):
         return "its duration, intervals or starts are not positive"
     task.scene.describe()
-    if task.options.intervals > MOST_INTERVALS:
+    if intervals > MOST_INTERVALS:
         return ""
     once = task.with_options(starts=1, tolerance=None)
     solution = plan_task(once, max_iterations=2, time_limit=2.0, processes=1)
@@ -167,17 +168,29 @@ def _settings(scene: dict[str, Any], random: Random) -> None:
     table = scene.setdefault("scheme", {})
     if isinstance(table, dict):
         table.update({key: random.choice(values) for key, values in choices.items()})
-    scene["duration"] = random.choice((1e-300, 1e-9, 1e-3, 0.3, 7.0, 1e4, 1e100, 1e308))
+    numbers = (1e-300, 1e-9, 1e-3, 0.3, 7.0, 1e4, 1e100, 1e308)
+    texts = ("1e-300 s", "300 ms", "0.5min", "1e307 h", "1e-324 s", ["1 s", "2 s"])
+    scene["duration"] = random.choice((*numbers, *texts))
 
 
-_CHANGES: tuple[Change, ...] = (_value, _value, _remove, _rename, _swap, _settings)
+def _passed(scene: dict[str, Any], random: Random) -> None:
+    times = (0.1, "100 ms", "0.1 s", "1 h", "0 s", "0.1", "0.1 sec", "nan s", [], True)
+    goal = {"frame": "tip", "position": [0.5, 0.0, 0.5]}
+    scene["via"] = [goal | {"time": random.choice(times)}, {"time": "200 ms", "q": [0.0, 0.0]}]
+    if random.random() < 0.5:
+        scene["via"].pop()
+
+
+_CHANGES: tuple[Change, ...] = (_value, _value, _remove, _rename, _swap, _settings, _passed)
 
 # Changes that must be refused; the docstring says why
 
 
 def _duration(scene: dict[str, Any], random: Random) -> None:
     """the duration is not a positive number"""
-    scene["duration"] = random.choice((*NOT_NUMBERS[:6], 0, -1, -1e-9, 0.0))
+    texts = ("2", "2 sec", "0 s", "-1 s", "2 mm", "1.2.3 s", "1e999 s", "2 s 3", "1e-400 s", "s")
+    pairs = (["2 s", "1 s"], ["1 s", "2 sec"], [1.0, "0 s"], ["1 s"])
+    scene["duration"] = random.choice((*NOT_NUMBERS[:6], 0, -1, -1e-9, 0.0, *texts, *pairs))
 
 
 def _intervals(scene: dict[str, Any], random: Random) -> None:

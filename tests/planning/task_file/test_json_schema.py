@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -70,6 +71,7 @@ RULES: dict[str, tuple[Any, Callable[[Any, Any, dict[str, Any]], bool]]] = {
     "maximum": (NUMBERS, lambda value, given, _: value <= given),
     "exclusiveMinimum": (NUMBERS, lambda value, given, _: value > given),
     "exclusiveMaximum": (NUMBERS, lambda value, given, _: value < given),
+    "pattern": (str, lambda value, given, _: re.search(given, value) is not None),
     "items": (list, lambda value, given, _: all(valid(each, given) for each in value)),
     "prefixItems": (list, lambda value, given, _: all(map(valid, value, given))),
     "minItems": (list, lambda value, given, _: len(value) >= given),
@@ -118,6 +120,8 @@ def test_a_written_effect_is_valid_and_each_of_its_keys_is_known(
     "wrong",
     [
         {"duration": "long"},
+        {"duration": "2"},
+        {"duration": ["1 s", "later"]},
         {"duration": None},
         {"limits": "all"},
         {"limits": {"base": "nothing"}},

@@ -15,10 +15,12 @@ import pytest
 import hovi.effects
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.writing import save_task
 from hovi.robot.bundled_models import example, example_scenes
+from hovi.schemes import galerkin
 
 REACH = example("two_link_reach.toml").read_text()
 
@@ -115,6 +117,41 @@ def test_whole_numbers_stand_for_real_ones(folder: Path) -> None:
     assert load_task(write(folder, REACH.replace("1.0  ", "1  "))).duration == 1.0
 
 
+def test_times_may_be_texts(folder: Path) -> None:
+    via = '[[via]]\ntime = "250 ms"\nq = [0, 0]\n'
+    task = load_task(write(folder, REACH.replace("= 1.0  ", '= "500 ms"  ') + via))
+    assert (task.duration, task.options.via[0].time) == (0.5, 0.25)
+    again = load_task(save_task(task, folder / "again.toml"))
+    assert (again.duration, again.options.via[0].time) == (0.5, 0.25)
+    task = load_task(write(folder, REACH.replace("= 1.0  ", '= ["500 ms", 2]  ')))
+    assert task.duration == (0.5, 2.0)
+
+
+def test_what_a_scene_file_cannot_say_is_not_lost_in_silence(folder: Path) -> None:
+    task = load_task(write(folder, REACH))
+    for name, value in (("weight", [1.0, 2.0]), ("max_iterations", 7), ("time_limit", "2 s")):
+        with pytest.raises(SceneError, match=f"cannot say '{name}'"):
+            save_task(task.with_options(**{name: value}), folder / "again.toml")
+    own = dataclasses.replace(galerkin(2), name="mine")
+    with pytest.raises(SceneError, match="a scheme of your own, 'mine'"):
+        save_task(task.with_options(scheme=own), folder / "again.toml")
+
+
+def test_schemes_and_tolerances_that_are_no_texts_survive_a_file(folder: Path) -> None:
+    task = load_task(write(folder, REACH)).with_options(scheme=galerkin(3))
+    tolerances = [
+        Tolerance(1e-5),
+        Tolerance(1e-4 / 3, Quantity.FRAME, "tip"),
+        Tolerance(1e-4, Quantity.FRAME, unit="mm"),
+        Tolerance(1e-3, Quantity.JOINTS),
+    ]
+    for tolerance in tolerances:
+        path = save_task(task.with_options(tolerance=tolerance), folder / "again.toml")
+        options = load_task(path).options
+        assert Tolerance.of(options.tolerance, task.scene.robot) == tolerance
+        assert options.scheme == "galerkin-3"
+
+
 MISTAKES = {
     "unknown key": ("duration =", "durration =", ["line 5", "`durration`", "'duration'"]),
     "unknown key in a table": ("intervals =", "interval =", ["`scheme.interval`", "'intervals'"]),
@@ -129,6 +166,11 @@ MISTAKES = {
     "boolean for a number": ("= 1.0", "= true", ["`duration`", "true"]),
     "T = 0": ("= 1.0", "= 0.0", ["line 5", "`duration`", "positive number", "0.0"]),
     "T < 0": ("= 1.0", "= -3.0", ["`duration`", "-3.0"]),
+    "T without a unit": ("= 1.0", '= "1"', ["`duration`", "positive number", '"1"']),
+    "unit of T": ("= 1.0", '= "1 sec"', ["line 5", "the duration '1 sec'", "'s'"]),
+    "T = 0 s": ("= 1.0", '= "0 s"', ["line 5", "`duration`", "positive number", '"0 s"']),
+    "unit in a pair": ("= 1.0", '= ["1 s", "2 mn"]', ["line 5", "'2 mn'", "'min'"]),
+    "pair that falls": ("= 1.0", '= ["2 s", 1.0]', ["line 5", "`duration`", "[lower, upper]"]),
     "T = inf": ("= 1.0", "= inf", ["`duration`", "inf"]),
     "N = 0": ("intervals = 16", "intervals = 0", ["line 17", "`scheme.intervals`", "0"]),
     "N is no whole number": ("intervals = 16", "intervals = 1.5", ["whole number", "1.5"]),

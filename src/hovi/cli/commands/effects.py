@@ -24,7 +24,7 @@ def effects(
         ),
     ] = None,
     time_limit: Annotated[
-        float | None,
+        str | None,
         typer.Option(metavar="SECONDS", help="Of everything; each candidate gets a share."),
     ] = None,
     out: Annotated[
@@ -39,19 +39,18 @@ def effects(
     """
     from hovi.accuracy.effect_study.study import study_effects
     from hovi.accuracy.effect_study.tables import plot_study, study_json
+    from hovi.cli.commands.durations import positive_seconds
     from hovi.cli.commands.files import check_output, find_scene
     from hovi.cli.commands.progress import progress
-    from hovi.errors import InputError
     from hovi.planning.task_file.reading import load_task
 
-    if time_limit is not None and not 0 < time_limit < float("inf"):
-        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    limit = None if time_limit is None else positive_seconds("--time-limit", time_limit)
     if out is not None:
         check_output(out, ".png", ".pdf", ".svg")
     task = load_task(find_scene(scene))
     tried = None if candidates is None else load_task(find_scene(candidates)).scene.effects
     with progress(quiet=json) as report:
-        study = study_effects(task, tried, report, time_limit)
+        study = study_effects(task, tried, report, limit)
     if out is not None:
         plot_study(study, out)
     if json:

@@ -33,7 +33,7 @@ def plan(
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of the random guesses.")] = None,
     time_limit: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Keep the best found by then.")
+        str | None, typer.Option(metavar="SECONDS", help="Keep the best found by then.")
     ] = None,
     guess: Annotated[
         str, typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="The first guess.")
@@ -71,15 +71,16 @@ def plan(
 
 def _options(flags: dict[str, Any]) -> dict[str, Any]:
     """What the flags say of the options of a plan. Raises InputError."""
+    from hovi.cli.commands.durations import positive_seconds
     from hovi.errors import InputError, nearest
     from hovi.planning.search.option_fields import about
     from hovi.planning.search.options import PlanOptions
 
     said = {name: value for name, value in flags.items() if value is not None}
     given: dict[str, Any] = {name: said[name] for name in about(PlanOptions) if name in said}
-    limits, time_limit = given.get("limits", "none"), given.get("time_limit", 1.0)
-    if not 0 < time_limit < float("inf"):
-        raise InputError(f"--time-limit must be a positive number of seconds, not {time_limit}.")
+    if "time_limit" in given:
+        given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
+    limits = given.get("limits", "none")
     if limits not in LIMITS:
         hint = nearest(limits, LIMITS)
         raise InputError(f"--limits {limits!r}: {hint} Others are given in the scene file.")

@@ -29,7 +29,7 @@ def simulate(
     ] = "none",
     bandwidth: Annotated[float, typer.Option(help="Of the feedback, in rad/s.")] = 10.0,
     duration: Annotated[
-        float | None, typer.Option(metavar="SECONDS", help="Instead of the scene's.")
+        str | None, typer.Option(metavar="SECONDS", help="Instead of the scene's.")
     ] = None,
     intervals: Annotated[
         int | None,
@@ -73,18 +73,14 @@ def simulate(
         _print(report, motion)
 
 
-def _free(
-    task: Task, duration: float | None, intervals: int | None, inner_modes: int
-) -> Simulation:
+def _free(task: Task, duration: str | None, intervals: int | None, inner_modes: int) -> Simulation:
     import math
 
-    from hovi.errors import InputError
+    from hovi.cli.commands.durations import positive_seconds
     from hovi.flows.simulator import simulate as simulate_motion
 
     longest = max(task.duration) if isinstance(task.duration, tuple) else task.duration
-    T = longest if duration is None else duration
-    if not 0 < T < math.inf:
-        raise InputError(f"--duration must be a positive number of seconds, not {T}.")
+    T = longest if duration is None else positive_seconds("--duration", duration)
     N = max(1, math.ceil(100 * T)) if intervals is None else intervals
     return simulate_motion(task.scene, task.start, T, intervals=N, inner_modes=inner_modes)
 

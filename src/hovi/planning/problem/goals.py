@@ -14,6 +14,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import Reached, inverse_kinematics
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import Condition, JointCondition
+from hovi.planning.problem.values import seconds
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -23,8 +24,9 @@ Array = npt.NDArray[np.float64]
 class Via:
     """What a motion passes through on its way.
 
-    time: when, in [s]. goal: a State, whose velocity is free where none is given, or a FrameGoal,
-    which leaves all velocities free.
+    time: when, in [s]; a text such as "500 ms" becomes the number.
+    goal: a State, whose velocity is free where none is given, or a FrameGoal, which leaves all
+        velocities free.
     Raises InputError for a time that is not positive, or what is no goal.
     """
 
@@ -36,6 +38,7 @@ class Via:
             raise InputError(
                 f"a via point is a hovi.State(q) or a hovi.FrameGoal, not {self.goal!r}."
             )
+        object.__setattr__(self, "time", seconds(self.time, "the time of a via point"))
         if not (np.isfinite(self.time) and self.time > 0):
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
         if isinstance(self.goal, State) and self.goal.turns:

@@ -13,12 +13,8 @@ import numpy as np
 
 from hovi.discrete.motion_error import MotionError
 from hovi.errors import InputError, nearest
+from hovi.planning.problem.values import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
-
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-SHARES = {"": 1.0, "%": 1e-2}
-_TEXT = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)(?:\s+at\s+(\S.*?))?\s*")
 
 
 class Quantity(StrEnum):
@@ -64,14 +60,12 @@ class Tolerance:
 
     @classmethod
     def _parsed(cls, text: str) -> Self:
-        match = _TEXT.fullmatch(text)
-        if match is None:
+        quantity, *rest = re.split(r"\sat\s", text, maxsplit=1)
+        frame = rest[0].strip() if rest else None
+        parsed = number_and_unit(quantity)
+        if parsed is None or frame == "":
             raise InputError(_expected(text))
-        number, unit, frame = match.groups()
-        try:
-            size = float(number)
-        except ValueError:
-            raise InputError(_expected(text)) from None
+        size, unit = parsed
         if unit in LENGTHS:
             return cls(size * LENGTHS[unit], Quantity.FRAME, frame, unit)
         if frame is not None:

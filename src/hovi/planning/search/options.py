@@ -17,6 +17,7 @@ from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.problem.values import seconds
 from hovi.planning.search.option_fields import (
     SceneKey,
     explain,
@@ -115,7 +116,9 @@ class PlanOptions:
         "of one solve; with limits of every round of it, of which a small number only makes more.",
         least=1,
     )
-    time_limit: float | None = option(None, "of everything, in [s]; returns the best so far.")
+    time_limit: float | str | None = option(
+        None, 'of everything, in [s] or as "2 min"; returns the best so far.'
+    )
     processes: int | None = whole_number(
         None, "for the starts; all processors by default.", least=1
     )
@@ -130,11 +133,16 @@ class PlanOptions:
         via = self.via
         if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
             raise InputError(f"via is a list of hovi.Via(time, goal), not {via!r}.")
-        if self.time_limit is not None and not self.time_limit > 0:
+        if self.most_seconds is not None and not self.most_seconds > 0:
             raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
         object.__setattr__(self, "via", tuple(via))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
         _ = self.table  # an unknown scheme speaks at once
+
+    @property
+    def most_seconds(self) -> float | None:
+        """The time limit, in [s]."""
+        return None if self.time_limit is None else seconds(self.time_limit, "time_limit")
 
     @property
     def table(self) -> Scheme:

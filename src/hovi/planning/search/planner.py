@@ -7,14 +7,14 @@ import time
 from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, cast
 
-import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State, as_state
-from hovi.errors import InputError, SceneError
+from hovi.errors import InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.values import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, with_room
@@ -31,7 +31,6 @@ from hovi.system.interruption import interruptible
 
 Start = State | npt.ArrayLike | str
 Goal = State | FrameGoal | npt.ArrayLike | str
-Duration = float | tuple[float, float]
 Keywords = ParamSpec("Keywords")
 
 
@@ -82,7 +81,8 @@ def plan(
     scene: what is simulated.
     start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose; the goal
         may be a FrameGoal.
-    duration: T in [s], or a pair (lower, upper) between which the best one is looked for.
+    duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
+        of these, between which the best one is looked for.
     progress: called with a line of text and the fraction done.
     options: a PlanOptions; what follows takes the place of what it says.
     {options}
@@ -91,18 +91,15 @@ def plan(
     began = time.perf_counter()
     if not isinstance(scene, Scene):
         raise InputError(f"plan takes a hovi.Scene, as in hovi.Scene(robot, [...]), not {scene!r}.")
-    chosen = (options or PlanOptions()).with_changes(**changes).on(scene.robot)
-    free = _free(scene, duration, chosen)
-    job = Job(
-        scene,
-        _grid(duration if free is None else free.first, chosen, scene.robot),
-        as_state(start, scene.robot),
-        _goal(goal, scene.robot, chosen),
-        chosen,
-    )
-    fine = with_room(job, chosen.guess)
-    search = Search(fine, Deadline(chosen.time_limit), progress or _silent, free)
-    problem = fine.problem()  # bad input speaks before any work is done
+    options = PlanOptions() if options is None else options
+    expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
+    chosen = options.with_changes(**changes).on(scene.robot)
+    free, T = _time(scene, as_duration(duration), chosen)
+    grid = _grid(T, chosen, scene.robot)
+    ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
+    job = with_room(Job(scene, grid, *ends, chosen), chosen.guess)
+    search = Search(job, Deadline(chosen.most_seconds), progress or _silent, free)
+    problem = job.problem()  # bad input speaks before any work is done
     started = time.perf_counter()
     best, minima = search.run()
     return dataclasses.replace(
@@ -114,30 +111,29 @@ def plan(
     )
 
 
-def _free(scene: Scene, duration: Duration, options: PlanOptions) -> FreeDuration | None:
-    """Bounds of a free duration, or None where it is given.
+def _time(
+    scene: Scene, T: float | tuple[float, float], options: PlanOptions
+) -> tuple[FreeDuration | None, float]:
+    """The bounds of a free duration, None where it is given, and the first one that is solved for.
 
     Raises SceneError for effects that a clock drives: the best duration is not known of them.
     """
-    if isinstance(duration, float | int | np.number):
+    if not isinstance(T, tuple):
         if options.time_weight != 0:
             raise InputError("a weight of time needs a free duration, a pair (lower, upper).")
-        return None
-    pair = tuple(np.asarray(duration, dtype=float).ravel())
-    if len(pair) != 2:
-        raise InputError(f"the duration is a number or a pair (lower, upper), got {duration!r}.")
+        return None, T
     if options.via:
         raise InputError("via points at given times need a given duration, not a free one.")
-    free = FreeDuration(pair[0], pair[1], options.time_weight)
+    free = FreeDuration(*T, options.time_weight)
     if scene.terms.timed:
         raise SceneError(
             f"effect {scene.terms.timed[0]!r} depends on the time, and a free duration needs "
             "effects that do not; give the duration as one number."
         )
-    return free
+    return free, free.first
 
 
-def _grid(T: Any, options: PlanOptions, robot: Robot) -> Grid:
+def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
     """The grid that is asked for, or with which the way to a tolerance begins."""
     if options.tolerance is None:
         grid = Grid.uniform(T, options.intervals, options.table)

@@ -11,6 +11,7 @@ from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
+from hovi.planning.problem.values import seconds
 from hovi.planning.task_file.joint_tables import read_configuration, read_velocity
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, GoalTable, ViaTable
@@ -71,16 +72,23 @@ def read_via(
     """What the motion passes through. duration: in [s], or its bounds."""
     points = []
     for i, table in enumerate(tables):
-        longest = float(np.max(duration))
-        if table.time >= longest:
-            sentence = f"a via point at {table.time:g} s is not inside the motion of {longest:g} s"
+        longest, time = float(np.max(duration)), _time(table.time, ("via", i, "time"), toml)
+        if time >= longest:
+            sentence = f"a via point at {time:g} s is not inside the motion of {longest:g} s"
             raise toml.error(("via", i, "time"), sentence)
         goal = read_goal(table, ("via", i), robot, toml)
         try:
-            points.append(Via(table.time, goal))
+            points.append(Via(time, goal))
         except InputError as wrong:
             raise toml.error(("via", i), str(wrong)) from None
     return tuple(points)
+
+
+def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
+    try:
+        return seconds(given, "the time of a via point")
+    except InputError as wrong:
+        raise toml.error(keys, str(wrong)) from None
 
 
 def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _ELEMENTS = {
     "finite_number": "a finite number",
     "float_type": "a finite number",
     "string_type": "a string",
+    "string_pattern_mismatch": 'a length of time such as "2 s"',
     "list_type": "a list",
     "dict_type": "a table",
     "too_long": "a shorter list",

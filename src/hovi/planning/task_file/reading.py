@@ -12,11 +12,12 @@ from pydantic import ValidationError
 
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.problem.values import as_duration
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via
 from hovi.planning.task_file.limit_tables import read_limits
-from hovi.planning.task_file.messages import TomlText, first_sentence
+from hovi.planning.task_file.messages import TomlText, first_sentence, in_toml
 from hovi.planning.task_file.obstacle_tables import read_obstacles
 from hovi.planning.task_file.schema import PLAIN, ShapedTable, TaskTable
 from hovi.planning.task_file.task import Task
@@ -75,13 +76,17 @@ def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:
         raise toml.error(("passive",), str(wrong)) from None
 
 
-def _duration(given: float | list[float], toml: TomlText) -> float | tuple[float, float]:
+def _duration(given: Any, toml: TomlText) -> float | tuple[float, float]:
     """A length of time, or the bounds of one."""
-    numbers = given if isinstance(given, list) else [given]
-    if not all(math.isfinite(each) and each > 0 for each in numbers) or numbers != sorted(numbers):
-        expected = TaskTable.model_fields["duration"].description
-        raise toml.error(("duration",), f"`duration` must be {expected}, but it is {given}")
-    return (given[0], given[1]) if isinstance(given, list) else given
+    try:
+        T = as_duration(given)
+    except InputError as wrong:
+        raise toml.error(("duration",), str(wrong)) from None
+    ends = T if isinstance(T, tuple) else (T,)
+    if not all(math.isfinite(each) and each > 0 for each in ends) or ends != tuple(sorted(ends)):
+        expected, came = TaskTable.model_fields["duration"].description, in_toml(given)
+        raise toml.error(("duration",), f"`duration` must be {expected}, but it is {came}")
+    return T
 
 
 def _read_text(path: Path) -> TomlText:

@@ -20,8 +20,8 @@ def _kind(value: object) -> str:
     return "<list>" if isinstance(value, list) else "<number>"
 
 
-def _kind_or_name(value: object) -> str:
-    return "<name>" if isinstance(value, str) else _kind(value)
+def _kind_or_text(value: object) -> str:
+    return "<text>" if isinstance(value, str) else _kind(value)
 
 
 Numbers = Annotated[list[FiniteFloat], Tag("<list>")]
@@ -31,7 +31,7 @@ ByJoint = Annotated[
 ]
 Coordinates = Annotated[Numbers | ByJoint, Discriminator(_kind)]
 Configuration = Annotated[
-    Numbers | ByJoint | Annotated[str, Tag("<name>")], Discriminator(_kind_or_name)
+    Numbers | ByJoint | Annotated[str, Tag("<text>")], Discriminator(_kind_or_text)
 ]
 
 Bound = Annotated[
@@ -50,10 +50,19 @@ _BOUNDS = (
 )
 
 
+NumberAndUnit = Annotated[
+    str, Field(pattern=r"^ *[0-9.]+([eE][+-]?[0-9]+)? *[a-z]+ *$"), Tag("<text>")
+]
+Seconds = Annotated[Annotated[float, Tag("<number>")] | NumberAndUnit, Discriminator(_kind_or_text)]
+PositiveSeconds = Annotated[
+    Annotated[FiniteFloat, Field(gt=0), Tag("<number>")] | NumberAndUnit,
+    Discriminator(_kind_or_text),
+]
 Duration = Annotated[
     Annotated[float, Tag("<number>")]
-    | Annotated[list[float], Field(min_length=2, max_length=2), Tag("<list>")],
-    Discriminator(_kind),
+    | NumberAndUnit
+    | Annotated[list[Seconds], Field(min_length=2, max_length=2), Tag("<list>")],
+    Discriminator(_kind_or_text),
 ]
 
 
@@ -126,7 +135,9 @@ class GoalTable(Table):
 class ViaTable(GoalTable):
     """[[via]]."""
 
-    time: FiniteFloat = Field(gt=0, description="a positive number of seconds")
+    time: PositiveSeconds = Field(
+        description='a positive number of seconds, or a text such as "500 ms"'
+    )
 
 
 class SchemeTable(Table):
@@ -172,7 +183,8 @@ class ShapedTable(Table):
     mimic: bool = Field(default=False, description="true or false")
     passive: list[str] = Field(default=[], description="a list of joint names")
     duration: Duration = Field(
-        description="a positive number of seconds, or a list [lower, upper] of two"
+        description='a positive number of seconds, a text such as "2 s", or a list [lower, upper] '
+        "of two"
     )
     limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
     obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")

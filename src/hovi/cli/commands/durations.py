@@ -1,0 +1,18 @@
+"""Lengths of time on the command line."""
+
+from __future__ import annotations
+
+from hovi.errors import InputError
+
+
+def positive_seconds(flag: str, said: str) -> float:
+    """What a flag says: a number of seconds, or a text such as "2 min". Raises InputError."""
+    from hovi.planning.problem.values import seconds
+
+    try:
+        number = float(said)
+    except ValueError:
+        number = seconds(said, flag)
+    if not 0 < number < float("inf"):
+        raise InputError(f"{flag} must be a positive number of seconds, not {number}.")
+    return number

@@ -1,0 +1,66 @@
+"""Numbers with a unit as people write them: "2 s", "0.1 mm", "0.01 deg"."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from hovi.errors import InputError, nearest
+
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
+SHARES = {"": 1.0, "%": 1e-2}
+DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
+_TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
+
+Duration = float | str | tuple[float | str, float | str]
+"""A length of time or, for one that is free, its bounds."""
+
+
+def number_and_unit(text: str) -> tuple[float, str] | None:
+    """The number and the unit of a text, "" where it has none; None for another text."""
+    match = _TEXT.fullmatch(text.strip())
+    if match is None:
+        return None
+    try:
+        return float(match[1]), match[2]
+    except ValueError:  # as of 1.2.3
+        return None
+
+
+def seconds(given: Any, what: str) -> float:
+    """A length of time, in [s].
+
+    given: a number of seconds, or a text such as "2 s", "500 ms" or "1.5 min".
+    what: what it is called in a sentence, as "the duration".
+    Raises InputError for what is neither.
+    """
+    if isinstance(given, float | int | np.number):
+        return float(given)
+    parsed = number_and_unit(given) if isinstance(given, str) else None
+    if parsed is None:
+        raise InputError(
+            f"{what} is a number of seconds or a text such as '2 s', '500 ms' or '1.5 min', got "
+            f"{given!r}."
+        )
+    number, unit = parsed
+    if not unit:
+        raise InputError(f"{what} {given!r} has no unit: say '{given.strip()} s', for instance.")
+    if unit not in DURATIONS:
+        raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, DURATIONS)}")
+    return number * DURATIONS[unit]
+
+
+def as_duration(given: Any) -> float | tuple[float, float]:
+    """A length of time, in [s], or the bounds (lower, upper) of one. Raises InputError."""
+    if isinstance(given, str | float | int | np.number):
+        return seconds(given, "the duration")
+    try:
+        lower, upper = given
+    except (TypeError, ValueError):
+        raise InputError(
+            f"the duration is a number or a pair (lower, upper), got {given!r}."
+        ) from None
+    return seconds(lower, "the duration"), seconds(upper, "the duration")

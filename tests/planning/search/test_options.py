@@ -1,0 +1,101 @@
+"""Options of a plan: each is said once, and is there wherever options are taken."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hovi
+from hovi.errors import InputError
+from hovi.planning.clearance.obstacles import Sphere
+from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.search.job import Job
+from hovi.planning.search.option_fields import about
+from hovi.planning.search.options import PlanOptions
+from hovi.scene.scene import Scene
+from samples.paper_arm import HANG, REACH_Q
+
+BALL = Sphere([0.0, 0.0, 5.0], 0.1)
+
+
+def test_every_option_is_a_keyword_of_plan_with_its_default_and_is_explained() -> None:
+    parameters = inspect.signature(hovi.plan).parameters
+    for option in fields(PlanOptions):
+        keyword = parameters[option.name]
+        assert keyword.kind is keyword.KEYWORD_ONLY
+        assert (keyword.default, keyword.annotation) == (option.default, option.type)
+        for documented in (hovi.plan, PlanOptions):
+            assert f"\n{option.name}: " in (documented.__doc__ or "")
+    assert "{options}" not in (hovi.plan.__doc__ or "")
+    assert all(known.doc.endswith(".") for known in about(PlanOptions).values())
+
+
+@pytest.mark.parametrize("taking", ["plan", "plan_task", "with_options", "with_changes"])
+def test_an_unknown_option_is_refused_with_the_nearest_name(arm_scene: Scene, taking: str) -> None:
+    task = hovi.Task(arm_scene, hovi.State(HANG), hovi.State(REACH_Q), 1.0)
+    take = {
+        "plan": lambda **given: hovi.plan(arm_scene, HANG, REACH_Q, 1.0, **given),
+        "plan_task": lambda **given: hovi.plan_task(task, **given),
+        "with_options": task.with_options,
+        "with_changes": task.options.with_changes,
+    }[taking]
+    with pytest.raises(InputError, match="no option 'toleranse': did you mean 'tolerance'"):
+        take(toleranse=1e-6)
+
+
+def test_options_that_are_ready_take_changes(arm_scene: Scene) -> None:
+    options = PlanOptions(intervals=8, limits="none")
+    ready = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, options=options, scheme="galerkin-1")
+    spelled = hovi.plan(
+        arm_scene, HANG, REACH_Q, 1.0, intervals=8, limits="none", scheme="galerkin-1"
+    )
+    assert ready.cost == spelled.cost
+    with pytest.raises(InputError, match="expected a PlanOptions"):
+        hovi.plan(arm_scene, HANG, REACH_Q, 1.0, options={"intervals": 8})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit", ["2 sec", "2", "-1 s", 0, "0 s", np.nan, []])
+def test_a_time_limit_is_a_positive_time(limit: Any) -> None:
+    with pytest.raises(InputError, match="time_limit"):
+        PlanOptions(time_limit=limit)
+
+
+def test_times_may_be_texts(arm_scene: Scene) -> None:
+    told = {"limits": "none", "time_limit": "1.5 min"}
+    one = hovi.plan(arm_scene, HANG, REACH_Q, "500 ms", **told)
+    assert one.cost == hovi.plan(arm_scene, HANG, REACH_Q, 0.5, limits="none").cost
+    free = hovi.plan(arm_scene, HANG, REACH_Q, ("300 ms", 0.6), **told)
+    assert 0.3 <= free.trajectory.duration <= 0.6
+    assert hovi.Via("500 ms", hovi.State(HANG)).time == 0.5  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="the duration '1 sec' has the unit 'sec'"):
+        hovi.plan(arm_scene, HANG, REACH_Q, "1 sec")
+
+
+def test_distances_of_a_clearance_are_built_once_whatever_else_changes() -> None:
+    options = PlanOptions(obstacles=[BALL])
+    assert options.obstacles[0].name == "sphere 1"
+    assert options.with_changes(starts=3).clearance is options.clearance
+    assert options.with_changes(margin=0.1).clearance.margin == 0.1
+
+
+def test_options_of_a_robot_hold_limits_and_a_tolerance_in_place_of_words(
+    arm_scene: Scene,
+) -> None:
+    options = PlanOptions(tolerance="0.1 mm").on(arm_scene.robot)
+    assert isinstance(options.tolerance, Tolerance)
+    assert isinstance(options.limits, hovi.Limits)
+    with pytest.raises(InputError, match="no such frame"):
+        PlanOptions(tolerance="1 mm at foot").on(arm_scene.robot)
+
+
+def test_a_job_travels_without_its_guess(arm_scene: Scene) -> None:
+    motion = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, limits="none").trajectory
+    options = PlanOptions(guess=motion, starts=7)
+    job = Job(arm_scene, motion.grid, hovi.State(HANG), hovi.State(REACH_Q), options)
+    again = pickle.loads(pickle.dumps(job))
+    assert (again.options.guess, again.options.starts) == ("cubic", 7)
