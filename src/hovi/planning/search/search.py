@@ -17,7 +17,7 @@ from hovi.planning.solver.solver import Solution, guess_path
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline
-from hovi.system.interruption import raise_if_interrupted, interrupted, record_interrupt
+from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
 COARSE_INTERVALS = 60
 """Grids with more than twice as many intervals are first solved on a grid of this many."""
