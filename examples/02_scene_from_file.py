@@ -28,7 +28,7 @@ task = load_task(hovi.example("two_link_reach"))
 
 
 # %%
-# Planning a task is handing its parts to `hovi.plan`.
+# Planning a task is handing its parts to `hovi.plan`, which is what `hovi.plan_task` does.
 
 
 def plan(task: Task) -> hovi.Solution:
@@ -37,8 +37,7 @@ def plan(task: Task) -> hovi.Solution:
         task.start,
         task.goal,
         task.duration,
-        scheme=task.options.scheme,
-        intervals=task.options.intervals,
+        options=task.options,
     )
 
 
