@@ -17,7 +17,7 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import CasadiTorque
 
 try:
-    from hovi._native import pinocchio_calls
+    import hovi_benchmarks
 except ImportError as error:
     raise SystemExit(
         "Pinocchio's own derivatives are not compiled: run `pip install -C "
@@ -44,7 +44,7 @@ def measure(robot: str, threads: int) -> dict[str, float]:
     ours = best_time(lambda: kernel.expand(q, v, a, weight, curvature, threads), seconds=1.0)
     result = {"n": n, "hovi": 1e6 * ours / POINTS}
     text = archive(model)
-    yardsticks = [pinocchio_calls.time_calls(text, q, v, a, 4) for _ in range(20)]
+    yardsticks = [hovi_benchmarks.time_pinocchio_calls(text, q, v, a, 4) for _ in range(20)]
     result["Pinocchio"] = 1e6 * min(yardsticks)
     if threads == 1:
         result |= _casadi(model, kernel, (q[:64], v[:64], a[:64]))

@@ -39,8 +39,8 @@ void evaluate(PinocchioCalls& calls, const Input<2>& q, const Input<2>& v, const
 }
 
 // Seconds per point of computeRNEADerivatives and ComputeRNEASecondOrderDerivatives.
-double time_calls(const std::string& archive, const Input<2>& q, const Input<2>& v,
-                  const Input<2>& a, int repeats) {
+double time_pinocchio_calls(const std::string& archive, const Input<2>& q, const Input<2>& v,
+                            const Input<2>& a, int repeats) {
   const pinocchio::Model model = hovi::read_archive(archive);
   PinocchioCalls calls(model);
   const auto start = std::chrono::steady_clock::now();
@@ -51,6 +51,7 @@ double time_calls(const std::string& archive, const Input<2>& q, const Input<2>&
 
 }  // namespace
 
-NB_MODULE(pinocchio_calls, m) {
-  m.def("time_calls", &time_calls, "archive"_a, "q"_a, "v"_a, "a"_a, "repeats"_a);
+NB_MODULE(hovi_benchmarks, m) {
+  m.def("time_pinocchio_calls", &time_pinocchio_calls, "archive"_a, "q"_a, "v"_a, "a"_a,
+        "repeats"_a);
 }

@@ -1,10 +1,10 @@
 // The choice of instruction set: the kernels of a module are compiled once for each.
 //
 // A module declares a table of functions `Kernels` with the static members `baseline` and `avx2`;
-// kernels.cpp.in defines them, in a unit of its own for each instruction set. These units share no
-// inline function with any other: the linker could keep the copy that was compiled for the larger
-// instruction set. So only plain data passes between them and the others, and no library's
-// templates.
+// CMake makes a unit that defines one of them, from kernels.in, for each instruction set. These
+// units share no inline function with any other: the linker could keep the copy that was compiled
+// for the larger instruction set. So only plain data passes between them and the others, and no
+// library's templates.
 #pragma once
 
 namespace hovi {
