@@ -20,8 +20,6 @@ from hovi.__main__ import EXTENSION, MEMORY
 TOP = Path(__file__).resolve().parents[1]
 FOLDERS = ("src", "tests", "examples", "docs", "models", ".ci")
 TABLES = "docs/tables/"
-OPTIONAL = {"hovi._native.pinocchio_calls"}
-"""Compiled only where a benchmark asks for it."""
 BUILT = ("docs/_build", "docs/gallery")
 TEXTS = {"", ".cpp", ".hpp", ".in", ".markdown", ".md", ".py", ".pyi", ".rst", ".toml", ".txt"}
 
@@ -82,7 +80,7 @@ def is_path(path: str) -> bool:
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_what_a_text_names_exists(page: Path) -> None:
     text = (TOP / page).read_text()
-    wrong = [each for each in names(text) if each[0] not in OPTIONAL and not is_name(each[0])]
+    wrong = [each for each in names(text) if not is_name(each[0])]
     wrong += [each for each in paths(text) if not is_path(each[0])]
     assert not [f"{page}:{text.count(chr(10), 0, start) + 1}: {name}" for name, start in wrong]
 
