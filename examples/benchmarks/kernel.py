@@ -21,7 +21,7 @@ try:
 except ImportError as error:
     raise SystemExit(
         "Pinocchio's own derivatives are not compiled: run `pip install -C "
-        "cmake.define.HOVI_BENCHMARKS=ON .` in hovi's folder, which needs 3 GB of free memory."
+        "cmake.define.HOVI_BENCHMARKS=ON .` in hovi's folder."
     ) from error
 
 ROBOTS = {
