@@ -65,6 +65,11 @@ def test_a_time_limit_is_a_positive_time(limit: Any) -> None:
         PlanOptions(time_limit=limit)
 
 
+def test_a_scheme_is_a_name_or_a_table() -> None:
+    with pytest.raises(InputError, match="expected a Scheme, got a int"):
+        PlanOptions(scheme=2)  # type: ignore[arg-type]
+
+
 def test_times_may_be_texts(arm_scene: Scene) -> None:
     told = {"limits": "none", "time_limit": "1.5 min"}
     one = hovi.plan(arm_scene, HANG, REACH_Q, "500 ms", **told)

@@ -11,7 +11,7 @@ from typing import Any, Self
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError
+from hovi.errors import InputError, expect
 from hovi.planning.clearance.clearance import MARGIN, Clearance
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.goals import Via
@@ -130,14 +130,14 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         keep_whole_numbers(self)
-        via = self.via
+        via, most = self.via, self.most_seconds
         if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
             raise InputError(f"via is a list of hovi.Via(time, goal), not {via!r}.")
-        if self.most_seconds is not None and not self.most_seconds > 0:
+        if most is not None and not most > 0:
             raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
         object.__setattr__(self, "via", tuple(via))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
-        _ = self.table  # an unknown scheme speaks at once
+        expect(self.table, Scheme, "a name such as 'galerkin-2' as the scheme")
 
     @property
     def most_seconds(self) -> float | None:
