@@ -5,14 +5,14 @@ from __future__ import annotations
 from hovi.errors import InputError
 
 
-def positive_seconds(flag: str, said: str) -> float:
+def positive_seconds(flag: str, text: str) -> float:
     """What a flag says: a number of seconds, or a text such as "2 min". Raises InputError."""
     from hovi.planning.problem.values import seconds
 
     try:
-        number = float(said)
+        number = float(text)
     except ValueError:
-        number = seconds(said, flag)
+        number = seconds(text, flag)
     if not 0 < number < float("inf"):
         raise InputError(f"{flag} must be a positive number of seconds, not {number}.")
     return number

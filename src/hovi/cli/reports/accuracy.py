@@ -8,7 +8,7 @@ import numpy as np
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.motion_error import MotionError
-from hovi.planning.problem.tolerance import as_said
+from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
@@ -39,7 +39,7 @@ def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
         for done in accuracy.rounds
     ]
     return {
-        "tolerance": as_said(task.options.tolerance),
+        "tolerance": as_number_or_text(task.options.tolerance),
         "tolerance_reached": accuracy.reached,
         "tolerance_reason": accuracy.reason or None,
         "errors": None if accuracy.estimate is None else errors_json(accuracy.estimate),

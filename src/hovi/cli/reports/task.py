@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 def describe_task(task: Task) -> str:
     """The ends, the scheme, the scene and the robot of a task."""
-    from hovi.planning.problem.tolerance import as_said
+    from hovi.planning.problem.tolerance import as_number_or_text
 
     robot, options = task.scene.robot, task.options
     how = f"{options.scheme_name} on {options.intervals} intervals"
     if options.tolerance is not None:
-        how = f"tolerance {as_said(options.tolerance)}"
+        how = f"tolerance {as_number_or_text(options.tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
     if options.clearance.wanted:

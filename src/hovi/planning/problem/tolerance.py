@@ -107,7 +107,7 @@ class Tolerance:
         return f"{size / LENGTHS[unit]:.2g} {unit} at {at}"
 
 
-def as_said(tolerance: float | str | Tolerance | None) -> float | str | None:
+def as_number_or_text(tolerance: float | str | Tolerance | None) -> float | str | None:
     """A number or a text that `Tolerance.of` takes for the same tolerance; None for None."""
     if not isinstance(tolerance, Tolerance):
         return tolerance

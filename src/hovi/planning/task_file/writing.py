@@ -9,7 +9,7 @@ from typing import Any
 import tomlkit
 
 from hovi.errors import SceneError, SchemeError
-from hovi.planning.problem.tolerance import as_said
+from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.search.option_fields import about
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
@@ -25,7 +25,7 @@ from hovi.system.files import reason, whole_file
 
 _TABLES = ("limits", "start", "goal", "via", "obstacles", "scheme")
 """Keys that may hold tables, in the order in which those are written."""
-_NOTHING: tuple[Any, ...] = (None, [], {})
+_NOTHING: tuple[Any, ...] = (None, [])
 
 
 def save_task(task: Task, path: str | Path) -> Path:
@@ -34,14 +34,15 @@ def save_task(task: Task, path: str | Path) -> Path:
     task: what to write.
     path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that
         came from a file is written beside it when it is not there yet, its SRDF too.
-    Raises SceneError when the robot has no file, or when another file of the same name is there.
+    Raises SceneError when the robot has no file, when another file of the same name is there, and
+    for an option that scene files have no key for.
     """
     path = Path(path)
-    source = task.scene.robot.source
+    content = tomlkit.dumps(_document(task, path.parent)).encode("utf-8")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _keep_robot_beside(source, path)
-        _write(path, tomlkit.dumps(_document(task, path.parent)).encode("utf-8"))
+        _keep_robot_beside(task.scene.robot.source, path)
+        _write(path, content)
     except OSError as refused:
         raise SceneError(f"{path} cannot be written: {reason(refused)}.") from None
     return path
@@ -50,15 +51,15 @@ def save_task(task: Task, path: str | Path) -> Path:
 def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     """The task as TOML, which wants tables behind what is none."""
     robot = task.scene.robot
-    said = {
+    keys = {
         **_robot_keys(task, folder),
         "duration": _duration(task.duration),
         **_option_keys(task),
         "start": state_table(task.start, robot, "start"),
         "goal": goal_table(task.goal, robot),
     }
-    plain = {key: value for key, value in said.items() if not _is_table(value)}
-    tables = {key: said[key] for key in _TABLES if _is_table(said.get(key))}
+    plain = {key: value for key, value in keys.items() if not _is_table(value)}
+    tables = {key: keys[key] for key in _TABLES if _is_table(keys.get(key))}
     document = tomlkit.document()
     for key, value in (plain | tables).items():
         if value not in _NOTHING:
@@ -91,20 +92,20 @@ def _option_keys(task: Task) -> dict[str, Any]:
     plain = {name: _plain(name, options) for name in PLAIN}
     shaped = {
         "limits": limits_value(options.limits, robot),
-        "tolerance": as_said(options.tolerance),
+        "tolerance": as_number_or_text(options.tolerance),
         "via": [via_table(each, robot) for each in options.via],
         "obstacles": [each.to_dict() for each in options.obstacles],
         "scheme": {"name": _scheme_name(options), "intervals": options.intervals},
         "intervals": None,
     }
-    said = plain | shaped
+    keys = plain | shaped
     for name in about(PlanOptions):
-        if name not in said and not _is_default(name, options):
+        if name not in keys and not _is_default(name, options):
             raise SceneError(
                 f"a scene file cannot say {name!r}: give it to hovi.plan_task, and save the task "
                 "without it."
             )
-    return {name: said[name] for name in about(PlanOptions) if name in said}
+    return {name: keys[name] for name in about(PlanOptions) if name in keys}
 
 
 def _plain(name: str, options: PlanOptions) -> Any:
