@@ -1,6 +1,6 @@
-"""The errors that hovi raises: one root, one class per door through which bad input comes.
+"""The errors that hovi raises: one root, one class per kind of invalid input.
 
-Every message is one sentence or two: what was expected, what came, what to do.
+Every message says in one or two sentences what was expected, what was found and what to do.
 """
 
 from __future__ import annotations
@@ -9,20 +9,20 @@ import difflib
 import re
 from collections.abc import Iterable
 
-_LONGEST = 256  # characters that are compared: the time grows with their square
-_MOST = 60  # names that are listed
-_WORD = re.compile(r"\S{160,}|\s{160,}")
+_MAX_COMPARED = 256  # characters of a name; the time of a comparison grows with their square
+_MAX_LISTED = 60  # names in a message
+_LONG_RUN = re.compile(r"\S{160,}|\s{160,}")
 
 
 class HoviError(Exception):
     """Root of everything that hovi raises on purpose.
 
-    Its sentence quotes what strangers wrote, so it stays on one line, holds no control characters
-    and shortens words that nobody would read.
+    Messages may quote untrusted input, so control characters are escaped, line breaks included, and
+    very long words are shortened.
     """
 
     def __init__(self, sentence: str = "") -> None:
-        super().__init__(_readable(sentence))
+        super().__init__(_sanitized(sentence))
 
 
 class InputError(HoviError):
@@ -30,19 +30,19 @@ class InputError(HoviError):
 
 
 class ChartError(InputError):
-    """A motion turns an orientation too far within an interval for one chart."""
+    """An orientation turns too far within one interval for its chart."""
 
 
 class ModelError(HoviError):
-    """A robot model cannot be read, is not physical, or cannot be planned on."""
+    """A robot model cannot be read, is not physical, or does not support planning."""
 
 
 class SceneError(HoviError):
-    """A scene or its file names something that does not exist or does not fit."""
+    """A scene or its file names something that does not exist or is inconsistent."""
 
 
 class SchemeError(HoviError):
-    """A scheme is unknown, or is not regular and so does not define a motion."""
+    """A scheme is unknown, or is not regular and so does not determine a motion."""
 
 
 class TrajectoryFileError(HoviError):
@@ -50,33 +50,33 @@ class TrajectoryFileError(HoviError):
 
 
 class UnmeasurableError(HoviError):
-    """A method cannot solve a scene, or there is no motion to measure methods against."""
+    """A method cannot solve a scene, or there is no reference motion to compare methods with."""
 
 
 class DisplayError(HoviError):
-    """A picture, a page or a viewer cannot be made."""
+    """A figure, a page or a viewer cannot be created."""
 
 
 def expect(value: object, kind: type, hint: str) -> None:
-    """Raise InputError for a value of another class; hint: what to give instead."""
+    """Raise InputError unless `value` is an instance of `kind`; hint: what to pass instead."""
     if not isinstance(value, kind):
         raise InputError(f"expected a {kind.__name__}, got a {type(value).__name__}; give {hint}.")
 
 
 def nearest(name: str, valid: Iterable[str]) -> str:
-    """The end of a sentence about an unknown name: the nearest valid names, or all of them.
+    """The end of a message about an unknown name: the closest valid names, or all of them.
 
-    name: what came.
-    valid: the names that would have been accepted.
+    name: the unknown name.
+    valid: the accepted names.
     """
     names = sorted(valid)
-    close = difflib.get_close_matches(name[:_LONGEST], names, n=3, cutoff=0.5)
+    close = difflib.get_close_matches(name[:_MAX_COMPARED], names, n=3, cutoff=0.5)
     if close:
         return "did you mean " + " or ".join(repr(c) for c in close) + "?"
-    more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
-    return "valid names are " + ", ".join(repr(n) for n in names[:_MOST]) + more + "."
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
+    return "valid names are " + ", ".join(repr(n) for n in names[:_MAX_LISTED]) + more + "."
 
 
-def _readable(sentence: str) -> str:
-    shorter = _WORD.sub(lambda word: f"{word[0][:80]}...{word[0][-40:]}", sentence)
+def _sanitized(sentence: str) -> str:
+    shorter = _LONG_RUN.sub(lambda word: f"{word[0][:80]}...{word[0][-40:]}", sentence)
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in shorter)

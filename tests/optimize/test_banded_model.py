@@ -1,4 +1,4 @@
-"""The banded model is the dense one: its sums, its solves and its verdict on definiteness."""
+"""The banded model agrees with the dense one: sums, solves and definiteness."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DEFINITE, INDEFINITE = 40.0, 0.0
 def build(
     n: int, modes: tuple[int, ...], curvature: float, seed: int = 0, *, equal: bool = False
 ) -> tuple[IntervalProblem, BandModel]:
-    """Unequal steps see the velocity of a node at different scales; equal ones need none."""
+    """Unequal steps scale the velocity of a node differently on both sides; equal steps do not."""
     N = len(modes)
     steps = np.ones(N) if equal else np.random.default_rng(N).uniform(0.1, 1.0, N)
     problem = random_problem(n, modes, steps, curvature, seed)
@@ -30,7 +30,9 @@ def build(
 
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_the_band_holds_the_lower_half_of_the_dense_matrix(n: int, modes: tuple[int, ...]) -> None:
+def test_the_band_stores_the_lower_triangle_of_the_dense_matrix(
+    n: int, modes: tuple[int, ...]
+) -> None:
     problem, model = build(n, modes, INDEFINITE)
     size = model.layout.size
     band = model.layout.assemble(problem.nodal.hessian)
@@ -56,7 +58,7 @@ def test_scatter_and_gather_are_transposes(n: int, modes: tuple[int, ...]) -> No
 
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> None:
+def test_the_metric_product_equals_the_dense_one(n: int, modes: tuple[int, ...]) -> None:
     problem, model = build(n, modes, INDEFINITE)
     s = np.random.default_rng(1).normal(size=problem.gradient.shape)
     expected = problem.metric @ s
@@ -68,7 +70,9 @@ def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> 
 @pytest.mark.parametrize("equal", [True, False], ids=["equal steps", "unequal steps"])
 @pytest.mark.parametrize("shift", [0.0, 0.7, 30.0])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float, equal: bool) -> None:
+def test_solves_equal_dense_solves(
+    n: int, modes: tuple[int, ...], shift: float, equal: bool
+) -> None:
     problem, model = build(n, modes, DEFINITE, equal=equal)
     factor = model.factor(shift)
     assert factor is not None
@@ -95,7 +99,7 @@ def test_steps_come_with_their_slope_and_length(
 
 
 @pytest.mark.parametrize("n", [5, 6, 7, 16, 30])
-def test_any_processor_solves_arms_of_any_size(n: int) -> None:
+def test_every_kernel_solves_every_matrix_size(n: int) -> None:
     problem, model = build(n, (2, 0, 1, 2, 2), DEFINITE + 10.0 * n)
     layout = model.layout
     band = layout.assemble(problem.nodal.hessian)
@@ -109,7 +113,7 @@ def test_any_processor_solves_arms_of_any_size(n: int) -> None:
 
 @pytest.mark.parametrize("curvature", [DEFINITE, INDEFINITE])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_a_factor_is_missing_just_where_the_matrix_is_not_positive_definite(
+def test_factorization_fails_exactly_where_the_matrix_is_not_positive_definite(
     n: int, modes: tuple[int, ...], curvature: float
 ) -> None:
     for seed in range(5):
@@ -120,7 +124,7 @@ def test_a_factor_is_missing_just_where_the_matrix_is_not_positive_definite(
                 assert (model.factor(shift) is not None) == (shift > edge)
 
 
-def test_ends_and_missing_modes_are_no_unknowns() -> None:
+def test_end_nodes_and_absent_modes_are_not_unknowns() -> None:
     problem, model = build(2, (1, 0, 2), DEFINITE)
     assert model.layout.size == 2 * (2 * 2) + 2 * (1 + 0 + 2)
     local = model.gather(np.ones(model.layout.size))

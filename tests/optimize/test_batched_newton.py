@@ -1,4 +1,4 @@
-"""Newton on a batch: roots found, roots lost, and one by one the same."""
+"""Newton's method on a batch: convergence and reported failures."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def circle(u: Array) -> tuple[Array, Array]:
     return F, np.stack([np.stack([2 * x, 2 * y], 1), np.stack([one, -one], 1)], axis=1)
 
 
-def test_every_system_of_a_batch_reaches_its_root() -> None:
+def test_every_system_of_a_batch_converges_to_its_root() -> None:
     u, found = newton(circle, np.array([[3.0, 1.0], [-2.0, -0.5], [1.0, 1.0]]))
     assert found.all()
     np.testing.assert_allclose(u, [[1, 1], [-1, -1], [1, 1]], rtol=0, atol=1e-15)
 
 
-def test_a_root_of_zero_and_no_unknowns_are_roots() -> None:
+def test_a_zero_root_and_an_empty_system_converge() -> None:
     u, found = newton(lambda u: (u, np.ones((len(u), 1, 1))), np.array([[1e-3], [0.0]]))
     assert found.all()
     np.testing.assert_array_equal(u, 0.0)
@@ -32,7 +32,7 @@ def test_a_root_of_zero_and_no_unknowns_are_roots() -> None:
     assert found.all()
 
 
-def test_a_system_without_root_is_reported() -> None:
+def test_a_system_without_a_root_is_reported() -> None:
     def no_root(u: Array) -> tuple[Array, Array]:
         return u**2 + 1, 2 * u[:, :, None]
 

@@ -1,4 +1,4 @@
-"""The interior point on small problems whose solutions are known."""
+"""The interior-point method on small problems with known solutions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class DenseFactor:
 
 
 class DenseModel(QuadraticModel):
-    """A model of one interval in as many unknowns, with the unit metric."""
+    """A model of one interval with n unknowns and the unit metric."""
 
     def __init__(self, gradient: Array, hessian: Array) -> None:
         n = len(gradient)
@@ -83,8 +83,8 @@ class Program(BoundedObjective[Array]):
     def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
         return float(self._g @ step), (self._J @ step).reshape(1, -1)
 
-    def follow(self, fraction: float) -> None:
-        """Nothing is lifted here."""
+    def apply_fraction(self, fraction: float) -> None:
+        """There are no lifted variables."""
 
     def retract(self, x: Array, step: Array, model: QuadraticModel) -> Array:
         return x + step
@@ -143,7 +143,7 @@ PROGRAMS = {
         [3, 3, 3, 3],
         [0, 1, 2, -1],
     ),
-    "bounds that nothing reaches": (
+    "inactive bounds": (
         2,
         lambda x: (x[0] - 1) ** 2 + 3 * (x[1] - 2) ** 2 + 1,
         lambda x: [x[0], x[1]],
@@ -166,14 +166,14 @@ def test_the_known_minimum_is_found(name: str) -> None:
     np.testing.assert_allclose(outcome.x, minimum, atol=2e-4)
 
 
-def test_multipliers_are_those_of_the_optimality_conditions() -> None:
+def test_multipliers_satisfy_the_optimality_conditions() -> None:
     """min (x - 3)^2 with x <= 1: 2 (x - 3) + z = 0, so z = 4."""
     program = Program(1, lambda x: (x[0] - 3) ** 2, lambda x: [x[0]], [0], [1])
     outcome = minimize_bounded(program, np.array([0.5]), Options())
     assert outcome.barrier.multipliers[0, 0] == pytest.approx(4.0, rel=1e-6)
 
 
-def test_budgets_and_interrupts_keep_the_point_so_far() -> None:
+def test_limits_and_interrupts_return_the_current_point() -> None:
     n, f, y, lower, upper, start, _ = PROGRAMS["hock-schittkowski 43, from outside"]
     x = np.array(start, dtype=float)
     few = minimize_bounded(Program(n, f, y, lower, upper), x, Options(max_iterations=2))
@@ -189,13 +189,13 @@ def test_budgets_and_interrupts_keep_the_point_so_far() -> None:
     assert stopped.iterations == 3
 
 
-def test_a_program_without_a_feasible_point_is_not_called_solved() -> None:
+def test_an_infeasible_program_is_not_reported_as_solved() -> None:
     program = Program(1, lambda x: x[0] ** 2, lambda x: [x[0], x[0]], [2, -INF], [INF, 1])
     outcome = minimize_bounded(program, np.array([0.0]), Options(max_iterations=200))
     assert not (outcome.stop is Stop.STATIONARY and outcome.feasible)
 
 
-def test_the_barrier_measures_gaps_and_keeps_slacks_inside() -> None:
+def test_the_barrier_keeps_slacks_inside_and_matches_its_gradient() -> None:
     bounds = Bounds(np.array([[0.0, -INF, 0.0]]), np.array([[1.0, 2.0, INF]]), np.ones((1, 1)))
     barrier = Barrier.central(bounds, np.array([[5.0, 1.0, 3.0]]), mu=0.1)
     assert ((barrier.s > bounds.lower) & (barrier.s < bounds.upper)).all()
@@ -207,5 +207,5 @@ def test_the_barrier_measures_gaps_and_keeps_slacks_inside() -> None:
     up, down = (barrier.value(np.ones((1, 1)), barrier.s + sign * change) for sign in (1, -1))
     slope = (up - down) / (2 * e)
     assert slope == pytest.approx(float(barrier.gradient.sum()), rel=1e-5)
-    assert barrier.longest(np.array([[1.0, -1e9, 1e9]])) < 0.0101
+    assert barrier.max_share(np.array([[1.0, -1e9, 1e9]])) < 0.0101
     assert barrier.zu[0, 2] == barrier.zl[0, 1] == 0.0

@@ -1,4 +1,4 @@
-"""Merging in pairs gives the dense answer and the inertia, and keeps its digits at small h."""
+"""Merging in pairs gives the dense solution and the inertia, and is accurate at small h."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def coordinates(problem: IntervalProblem, model: MergeTreeModel) -> Array:
 
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_the_coordinates_of_the_tree_reach_every_path_and_no_other(
+def test_the_coordinates_of_the_tree_span_exactly_the_discrete_paths(
     n: int, modes: tuple[int, ...]
 ) -> None:
     problem, model = build(n, modes, INDEFINITE)
@@ -64,7 +64,7 @@ def test_scatter_and_gather_are_transposes(n: int, modes: tuple[int, ...]) -> No
 
 
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> None:
+def test_the_metric_product_equals_the_dense_one(n: int, modes: tuple[int, ...]) -> None:
     problem, model = build(n, modes, INDEFINITE)
     C = coordinates(problem, model)
     s = np.random.default_rng(1).normal(size=problem.gradient.shape)
@@ -75,7 +75,7 @@ def test_the_metric_product_is_the_dense_one(n: int, modes: tuple[int, ...]) -> 
 
 @pytest.mark.parametrize("shift", [0.0, 0.7, 30.0])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float) -> None:
+def test_solves_equal_dense_solves(n: int, modes: tuple[int, ...], shift: float) -> None:
     problem, model = build(n, modes, DEFINITE)
     factor = model.factor(shift)
     assert factor is not None
@@ -86,7 +86,7 @@ def test_solves_are_dense_solves(n: int, modes: tuple[int, ...], shift: float) -
 
 @pytest.mark.parametrize("curvature", [DEFINITE, INDEFINITE])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_a_factor_is_missing_just_where_the_matrix_is_not_positive_definite(
+def test_factorization_fails_exactly_where_the_matrix_is_not_positive_definite(
     n: int, modes: tuple[int, ...], curvature: float
 ) -> None:
     for seed in range(5):
@@ -99,7 +99,7 @@ def test_a_factor_is_missing_just_where_the_matrix_is_not_positive_definite(
 
 @pytest.mark.parametrize("curvature", [DEFINITE, 8.0, INDEFINITE, -8.0])
 @pytest.mark.parametrize(("n", "modes"), SIZES)
-def test_negative_eigenvalues_are_those_of_the_dense_matrix(
+def test_the_count_of_negative_eigenvalues_equals_the_dense_one(
     n: int, modes: tuple[int, ...], curvature: float
 ) -> None:
     for seed in range(5):
@@ -138,7 +138,7 @@ def test_band_and_tree_take_the_same_newton_step(n: int, modes: tuple[int, ...])
 
 
 def merged(grid: Grid, L: CasadiLagrangian, path: DiscretePath) -> tuple[MergeTreeModel, Array]:
-    """The model of the action at a path in regular columns, and those columns, (N, m, n)."""
+    """The model of the action at a path in regularized columns, and those columns, (N, m, n)."""
     expansion = DiscreteLagrangian(L, grid).expand(path, "regular")
     rows = grid.schemes[0].regular_table[:, 2]
     metric = (rows.T * grid.schemes[0].weights) @ rows * (1 / grid.steps[:, None, None]) ** 3
@@ -161,7 +161,7 @@ def quadratic(potential: float) -> CasadiLagrangian:
 
 
 @pytest.mark.parametrize("step", [1e-3, 1e-5])
-def test_the_spline_is_exact_however_small_the_step(step: float) -> None:
+def test_the_spline_is_exact_at_any_step_size(step: float) -> None:
     # from the cubic plus a wave with zero ends, one Newton step leads to the cubic
     N = 10_000
     grid = Grid.uniform(N * step, N, galerkin(0))
@@ -191,7 +191,7 @@ def test_the_spline_is_exact_however_small_the_step(step: float) -> None:
     np.testing.assert_allclose(found[:, 1] / h, (v - wave[1])[:-1], rtol=0, atol=1e-12 / T)
 
 
-def test_a_motion_of_ten_thousand_intervals_is_the_analytic_one() -> None:
+def test_ten_thousand_intervals_reproduce_the_analytic_motion() -> None:
     # L = a^2/2 + v^2/2: q'''' = q'', and q = e^t + e^-t + t - 1 among others
     N, T = 10_000, 2.0
     grid = Grid.uniform(T, N, galerkin(1))

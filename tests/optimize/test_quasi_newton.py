@@ -1,4 +1,4 @@
-"""Quasi-Newton steps: they never go up, and make up for a factorisation from elsewhere."""
+"""Quasi-Newton steps never increase the value and correct a factorisation of a nearby Hessian."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Dense:
 
 
 class Bowl(Smooth[Array]):
-    """1 + 1/2 x.H x + |x|^4 / 4, not defined outside a ball; it counts its gradients."""
+    """1 + 1/2 x.H x + |x|^4 / 4, undefined outside a ball; counts its gradients."""
 
     def __init__(self, H: Array, quartic: float = 1.0, radius: float = np.inf) -> None:
         self.H, self.quartic, self.radius = H, quartic, radius
@@ -48,13 +48,13 @@ def bowl(size: int, seed: int, quartic: float = 1.0, radius: float = np.inf) -> 
     return Bowl(A @ A.T + np.eye(size), quartic, radius)
 
 
-def test_the_right_factorisation_of_a_quadratic_needs_one_step() -> None:
+def test_a_quadratic_with_its_own_factorisation_takes_one_step() -> None:
     objective = bowl(6, 0, quartic=0.0)
     x = descend(objective, np.arange(6.0), Dense(objective.H), 1, 0.0)
     np.testing.assert_allclose(x, 0.0, rtol=0, atol=1e-12)
 
 
-def test_one_direction_of_wrong_curvature_is_learnt_in_a_few_steps() -> None:
+def test_a_rank_one_error_of_the_hessian_is_corrected_in_a_few_steps() -> None:
     objective = bowl(8, 1, quartic=0.0)
     u = np.random.default_rng(2).normal(size=8)
     for extra in (5.0, 50.0):
@@ -64,11 +64,11 @@ def test_one_direction_of_wrong_curvature_is_learnt_in_a_few_steps() -> None:
         for _ in range(6):
             plain = plain - np.linalg.solve(objective.H, stiffer.gradient(plain))
         assert stiffer.value(x) - 1.0 < 1e-6
-        assert stiffer.value(plain) > 1e3  # the same factorisation without learning
+        assert stiffer.value(plain) > 1e3  # the same factorisation without updates
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_step_goes_up_even_where_the_objective_ends(seed: int) -> None:
+def test_no_step_increases_the_value_even_at_the_edge_of_the_domain(seed: int) -> None:
     objective = bowl(5, seed, quartic=3.0, radius=2.5)
     x = np.random.default_rng(seed).normal(size=5)
     x *= 2.4 / np.linalg.norm(x)
@@ -78,7 +78,7 @@ def test_no_step_goes_up_even_where_the_objective_ends(seed: int) -> None:
     assert values[-1] < values[0]
 
 
-def test_steps_that_promise_too_little_are_not_taken() -> None:
+def test_steps_with_a_negligible_predicted_decrease_are_not_taken() -> None:
     objective = bowl(4, 3)
     x = 1e-3 * np.ones(4)
     assert descend(objective, x, Dense(objective.H), 5, 1.0) is x

@@ -1,4 +1,4 @@
-"""The trust region on small classical functions: minima, saddles, budgets, and bad numbers."""
+"""The trust region on classical test functions: minima, saddles, limits, non-finite numbers."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def barrier(x: ca.SX) -> ca.SX:
     ],
 )
 @pytest.mark.parametrize("radius", [0.01, 10.0, 1e6])
-def test_the_minimum_is_found_from_afar(
+def test_the_minimum_is_found_from_a_distant_start(
     n: int,
     f: Callable[[ca.SX], ca.SX],
     start: list[float],
@@ -163,13 +163,13 @@ def test_a_convex_quadratic_takes_one_step() -> None:
     np.testing.assert_allclose(outcome.x, 2.0, rtol=1e-15)
 
 
-def test_a_minimum_of_value_zero_is_recognised_by_the_step() -> None:
+def test_a_minimum_of_value_zero_is_recognized_by_the_step() -> None:
     outcome = minimize(objective(2, rosenbrock), np.array([1.0, 1.0]), Options())
     assert (outcome.stop, outcome.iterations) == (Stop.STATIONARY, 1)
     assert outcome.value == 0.0
 
 
-def test_the_history_tells_every_step_and_the_value_never_rises() -> None:
+def test_the_history_records_every_step_and_the_value_never_increases() -> None:
     reports: list[tuple[int, float]] = []
     problem = objective(2, rosenbrock)
     outcome = minimize(
@@ -183,8 +183,8 @@ def test_the_history_tells_every_step_and_the_value_never_rises() -> None:
 
 
 @dataclass
-class Remembering(Smooth):
-    """Like Smooth; tells which of its models were asked for without an earlier one."""
+class RecordingModels(Smooth):
+    """Like Smooth; records which of its models were requested without a previous one."""
 
     exact: list[bool] = field(default_factory=list)
 
@@ -196,11 +196,11 @@ class Remembering(Smooth):
 
 
 @pytest.mark.parametrize("f", [rosenbrock, himmelblau, beale])
-def test_the_last_step_is_that_of_an_exact_model_and_leaves_nothing_but_rounding(
+def test_the_last_step_uses_an_exact_model_and_converges_to_rounding(
     f: Callable[[ca.SX], ca.SX],
 ) -> None:
     x = ca.SX.sym("x", 2)
-    problem = Remembering(x, f(x) + 1)
+    problem = RecordingModels(x, f(x) + 1)
     outcome = minimize(problem, np.array([0.6, 0.2]), Options(decrease=1e-9, exact=True))
     assert outcome.stop is Stop.STATIONARY
     assert outcome.convex
@@ -211,7 +211,7 @@ def test_the_last_step_is_that_of_an_exact_model_and_leaves_nothing_but_rounding
     assert np.abs(np.linalg.solve(hessian, gradient)).max() < 1e-12
 
 
-def test_only_a_minimum_is_told_to_be_convex() -> None:
+def test_only_a_minimum_is_reported_as_convex() -> None:
     options = Options(exact=True, escape_saddles=False)
     assert not minimize(objective(2, two_wells), np.zeros(2), options).convex
     assert minimize(objective(2, two_wells), np.array([0.1, 1.0]), options).convex
@@ -228,17 +228,17 @@ def test_a_saddle_is_left_along_negative_curvature() -> None:
     assert outcome.saddles_left == [0.0]
 
 
-def test_a_saddle_is_the_answer_where_it_is_asked_for() -> None:
+def test_a_saddle_is_returned_if_escape_is_off() -> None:
     outcome = minimize(objective(2, two_wells), np.zeros(2), Options(escape_saddles=False))
     assert (outcome.stop, outcome.iterations) == (Stop.STATIONARY, 0)
     np.testing.assert_array_equal(outcome.x, 0.0)
 
 
 @pytest.mark.parametrize("start", [[1.0, 0.0], [-3.0, 0.0], [1e-3, 0.0]])
-def test_a_gradient_without_a_part_along_negative_curvature_leads_to_no_saddle(
+def test_a_gradient_orthogonal_to_negative_curvature_does_not_end_in_a_saddle(
     start: list[float],
 ) -> None:
-    # the hard case: the valley x[1] = 0 leads straight into the saddle
+    # the hard case: the valley x[1] = 0 leads to the saddle
     outcome = minimize(objective(2, two_wells), np.array(start), Options())
     assert outcome.stop is Stop.STATIONARY
     assert outcome.value == pytest.approx(-0.25, rel=1e-12)
@@ -250,7 +250,7 @@ def test_a_maximum_is_left_too() -> None:
     assert outcome.value == pytest.approx(-3.0, rel=1e-12)
 
 
-# Budgets
+# Limits
 
 
 def test_the_iteration_limit_returns_the_best_so_far() -> None:
@@ -276,7 +276,7 @@ def test_the_time_limit_returns_the_best_so_far(monkeypatch: pytest.MonkeyPatch)
     assert outcome.value == min(problem.values) == problem.value(outcome.x)
 
 
-def test_no_time_is_no_step() -> None:
+def test_an_expired_time_limit_allows_no_step() -> None:
     outcome = minimize(objective(2, rosenbrock), np.array([-1.2, 1.0]), Options(time_limit=-1.0))
     assert (outcome.stop, outcome.iterations) == (Stop.TIME_LIMIT, 0)
 
@@ -299,7 +299,7 @@ def test_an_interrupt_returns_the_best_so_far(evaluations: int) -> None:
     np.testing.assert_allclose(outcome.value, float(problem.function(outcome.x)), rtol=1e-15)
 
 
-def test_an_interrupt_in_the_report_keeps_the_step_before_it() -> None:
+def test_an_interrupt_in_the_callback_keeps_the_previous_step() -> None:
     def report(iteration: int, value: float) -> None:
         if iteration == 3:
             raise KeyboardInterrupt
@@ -310,16 +310,16 @@ def test_an_interrupt_in_the_report_keeps_the_step_before_it() -> None:
     assert outcome.value == float(problem.function(outcome.x)) <= min(problem.values[:3])
 
 
-# Numbers that are none
+# Non-finite numbers
 
 
 @pytest.mark.parametrize("start", [-1.0, 0.0, np.nan])
-def test_a_start_without_a_finite_value_is_given_back(start: float) -> None:
+def test_a_start_without_a_finite_value_diverges_at_once(start: float) -> None:
     outcome = minimize(objective(1, barrier), np.array([start]), Options())
     assert (outcome.stop, outcome.iterations) == (Stop.DIVERGED, 0)
 
 
-def test_steps_to_where_the_value_is_no_number_are_refused() -> None:
+def test_steps_to_a_non_finite_value_are_rejected() -> None:
     problem = objective(1, lambda x: ca.sqrt(x[0]) + 0.1 / x[0])
     outcome = minimize(problem, np.array([5.0]), Options(radius=1e3))
     assert not np.isfinite(problem.values).all()
@@ -330,14 +330,14 @@ def test_steps_to_where_the_value_is_no_number_are_refused() -> None:
 @pytest.mark.parametrize(
     "f", [lambda x: -(x[0] ** 4), lambda x: x[0] ** 3, lambda x: -ca.exp(x[0]), lambda x: -x[0]]
 )
-def test_what_has_no_minimum_is_never_called_stationary(f: Callable[[ca.SX], ca.SX]) -> None:
+def test_an_unbounded_function_is_never_reported_as_stationary(f: Callable[[ca.SX], ca.SX]) -> None:
     outcome = minimize(objective(1, f), np.array([-0.3]), Options(max_iterations=200))
     assert outcome.stop in (Stop.ITERATION_LIMIT, Stop.DIVERGED)
 
 
 @pytest.mark.parametrize("part", ["gradient", "hessian"])
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_derivatives_that_are_no_numbers_end_the_iteration(part: str, bad: float) -> None:
+def test_non_finite_derivatives_end_the_iteration(part: str, bad: float) -> None:
     @dataclass
     class Broken(Smooth):
         def model(
@@ -357,7 +357,7 @@ def test_derivatives_that_are_no_numbers_end_the_iteration(part: str, bad: float
     assert outcome.value == min(value for value in problem.values if np.isfinite(value))
 
 
-def test_wrong_derivatives_end_in_divergence_and_not_in_a_loop() -> None:
+def test_wrong_derivatives_end_as_diverged() -> None:
     @dataclass
     class Uphill(Smooth):
         def model(
@@ -417,7 +417,7 @@ def random_model(n: int, lowest: float, seed: int, hard: bool = False) -> DenseM
 @pytest.mark.parametrize("lowest", [1.0, 1e-6, -1e-6, -1.0])
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 100.0])
 @pytest.mark.parametrize("hard", [False, True])
-def test_a_step_is_as_good_as_the_best_within_three_quarters_of_the_radius(
+def test_a_step_is_nearly_optimal_within_three_quarters_of_the_radius(
     n: int, lowest: float, radius: float, hard: bool
 ) -> None:
     for seed in range(5):
@@ -434,7 +434,7 @@ def test_a_step_is_as_good_as_the_best_within_three_quarters_of_the_radius(
 @pytest.mark.parametrize("lowest", [1.0, 1e-6, -1e-6, -1.0])
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 100.0])
 @pytest.mark.parametrize("hard", [False, True])
-def test_the_predicted_decrease_is_that_of_the_model(
+def test_the_predicted_decrease_equals_that_of_the_model(
     n: int, lowest: float, radius: float, hard: bool
 ) -> None:
     for seed in range(5):
@@ -455,7 +455,7 @@ def test_a_step_along_negative_curvature_goes_downhill(radius: float) -> None:
             assert along * (lowest @ model.gradient) < 0
 
 
-def test_a_newton_step_within_the_radius_is_taken_whatever_the_last_shift() -> None:
+def test_a_newton_step_within_the_radius_is_taken_for_any_initial_shift() -> None:
     model = random_model(5, 1.0, 0)
     newton = np.linalg.solve(model.hessian, -model.gradient)
     for guess in (0.0, 1e-3, 1.0, 1e3):
@@ -464,7 +464,7 @@ def test_a_newton_step_within_the_radius_is_taken_whatever_the_last_shift() -> N
         np.testing.assert_allclose(trial.step, newton, rtol=1e-9)
 
 
-def test_only_a_stationary_point_is_left_along_negative_curvature_alone() -> None:
+def test_only_a_stationary_point_takes_a_pure_negative_curvature_step() -> None:
     model = random_model(4, -1.0, 0)
     assert not solve_subproblem(model, 1.0, 0.0).along_negative_curvature
     at_rest = DenseModel(0 * model.gradient, model.hessian, model.metric)

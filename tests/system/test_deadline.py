@@ -1,4 +1,4 @@
-"""Deadlines count from when they are made, by the monotonic clock."""
+"""Deadlines start when they are created, by the monotonic clock."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     return clock
 
 
-def test_seconds_run_down_to_zero_and_no_further(clock: Clock) -> None:
+def test_seconds_left_decrease_to_zero(clock: Clock) -> None:
     deadline = Deadline(3.0)
     assert (deadline.seconds_left, deadline.passed) == (3.0, False)
     clock.now += 2.0
@@ -30,14 +30,14 @@ def test_seconds_run_down_to_zero_and_no_further(clock: Clock) -> None:
     assert (deadline.seconds_left, deadline.passed) == (0.0, True)
 
 
-def test_none_is_never(clock: Clock) -> None:
+def test_none_means_no_limit(clock: Clock) -> None:
     never = Deadline()
     clock.now += 1e9
     assert (never.seconds_left, never.passed) == (None, False)
     assert (never.part(0.5).seconds_left, never.part(0.5).passed) == (None, False)
 
 
-def test_a_part_is_a_share_of_what_is_left(clock: Clock) -> None:
+def test_a_part_is_a_share_of_the_time_left(clock: Clock) -> None:
     deadline = Deadline(10.0)
     clock.now += 2.0
     part = deadline.part(0.5)

@@ -1,4 +1,4 @@
-"""Nothing is read from what is not a regular file of a sane size."""
+"""Only regular files of acceptable size are read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READERS: tuple[Callable[[Path], object], ...] = (
 )
 
 
-def test_a_file_up_to_the_limit_passes(tmp_path: Path) -> None:
+def test_files_up_to_the_limit_are_accepted(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"x" * 1000)
     require_file(path, 1000)
@@ -32,9 +32,7 @@ def test_a_file_up_to_the_limit_passes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("read", READERS)
-def test_a_pipe_is_refused_and_not_waited_for(
-    read: Callable[[Path], object], tmp_path: Path
-) -> None:
+def test_a_pipe_is_refused_without_blocking(read: Callable[[Path], object], tmp_path: Path) -> None:
     pipe = tmp_path / "robot.urdf"
     os.mkfifo(pipe)
     with pytest.raises(HoviError, match="it is not a regular file"):
@@ -42,21 +40,23 @@ def test_a_pipe_is_refused_and_not_waited_for(
 
 
 @pytest.mark.parametrize("read", READERS)
-def test_a_device_without_end_is_refused(read: Callable[[Path], object]) -> None:
+def test_an_endless_device_is_refused(read: Callable[[Path], object]) -> None:
     with pytest.raises(HoviError, match="it is not a regular file"):
         read(Path("/dev/zero"))
 
 
 @pytest.mark.parametrize("read", READERS)
-def test_an_impossible_name_is_no_file(read: Callable[[Path], object]) -> None:
+def test_a_name_with_a_nul_byte_is_not_found(read: Callable[[Path], object]) -> None:
     with pytest.raises(HoviError, match=r"no such|there is no"):
         read(Path("a\0b.urdf"))
 
 
 @pytest.mark.parametrize("read", READERS)
-def test_a_huge_file_is_refused_unread(read: Callable[[Path], object], tmp_path: Path) -> None:
+def test_a_huge_file_is_refused_without_reading_it(
+    read: Callable[[Path], object], tmp_path: Path
+) -> None:
     path = tmp_path / "robot.urdf"
     with path.open("wb") as stream:
-        stream.truncate(2**34)  # of zeros that take no room
+        stream.truncate(2**34)  # sparse
     with pytest.raises(HoviError, match=r"it has 17179\.9 MB, and at most"):
         read(path)

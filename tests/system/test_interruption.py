@@ -1,4 +1,4 @@
-"""An interrupt that any part of a call caught ends the whole call, and nothing after it."""
+"""An interrupt caught in any part of a call ends that call, and no later one."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from hovi.system.interruption import (
 
 HANG = np.array([-np.pi / 2, 0.0])
 REACH = np.array([0.3, 0.7])
-FEW = 25
-"""Evaluations that putting the answer together may take."""
+MAX_EVALUATIONS_AFTER = 25
+"""Maximum number of evaluations to build the result after an interrupt."""
 
 SEARCHES: dict[str, dict[str, Any]] = {
     "between limits": {"limits": {"base": "none", "tau": 12.0}},
@@ -43,27 +43,27 @@ SEARCHES: dict[str, dict[str, Any]] = {
 
 
 @interruptible
-def swallowing() -> bool:
+def suppressing() -> bool:
     with contextlib.suppress(KeyboardInterrupt):
         record_interrupt()
         raise KeyboardInterrupt
     return interrupted()
 
 
-def test_an_interrupt_is_remembered_until_the_outermost_call_returns() -> None:
+def test_an_interrupt_is_recorded_until_the_outermost_call_returns() -> None:
     @interruptible
     def outer() -> bool:
-        swallowing()
+        suppressing()
         return interrupted()
 
     assert outer()
     assert not interrupted()
 
 
-def test_a_call_that_raises_leaves_no_interrupt_to_the_next() -> None:
+def test_a_call_that_raises_clears_the_recorded_interrupt() -> None:
     @interruptible
     def ended() -> None:
-        swallowing()
+        suppressing()
         raise_if_interrupted()
 
     with pytest.raises(KeyboardInterrupt):
@@ -71,23 +71,23 @@ def test_a_call_that_raises_leaves_no_interrupt_to_the_next() -> None:
     assert not interruptible(interrupted)()
 
 
-def test_outside_of_calls_nothing_is_remembered() -> None:
+def test_no_interrupt_is_recorded_outside_of_a_call() -> None:
     record_interrupt()
     assert not interrupted()
     raise_if_interrupted()
 
 
-@pytest.mark.parametrize("dropped", [False, True])
+@pytest.mark.parametrize("discarded", [False, True])
 @pytest.mark.parametrize("evaluations", [2, 8])
 @pytest.mark.parametrize("search", SEARCHES)
 def test_an_interrupt_anywhere_ends_every_search(
     search: str,
     evaluations: int,
-    dropped: bool,
+    discarded: bool,
     arm_scene: Scene,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Also one that Python drops, as in a destructor, of which only the handler tells."""
+    """Also where Python discards the exception, as in a destructor, and only the record remains."""
     jets, calls = DiscreteLagrangian.jets, 0
 
     def interrupting(self: DiscreteLagrangian, path: DiscretePath) -> Any:
@@ -95,13 +95,15 @@ def test_an_interrupt_anywhere_ends_every_search(
         calls += 1
         if calls == evaluations:
             record_interrupt()
-            if not dropped:
+            if not discarded:
                 raise KeyboardInterrupt
         return jets(self, path)
 
     monkeypatch.setattr(DiscreteLagrangian, "jets", interrupting)
-    asked = {"goal": REACH, "duration": 1.0, "limits": "none", "intervals": 12} | SEARCHES[search]
-    found = plan(arm_scene, HANG, **asked)
+    arguments = {"goal": REACH, "duration": 1.0, "limits": "none", "intervals": 12} | SEARCHES[
+        search
+    ]
+    found = plan(arm_scene, HANG, **arguments)
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
     assert "interrupted" in found.message
-    assert evaluations <= calls <= evaluations + FEW
+    assert evaluations <= calls <= evaluations + MAX_EVALUATIONS_AFTER

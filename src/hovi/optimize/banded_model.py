@@ -21,15 +21,15 @@ Index = npt.NDArray[np.intp]
 PANEL: int = native.panel_columns
 """Columns of the band that are factored together."""
 _FIXED = np.zeros(1)
-"""How columns change that are fixed: what index -1 finds behind a step."""
+"""Change of a fixed column: the entry appended to a step, at index -1."""
 
 
 @dataclass(frozen=True, eq=False)
 class Runs:
-    """Neighbouring entries of the intervals' Hessians that are neighbours in the band as well.
+    """Consecutive entries of the intervals' Hessians that are consecutive in the band as well.
 
     starts, positions: where each run begins in the Hessians and in the band, both laid out flat.
-    lengths: numbers in it. scales: what they are multiplied with; one when None.
+    lengths: number of entries in each. scales: factor of each; one when None.
     """
 
     starts: Index
@@ -39,7 +39,7 @@ class Runs:
 
     @classmethod
     def of(cls, entries: Index, positions: Index, scales: Array | None) -> Runs:
-        """The runs of single entries, of which no two with one start have different scales."""
+        """Runs of the given entries; a run never mixes different scales."""
         cut = (np.diff(entries) != 1) | (np.diff(positions) != 1)
         if scales is not None:
             cut |= np.diff(scales) != 0
@@ -52,16 +52,16 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class BandLayout:
-    """Where the columns of the intervals stand among the unknowns, and the band's entries.
+    """The map from the columns of the intervals to the unknowns, and from Hessians to the band.
 
     unknowns: index of the unknown of every interval's column, shape (N, m, n); -1 where a
         column is fixed.
     size: number of unknowns.
-    rows: of every panel of the band, from its first column's diagonal to the last row that it or
-        an earlier panel reaches, shape (panels,).
-    runs: which entries of the intervals' Hessians the band takes, and where they go.
-    scales: column = scale * unknown, shape (N, m), so that neighbours of different length share
-        an unknown; None where every scale is one.
+    rows: number of rows of every panel of the band, from the diagonal of its first column to the
+        last row that it or an earlier panel reaches, shape (panels,).
+    runs: which entries of the intervals' Hessians enter the band, and where.
+    scales: column = scale * unknown, shape (N, m), so that adjacent intervals of different length
+        share an unknown; None where every scale is one.
     """
 
     unknowns: Index
@@ -98,10 +98,10 @@ class BandLayout:
         return self.unknowns.ravel() + 1
 
     def assemble(self, hessian: Array) -> Array:
-        """The band of a sum over intervals, a column of the lower triangle in every row.
+        """The band of a sum over intervals, one column of the lower triangle per row.
 
-        Entry (i, j) stands at [j, i - i0], i0 = j - j % 4 the first column of its panel; columns
-        fill up the last panel. Shape (4 panels, most rows of a panel).
+        Entry (i, j) is stored at [j, i - i0], with i0 = j - j % 4 the first column of its panel;
+        the last panel is padded. Shape (4 panels, maximum rows of a panel).
         hessian: symmetric, shape (N, m, m, n, n).
         """
         band = np.empty((PANEL * len(self.rows), max(self.rows, default=0)))
@@ -111,7 +111,7 @@ class BandLayout:
 
 
 def _rows(unknowns: Index, size: int) -> Index:
-    """Rows of every panel, multiples of its width: where panels end does not fall.
+    """Number of rows of every panel, a multiple of its width; the last rows do not decrease.
 
     unknowns: of every interval, shape (N, m n), -1 where fixed.
     """
@@ -125,7 +125,7 @@ def _rows(unknowns: Index, size: int) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class BandFactor:
-    """A banded Cholesky factor, with the reciprocal of its diagonal in the diagonal's place."""
+    """A banded Cholesky factor that stores the reciprocals of its diagonal entries."""
 
     factor: Array
     rows: Index
@@ -154,7 +154,7 @@ class BandModel(QuadraticModel):
         return np.asarray(sums[1:], dtype=np.float64)
 
     def gather(self, s: Array) -> Array:
-        """Columns of every interval, zero where they are fixed."""
+        """The columns of every interval, zero where fixed."""
         local = np.concatenate([s, _FIXED])[self.layout.unknowns]
         scales = self.layout.scales
         return local if scales is None else np.asarray(local * scales[..., None])
@@ -166,7 +166,7 @@ class BandModel(QuadraticModel):
         return product
 
     def descend(self, factor: Factor) -> tuple[Array, float, float]:
-        """The step of a factor of this model: see QuadraticModel.descend."""
+        """The step, slope and squared length of `QuadraticModel.descend`, in one compiled pass."""
         if not isinstance(factor, BandFactor):
             return super().descend(factor)
         s = np.empty_like(self.gradient)
@@ -187,10 +187,9 @@ class BandModel(QuadraticModel):
         return BandFactor(factor, rows) if definite else None
 
     def negative_eigenvalues(self) -> int:
-        """Number of negative eigenvalues of H, by elimination of blocks as large as the band.
+        """Number of negative eigenvalues of H, by elimination of blocks as wide as the band.
 
-        Each pivot block adds its own count, as Sylvester's law of inertia says (Haynsworth's
-        additivity for Schur complements).
+        The counts of the pivot blocks add up: Haynsworth's inertia additivity.
         """
         bands = self.layout.assemble(self.intervals.hessian)
         size, block = self.layout.size, max(bands.shape[1], 1)
@@ -210,7 +209,7 @@ class BandModel(QuadraticModel):
 
 
 def _dense(bands: Array, rows: range, columns: range) -> Array:
-    """The lower triangle's entries of a block, shape (len(rows), len(columns))."""
+    """The entries of a block in the lower triangle, shape (len(rows), len(columns))."""
     i, j = np.array(rows)[:, None], np.array(columns)[None]
     offset = i - (j - j % PANEL)
     inside = (i >= j) & (offset < bands.shape[1])

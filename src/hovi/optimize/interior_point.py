@@ -1,7 +1,7 @@
-"""A primal-dual interior point for bounds on outputs y(x), with the trust region's subproblem.
+"""A primal-dual interior-point method for bounds on outputs y(x), with trust-region steps.
 
-Outputs have slacks s, held strictly between their bounds, and y(x) = s only in the limit, so
-that a start may violate every bound. With zl, zu the multipliers of s, Newton's method on
+The outputs have slacks s strictly between the bounds, and y(x) = s only in the limit, so the
+initial point may violate every bound. With zl, zu the multipliers of s, Newton's method on
 
     z_l (s - l) = mu,  z_u (u - s) = mu,  y(x) = s,  d action + J^T (z_u - z_l) = 0
 
@@ -40,20 +40,20 @@ from hovi.system.interruption import raise_if_interrupted, record_interrupt
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
-FIRST_MU = 0.1
-"""First barrier parameter, relative to the mean of the objective's density."""
-LAST_MU = 1e-10
-"""Last barrier parameter, relative to the same."""
-FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
-"""Shares of the longest step inside the bounds among which the model chooses."""
-SMALL_DENSITY = 1e-9
-"""Mean density of a first objective below which it says nothing about its scale."""
-INFEASIBLE = 1e-8
+INITIAL_MU = 0.1
+"""First barrier parameter, relative to the mean density of the objective."""
+FINAL_MU = 1e-10
+"""Last barrier parameter, relative to the mean density of the objective."""
+STEP_FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
+"""Candidate fractions of the longest step inside the bounds; the model chooses among them."""
+DENSITY_FLOOR = 1e-9
+"""Mean density of the initial objective below which 1 is used as its scale."""
+FEASIBILITY_TOLERANCE = 1e-8
 """Largest |y - s| of a solution, relative to the range of a bound."""
-SETTLED = 1e-9
-"""Largest |y - s| of an output whose slack may not be cut off from it any more."""
-STALL = 12
-"""Steps in a row that hardly move before the bounds are called into question."""
+SLACK_MATCHED = 1e-9
+"""Largest |y - s| at which the slack has reached its output and limits the length of a step."""
+MAX_STALLED_STEPS = 12
+"""Consecutive steps without progress after which the iteration ends as diverged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class Outputs:
 
 
 class BoundedObjective(ABC, Generic[X]):
-    """What the interior point minimises: an objective with bounded outputs at weighted points."""
+    """An objective with bounded outputs at weighted points."""
 
     bounds: Bounds
 
@@ -80,7 +80,7 @@ class BoundedObjective(ABC, Generic[X]):
     def model(self, x: X, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
         """The objective's quadratic model plus sum of weights (rho dy + sigma dy^2/2).
 
-        multipliers: of the outputs, shape (P, K), with which their curvature is weighted.
+        multipliers: weights of the outputs' curvature, shape (P, K).
         """
 
     @abstractmethod
@@ -88,8 +88,8 @@ class BoundedObjective(ABC, Generic[X]):
         """First-order change of the objective and of the outputs in a step of the model."""
 
     @abstractmethod
-    def follow(self, fraction: float) -> None:
-        """Remember that a fraction of the last step of `linear_outputs` was taken."""
+    def apply_fraction(self, fraction: float) -> None:
+        """Apply a fraction of the last step of `linear_outputs` to lifted variables, if any."""
 
     @abstractmethod
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
@@ -98,7 +98,7 @@ class BoundedObjective(ABC, Generic[X]):
 
 @dataclass(eq=False)
 class BoundedOutcome(Generic[X]):
-    """Where the iteration ended, and the multipliers there.
+    """The final point, its multipliers, and why the iteration ended.
 
     violation: |y - s| at the end, shape (P, K), in units of the ranges.
     """
@@ -118,15 +118,15 @@ class BoundedOutcome(Generic[X]):
 
     @property
     def feasible(self) -> bool:
-        """Whether the outputs equal their slacks, which are inside the bounds."""
-        return bool(self.violation.max(initial=0.0) <= INFEASIBLE)
+        """Whether the outputs equal their slacks to tolerance, and so satisfy the bounds."""
+        return bool(self.violation.max(initial=0.0) <= FEASIBILITY_TOLERANCE)
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step of the primal-dual system, cut so that the slacks stay inside.
+    """A step of the primal-dual system, shortened such that the slacks stay inside.
 
-    fraction: of the trial step that is taken. decrease: of the merit function, by the model.
+    fraction: share of the trial step taken. decrease: predicted decrease of the merit function.
     """
 
     trial: Trial
@@ -144,15 +144,15 @@ def minimize_bounded(
     report: Callable[[int, float], None] | None = None,
     start: Barrier | None = None,
 ) -> BoundedOutcome[X]:
-    """Minimise from x, which may violate the bounds; Ctrl-C ends it with the point so far.
+    """Minimise from x, which may violate the bounds; Ctrl-C ends it with the current point.
 
-    start: slacks and multipliers of an earlier solution nearby.
+    start: slacks and multipliers of a nearby solution, for a warm start.
     """
     outputs = objective.outputs(x)
     density = abs(outputs.value) / float(np.sum(objective.bounds.weights))
-    if density < SMALL_DENSITY:
+    if density < DENSITY_FLOOR:
         density = 1.0
-    barrier = start or Barrier.central(objective.bounds, outputs.y, FIRST_MU * density)
+    barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
     outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
         outcome.stop = Stop.DIVERGED
@@ -168,7 +168,7 @@ def minimize_bounded(
 
 
 class _Iteration(Generic[X]):
-    """The loop: a subproblem, a step, a test, a smaller mu."""
+    """The main loop: solve a subproblem, accept or reject its step, reduce mu when converged."""
 
     def __init__(
         self,
@@ -189,7 +189,7 @@ class _Iteration(Generic[X]):
         self.stalled = 0
 
     def run(self) -> None:
-        """Until stationary, or a budget ends it."""
+        """Iterate until stationary, or until a limit is reached."""
         raise_if_interrupted()
         deadline = Deadline(self.options.time_limit)
         model = self._model()
@@ -200,11 +200,11 @@ class _Iteration(Generic[X]):
                 return
             step = self._step(model)
             accepted = self._try(step, model)
-            if accepted and self._advance(step):
+            if accepted and self._reduce_mu(step):
                 self.outcome.stop = Stop.STATIONARY
                 self.outcome.model = self._model()
                 return
-            if self.stalled >= STALL:
+            if self.stalled >= MAX_STALLED_STEPS:
                 self.outcome.stop = Stop.DIVERGED
                 return
             if accepted:
@@ -234,7 +234,7 @@ class _Iteration(Generic[X]):
         square = -float(np.vdot(model.gradient, trial.step)) - trial.shift * trial.norm**2
         square -= float(np.sum(weights * barrier.sigma * dy**2))
         y = self.outcome.outputs.y
-        settled = np.abs(residual) <= SETTLED
+        matched = np.abs(residual) <= SLACK_MATCHED
         before = barrier.merit(weights, y, self.penalty)
 
         def decrease(share: float) -> float:
@@ -242,9 +242,9 @@ class _Iteration(Generic[X]):
             after = barrier.with_slacks(ds, share).merit(weights, y + share * dy, self.penalty)
             return before - after - smooth
 
-        shares = barrier.longest(np.where(settled, ds, 0.0)) * FRACTIONS
+        shares = barrier.max_share(np.where(matched, ds, 0.0)) * STEP_FRACTIONS
         decreases = np.array([decrease(share) for share in shares])
-        # the longest share among those that rounding cannot tell from the best
+        # the largest share whose decrease equals the best up to rounding
         noise = 1e-13 * self._scale()
         best = int(np.argmax(decreases >= np.max(decreases) - noise))
         return _Step(trial, float(shares[best]), ds, dzl, dzu, float(decreases[best]))
@@ -270,24 +270,24 @@ class _Iteration(Generic[X]):
         radius = next_radius(self.radius, length, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
-        hardly = ratio <= 1e-4 or (length < 1e-4 * max(1.0, radius) and not outcome.feasible)
-        self.stalled = self.stalled + 1 if hardly else 0
+        stalled = ratio <= 1e-4 or (length < 1e-4 * max(1.0, radius) and not outcome.feasible)
+        self.stalled = self.stalled + 1 if stalled else 0
         if ratio <= 1e-4:
             return False
-        self.objective.follow(step.fraction)
+        self.objective.apply_fraction(step.fraction)
         outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
         return True
 
     def _scale(self) -> float:
-        """Size of the objective, by which decreases are judged; never quite zero."""
+        """Magnitude of the objective, to which decreases are relative; positive."""
         total = float(np.sum(self.objective.bounds.weights))
-        return max(abs(self.outcome.outputs.value), LAST_MU * self.density * total)
+        return max(abs(self.outcome.outputs.value), FINAL_MU * self.density * total)
 
-    def _advance(self, step: _Step) -> bool:
-        """Lower mu where its problem is solved; True where the last one is."""
+    def _reduce_mu(self, step: _Step) -> bool:
+        """Reduce mu once its problem is solved; True once the last one is."""
         outcome, barrier = self.outcome, self.outcome.barrier
         total = float(np.sum(self.objective.bounds.weights))
-        last = LAST_MU * self.density
+        last = FINAL_MU * self.density
         newton = step.trial.newton and step.fraction == 1.0
         scale = self._scale()
         if barrier.mu <= last:
@@ -296,7 +296,7 @@ class _Iteration(Generic[X]):
         solved = (
             step.trial.newton
             and step.decrease <= 10 * barrier.mu * total
-            and outcome.violation.max(initial=0.0) <= max(INFEASIBLE, 0.1 * share)
+            and outcome.violation.max(initial=0.0) <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
             and barrier.complementarity() <= 10 * barrier.mu
         )
         if solved:

@@ -1,10 +1,10 @@
-"""The model factored by merging intervals in pairs: right at every step length.
+"""Factorisation of the model by merging intervals in pairs: accurate at every step length.
 
-Two neighbouring intervals become one of their joint length by eliminating the node between
-them, as its deviation Y from the cubic through the outer ends. Everything is written in the
-regularized coordinates (q0, H v0, Z0, Z1) of the interval at hand, so no entry is a difference of
-numbers that grow like h^-3, and log2(N) rounds of small batched operations do the work. The
-eliminated blocks give the inertia. [ColomboFerraroMartin2016, section 2]
+Two adjacent intervals become one of their joint length by eliminating the node between them, in
+the form of its deviation Y from the cubic through the outer ends. All blocks are in regularized
+coordinates (q0, H v0, Z0, Z1) of the merged interval, so no entry is a difference of numbers that
+grow like h^-3; there are log2(N) levels of small batched operations. The inertias of the eliminated
+blocks add up to that of H. [ColomboFerraroMartin2016, section 2]
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
 Array = npt.NDArray[np.float64]
 
 CHUNK = 512
-"""Intervals or pairs that are eliminated at a time."""
+"""Number of intervals or pairs eliminated at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class MergeLevel:
-    """One round of merging neighbouring pairs.
+    """One level of merging adjacent pairs.
 
-    left, right: child coordinates (4) over the parent's (q0, H v0, Z0, Z1, Y0, Y1), shape
-        (P, 4, 6), or (1, 4, 6) where all pairs are cut alike.
-    pairs: number P of parents. A last interval without a partner stays as it is.
+    left, right: matrices from the parent's (q0, H v0, Z0, Z1, Y0, Y1) to the children's
+        coordinates, shape (P, 4, 6), or (1, 4, 6) where all pairs are split in the same ratio.
+    pairs: number P of parents. A last interval without a partner is passed on unchanged.
     """
 
     left: Array
@@ -54,7 +54,7 @@ class MergeLevel:
         return total.reshape(P, 6, 6, n, n)
 
     def chunk(self, first: int, last: int) -> MergeLevel:
-        """The round of some of the pairs alone."""
+        """The level restricted to some of the pairs."""
         one = len(self.left) == 1
         left, right = (T if one else T[first:last] for T in (self.left, self.right))
         return MergeLevel(left, right, last - first)
@@ -68,7 +68,7 @@ class MergeLevel:
 
 
 def merge_levels(steps: Array) -> list[MergeLevel]:
-    """The rounds that turn intervals of the given lengths into one."""
+    """The levels that merge intervals of the given lengths into one."""
     levels = []
     lengths = np.asarray(steps, dtype=np.float64)
     while len(lengths) > 1:
@@ -82,9 +82,9 @@ def merge_levels(steps: Array) -> list[MergeLevel]:
 
 
 def _split_tables(share: Array) -> tuple[Array, Array]:
-    """Coordinates of both parts of an interval that is cut at `share` of its length.
+    """Coordinates of both parts of an interval that is split at `share` of its length.
 
-    The cubic through the ends passes the cut with q1 = q0 + x and H v1; Y deviates from it.
+    At the split the cubic through the ends has the values q1 = q0 + x and H v1; Y is added to them.
     """
     s, b = share, 1 - share
     zero, one = np.zeros_like(s), np.ones_like(s)
@@ -114,10 +114,10 @@ class _Elimination:
 
 @dataclass(frozen=True, eq=False)
 class MergeTree:
-    """The shape of the elimination: inner modes first, then the nodes round by round.
+    """The structure of the elimination: inner modes first, then the nodes level by level.
 
-    levels: the rounds. intervals: N. inner_modes: r. dof: n.
-    present: which inner modes exist, shape (N, r); others are held at zero.
+    levels: from the intervals upwards. intervals: N. inner_modes: r. dof: n.
+    present: which inner modes exist, shape (N, r); the others are fixed at zero.
     """
 
     levels: list[MergeLevel]
@@ -128,7 +128,7 @@ class MergeTree:
 
     @property
     def shapes(self) -> list[tuple[int, ...]]:
-        """Shapes of the parts of a step: inner modes, then Y of every round."""
+        """Shapes of the parts of a step: inner modes, then Y of every level."""
         first = (self.intervals, self.inner_modes, self.dof)
         return [first, *((level.pairs, 2, self.dof) for level in self.levels)]
 
@@ -142,7 +142,7 @@ class MergeTree:
 class MergeTreeModel(QuadraticModel):
     """A quadratic model in the hierarchical coordinates of a merge tree, both ends fixed.
 
-    The intervals' columns are the regular ones: (q0, h v0, Z0, Z1, c).
+    The columns of the intervals are the regularized ones: (q0, h v0, Z0, Z1, c).
     """
 
     def __init__(self, intervals: IntervalSum, tree: MergeTree) -> None:
@@ -215,13 +215,15 @@ class MergeFactor:
     def solve(self, rhs: Array) -> Array:
         """(H + shift D)^-1 rhs."""
         parts = self.tree.parts(rhs)
-        solved, carried = _forward(self.eliminations[0], parts[0], None)
+        solved, remaining = _forward(self.eliminations[0], parts[0], None)
         forward = [solved]
         for i, level in enumerate(self.tree.levels, start=1):
-            merged = level.merge(carried)
-            solved, up = _forward(self.eliminations[i], parts[i] + merged[:, 4:], merged[:, :4])
+            merged = level.merge(remaining)
+            solved, merged_rest = _forward(
+                self.eliminations[i], parts[i] + merged[:, 4:], merged[:, :4]
+            )
             forward.append(solved)
-            carried = np.concatenate([up, carried[2 * level.pairs :]])
+            remaining = np.concatenate([merged_rest, remaining[2 * level.pairs :]])
         return self._backward(forward)
 
     def _backward(self, forward: list[Array]) -> Array:
@@ -237,13 +239,13 @@ class MergeFactor:
 
 
 def _descend(level: MergeLevel, x: Array, Y: Array) -> Array:
-    """Children of a round: from the parents' coordinates and Y, the odd one carried over."""
+    """The children of a level from the parents' coordinates and Y; an odd last one is unchanged."""
     children = level.split(np.concatenate([x[: level.pairs], Y], axis=1))
     return np.concatenate([children, x[level.pairs :]])
 
 
 def _chunks(count: int) -> Iterator[slice]:
-    """Parts of a round that stay in the processor's cache."""
+    """Parts of a level that fit in the processor's cache."""
     for first in range(0, count, CHUNK):
         yield slice(first, min(first + CHUNK, count))
 
@@ -251,7 +253,7 @@ def _chunks(count: int) -> Iterator[slice]:
 def _condense_all(
     chunks: Iterable[Array], k: int, n: int, definite: bool
 ) -> tuple[Array, _Elimination, int]:
-    """`_condense` of one round, chunk by chunk."""
+    """`_condense` for one level, chunk by chunk."""
     schur, eliminations, negative = [], [], 0
     for chunk in chunks:
         S, elimination, count = _condense(chunk, k, n, definite)
@@ -264,7 +266,10 @@ def _condense_all(
 
 
 def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimination, int]:
-    """Eliminate the last k columns of (B, 4 + k, 4 + k, n, n); Cholesky decides where asked."""
+    """Eliminate the last k columns of (B, 4 + k, 4 + k, n, n).
+
+    definite: raise LinAlgError, by Cholesky, where a block is not positive definite.
+    """
     B = len(A)
     flat = A.transpose(0, 1, 3, 2, 4).reshape(B, (4 + k) * n, (4 + k) * n)
     block, coupling = flat[:, 4 * n :, 4 * n :], flat[:, 4 * n :, : 4 * n]
@@ -273,10 +278,10 @@ def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimina
         np.linalg.cholesky(block)
         inverse = np.asarray(np.linalg.inv(block), dtype=np.float64)
         solved = np.matmul(inverse, coupling)
-        taken = np.matmul(coupling.transpose(0, 2, 1), solved)
+        correction = np.matmul(coupling.transpose(0, 2, 1), solved)
     else:
-        inverse, solved, taken, negative = _spectral(block, coupling)
-    S = flat[:, : 4 * n, : 4 * n] - taken
+        inverse, solved, correction, negative = _spectral(block, coupling)
+    S = flat[:, : 4 * n, : 4 * n] - correction
     S = (S + S.transpose(0, 2, 1)) / 2
     schur = S.reshape(B, 4, n, 4, n).transpose(0, 1, 3, 2, 4)
     return schur, _Elimination(inverse, solved), negative
@@ -285,8 +290,8 @@ def _condense(A: Array, k: int, n: int, definite: bool) -> tuple[Array, _Elimina
 def _spectral(block: Array, coupling: Array) -> tuple[Array, Array, Array, int]:
     """B^-1, B^-1 C, C^T B^-1 C and the number of negative eigenvalues of symmetric blocks B.
 
-    By the eigenvectors of B with its diagonal scaled to one: on long chains, products with B^-1
-    itself lose the signs that are to be counted.
+    From the eigenvectors of B, scaled to unit diagonal: on long chains, products with B^-1 itself
+    are too inaccurate to count signs.
     """
     size = np.sqrt(np.abs(np.einsum("bii->bi", block)))
     size[size == 0] = 1.0
@@ -295,21 +300,21 @@ def _spectral(block: Array, coupling: Array) -> tuple[Array, Array, Array, int]:
     rotated = np.matmul(vector.transpose(0, 2, 1), coupling)
     divided = rotated / value[:, :, None]
     inverse = np.matmul(vector / value[:, None, :], vector.transpose(0, 2, 1))
-    taken = np.matmul(rotated.transpose(0, 2, 1), divided)
-    return inverse, np.matmul(vector, divided), taken, int(np.sum(value < 0))
+    correction = np.matmul(rotated.transpose(0, 2, 1), divided)
+    return inverse, np.matmul(vector, divided), correction, int(np.sum(value < 0))
 
 
-def _forward(step: _Elimination, rhs: Array, carried: Array | None) -> tuple[Array, Array]:
-    """(block^-1 rhs, what remains for the coordinates that stay)."""
+def _forward(step: _Elimination, rhs: Array, remaining: Array | None) -> tuple[Array, Array]:
+    """(block^-1 rhs, the right-hand side that remains for the other coordinates)."""
     B, _, n = rhs.shape
     flat = rhs.reshape(B, -1, 1)
     solved = np.matmul(step.inverse, flat)
     passed = np.matmul(step.coupling.transpose(0, 2, 1), flat).reshape(B, 4, n)
-    return solved, -passed if carried is None else carried - passed
+    return solved, -passed if remaining is None else remaining - passed
 
 
 def _back(step: _Elimination, solved: Array, x: Array) -> Array:
-    """The eliminated unknowns once the coordinates that stay are known, (B, k, n)."""
+    """The eliminated unknowns from the remaining coordinates x, shape (B, k, n)."""
     B, _, n = x.shape
     y = solved - np.matmul(step.coupling, x.reshape(B, -1, 1))
     return np.asarray(y.reshape(B, -1, n))

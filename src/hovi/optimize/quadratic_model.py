@@ -1,7 +1,7 @@
 """A quadratic model g.s + 1/2 s.H s that is a sum over intervals, with a metric D.
 
-Each interval couples its own columns only: the two nodes at its ends and its inner modes. A
-solver brings these sums into an order in which H + shift D can be factored in O(N n^3).
+An interval couples only its own columns: its two end nodes and its inner modes. A solver orders
+the unknowns such that H + shift D is factored in O(N n^3).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Factor(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class IntervalSum:
-    """What every interval contributes.
+    """The contribution of every interval to the model.
 
     gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
     metric: D of an interval, the same for every component, shape (N, m, m).
@@ -49,7 +49,7 @@ class QuadraticModel(ABC):
 
     @abstractmethod
     def gather(self, s: Array) -> Array:
-        """What a step s is in every interval, shape (N, m, n)."""
+        """The columns of every interval in a step s, shape (N, m, n)."""
 
     @abstractmethod
     def factor(self, shift: float) -> Factor | None:
@@ -66,10 +66,10 @@ class QuadraticModel(ABC):
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
     def curvature_scale(self) -> float:
-        """A size of H relative to D, for a first shift."""
+        """Magnitude of H relative to D, from which a first shift is chosen."""
         largest = float(np.max(np.abs(self.intervals.hessian)))
         return largest / float(np.max(np.abs(self.intervals.metric)))
 
     def random_vector(self, seed: int) -> Array:
-        """A reproducible step that is orthogonal to nothing in particular."""
+        """A reproducible random step, a start of inverse iterations."""
         return np.random.default_rng(seed).standard_normal(self.gradient.shape)

@@ -1,8 +1,8 @@
-"""A trust region whose subproblem is solved by repeated factorisation of H + shift D.
+"""A trust-region method whose subproblems are solved by factorisations of H + shift D.
 
-It copes with indefinite Hessians, leaves saddles along negative curvature, and stops on scaled
-quantities: the decrease that a Newton step predicts, relative to the cost, or the size of the
-step, relative to the data. [ConnGouldToint2000, chapter 7; MoreSorensen1983]
+It handles indefinite Hessians, leaves saddles along directions of negative curvature, and stops
+on relative quantities: the predicted decrease of a Newton step relative to the cost, or its size
+relative to the data. [ConnGouldToint2000, chapter 7; MoreSorensen1983]
 """
 
 from __future__ import annotations
@@ -24,15 +24,17 @@ from hovi.system.interruption import raise_if_interrupted, record_interrupt
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
-MOST_FACTORS = 30
-"""Factorisations that one subproblem may take."""
-NEAR = 1e-5
-"""Relative decrease in a Newton step after which models are exact, where the last one shall be."""
-LONG = 1e-4
-"""Share of the first radius beyond which a step is too long to be asked for its relative size."""
-LAST, LEFT = 1e-14, 1e-26
-"""Relative decrease that the last exact step may predict where it bends sharply, and what it may
-leave elsewhere: steps are like the square root of what they leave."""
+MAX_FACTORIZATIONS = 30
+"""Maximum number of factorisations per subproblem."""
+EXACT_MODEL_DECREASE = 1e-5
+"""Relative decrease of a Newton step below which models are exact, if Options.exact."""
+SIZE_TEST_LENGTH = 1e-4
+"""Step length, relative to the first radius, up to which the relative size is evaluated."""
+LAST_DECREASE = 1e-14
+"""Relative predicted decrease below which an exact Newton step is the last in any case."""
+REMAINING_DECREASE = 1e-26
+"""Estimated relative decrease that may remain after the last step; its square root is the relative
+error of the point."""
 
 
 class Stop(StrEnum):
@@ -46,7 +48,7 @@ class Stop(StrEnum):
 
 
 class Objective(ABC, Generic[X]):
-    """What the trust region minimises: it evaluates, retracts and has a norm."""
+    """An objective to minimise on a manifold: value, quadratic model, retraction and norm."""
 
     @abstractmethod
     def value(self, x: X) -> float:
@@ -54,7 +56,10 @@ class Objective(ABC, Generic[X]):
 
     @abstractmethod
     def model(self, x: X, previous: QuadraticModel | None, step: Array | None) -> QuadraticModel:
-        """The quadratic model at x, exact without a `previous` one, from which `step` led here."""
+        """The quadratic model at x: exact if `previous` is None, otherwise perhaps an update.
+
+        previous: the model at the last point, from which `step` led to x.
+        """
 
     @abstractmethod
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
@@ -62,21 +67,21 @@ class Objective(ABC, Generic[X]):
 
     @abstractmethod
     def relative_size(self, x: X, step: Array, model: QuadraticModel) -> float:
-        """The largest change of a step, relative to the size of the data."""
+        """The largest component of a step relative to the size of the data."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """Tolerances and budgets.
+    """Tolerances and limits.
 
-    decrease: stop with a Newton step that predicts less than this, relative to the value; what is
-        left after it is of the square of that.
-    step: stop when a Newton step changes less than this, relative to the data.
-    max_iterations: steps, rejected ones included. time_limit: in [s]; none when None.
-    radius: first radius of the trust region, in the metric's norm.
+    decrease: stop when a Newton step predicts a smaller decrease, relative to the value; what
+        remains after it is of the order of its square.
+    step: stop when a Newton step is smaller than this, relative to the data.
+    max_iterations: number of steps, rejected ones included. time_limit: in [s]; no limit when None.
+    radius: initial radius of the trust region, in the norm of the metric.
     escape_saddles: leave a saddle along negative curvature; False stops there.
-    exact: stop only after the step of an exact model, one that no earlier model had a part in, that
-        leaves nothing but rounding.
+    exact: stop only after a Newton step of an exact model, one not updated from an earlier model,
+        after which only rounding errors remain.
     """
 
     decrease: float = 1e-11
@@ -92,8 +97,8 @@ class Options:
 class Iteration:
     """One accepted or rejected step.
 
-    value: the objective where it led. decrease: what the model foresaw. ratio: actual over foreseen
-        decrease. shift: multiplier of the radius. radius: before the step.
+    value: the objective after the step. decrease: predicted by the model. ratio: actual over
+        predicted decrease. shift: multiplier of the radius. radius: before the step.
     """
 
     value: float
@@ -105,11 +110,11 @@ class Iteration:
 
 @dataclass
 class Outcome(Generic[X]):
-    """Where the iteration ended.
+    """The final point and why the iteration ended.
 
-    value: the objective at x. iterations: steps tried, each with an entry in history.
-    saddles_left: values of the saddles that were left along negative curvature.
-    convex: whether the last step was that of an exact model, whose Hessian is positive definite.
+    value: the objective at x. iterations: number of steps tried, each with an entry in history.
+    saddles_left: values at the saddles that were left along negative curvature.
+    convex: whether the last step was that of an exact model with positive definite Hessian.
     """
 
     x: X
@@ -124,8 +129,9 @@ class Outcome(Generic[X]):
 class Trial(NamedTuple):
     """A solution of the subproblem min g.s + 1/2 s.H s, |s| <= radius.
 
-    decrease: what the model foresees. shift: multiplier of the radius; 0 for a Newton step.
-    norm: |s| in the metric. along_negative_curvature: whether the gradient has no part in it.
+    decrease: predicted by the model. shift: multiplier of the radius; 0 for a Newton step.
+    norm: |s| in the metric. along_negative_curvature: whether the step is a direction of negative
+        curvature alone, since the gradient is negligible.
     """
 
     step: Array
@@ -204,7 +210,7 @@ def _iterate(
         shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
             before = trial.decrease if trial.newton else math.inf
-            exact = options.exact and (settled or before <= NEAR * abs(value))
+            exact = options.exact and (settled or before <= EXACT_MODEL_DECREASE * abs(value))
             known = (None, None) if exact else (model, trial.step)
             model = objective.model(outcome.x, *known)
         elif radius < 1e-14 * options.radius:
@@ -219,14 +225,14 @@ def _is_stationary(
     trial: Trial,
     options: Options,
 ) -> bool:
-    """Whether the gradient is zero to working precision, whatever the curvature."""
+    """Whether the gradient is zero to working precision; says nothing about the curvature."""
     if trial.along_negative_curvature:
         return True
     if not trial.newton:
         return False
     if trial.decrease <= options.decrease * abs(outcome.value):
         return True
-    if trial.norm > LONG * options.radius:
+    if trial.norm > SIZE_TEST_LENGTH * options.radius:
         return False
     return objective.relative_size(outcome.x, trial.step, model) <= options.step
 
@@ -234,23 +240,23 @@ def _is_stationary(
 def _is_last(
     outcome: Outcome[X], trial: Trial, exact: bool, before: float, options: Options
 ) -> bool:
-    """Whether the Newton step from a stationary point may be the last: see Options.exact.
+    """Whether the Newton step from a stationary point is accurate enough to be the last one.
 
-    What it leaves to decrease is decrease^3 / before^2, since convergence is quadratic; where it
-    is not any more, only rounding is left.
-    exact: whether the model is. before: the decrease that the step before it predicted, infinite
-        where that was no Newton step.
+    The decrease that remains after it is decrease^3 / before^2 by quadratic convergence; where
+    convergence is slower, rounding dominates. See Options.exact.
+    exact: whether the model is exact. before: predicted decrease of the previous step, infinite
+        if that was not a Newton step.
     """
     size, decrease = abs(outcome.value), trial.decrease
     if not options.exact or not exact:
         return not options.exact
-    if decrease <= LAST * size or decrease > min(options.decrease * size, 0.1 * before):
+    if decrease <= LAST_DECREASE * size or decrease > min(options.decrease * size, 0.1 * before):
         return True
-    return before < math.inf and decrease * (decrease / before) ** 2 <= LEFT * size
+    return before < math.inf and decrease * (decrease / before) ** 2 <= REMAINING_DECREASE * size
 
 
 def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
-    """Actual over predicted decrease; 1 where both drown in rounding, -1 where not finite."""
+    """Actual over predicted decrease; 1 where both are rounding noise, -1 where not finite."""
     if not math.isfinite(actual):
         return -1.0
     if abs(actual) <= noise and abs(predicted) <= 10 * noise:
@@ -259,13 +265,14 @@ def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
 
 
 def next_shift(shift: float, norm: float, radius: float) -> float:
-    """A first shift for another radius: it falls a little faster than the radius grows."""
+    """Initial shift for a new radius: it decreases slightly faster than the radius grows."""
     return float(shift * (norm / radius) ** 1.2)
 
 
 def next_radius(radius: float, norm: float, ratio: float) -> float:
-    """Where the model failed, the minimum of a parabola along the step, within bounds.
+    """The radius after a step: larger where the model was good and the radius limited the step.
 
+    Where the model failed: the minimum of a parabola along the step, within bounds.
     norm: length of the step. ratio: actual over predicted decrease.
     """
     if ratio < 0.25:
@@ -279,12 +286,12 @@ def next_radius(radius: float, norm: float, ratio: float) -> float:
 def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Trial:
     """A step with |s| within a quarter of the radius, or a shorter Newton step.
 
-    guess: the shift of the last subproblem, a first value for this one.
+    guess: initial shift, from the previous subproblem.
     """
     search = _ShiftSearch(model, radius, guess)
     shift = guess
     last: tuple[Factor, Trial] | None = None
-    for _ in range(MOST_FACTORS):
+    for _ in range(MAX_FACTORIZATIONS):
         factor = model.factor(shift)
         if factor is None:
             if last is not None and last[1].norm < radius and search.is_hard_case(last[1].shift):
@@ -301,7 +308,7 @@ def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Tria
     if last is not None:
         factor, trial = last
         return search.complete(factor, trial) if search.is_short(trial) else trial
-    raise ArithmeticError("H + shift D stays indefinite: the model has numbers that are not finite")
+    raise ArithmeticError("H + shift D stays indefinite: the model has non-finite entries")
 
 
 class _ShiftSearch:
@@ -324,12 +331,12 @@ class _ShiftSearch:
         return max(4.0 * shift, (1e-5 if self.reached else 0.03) * self._scale())
 
     def step_at(self, factor: Factor, shift: float) -> Trial:
-        """The step of a shift."""
+        """The step for a shift."""
         s, slope, norm2 = self.model.descend(factor)
         norm2 = max(norm2, 0.0)
         decrease = -0.5 * slope + 0.5 * shift * norm2
         if not math.isfinite(decrease) or (decrease == 0.0 and self.model.gradient.any()):
-            raise ArithmeticError("the model has numbers that are not finite")
+            raise ArithmeticError("the model has non-finite entries")
         return Trial(s, decrease, shift, math.sqrt(norm2))
 
     def after_step(self, factor: Factor, trial: Trial) -> float:
@@ -354,7 +361,7 @@ class _ShiftSearch:
     def _scale(self) -> float:
         scale = self.model.curvature_scale()
         if not math.isfinite(scale):
-            raise ArithmeticError("the model has numbers that are not finite")
+            raise ArithmeticError("the model has non-finite entries")
         return scale or float(np.max(np.abs(self.model.gradient))) / self.radius
 
     def fits(self, trial: Trial) -> bool:
@@ -363,15 +370,15 @@ class _ShiftSearch:
         return within and (trial.newton or trial.norm >= 0.75 * self.radius)
 
     def is_short(self, trial: Trial) -> bool:
-        """Whether a step ends inside the radius although H has negative curvature."""
+        """Whether a step ends inside the radius although H is indefinite."""
         return self.indefinite and trial.norm < self.radius
 
     def is_hard_case(self, shift: float) -> bool:
-        """Whether the step stays short down to the edge of definiteness."""
+        """Whether the step is too short even at the smallest shift with H + shift D definite."""
         return self.indefinite and (shift - self.low) <= 0.2 * shift
 
     def complete(self, factor: Factor, trial: Trial) -> Trial:
-        """A short step completed to the radius along the lowest curvature."""
+        """A short step extended to the radius along the lowest eigenvector of H relative to D."""
         u = self.model.random_vector(seed=0)
         for _ in range(4):
             u = factor.solve(self.model.metric_product(u))
@@ -383,7 +390,7 @@ class _ShiftSearch:
         length = -b + np.sqrt(max(b * b + self.radius**2 - trial.norm**2, 0.0))
         step = trial.step + length * u
         rest = factor.solve(Du)
-        # u.H u from u.(H + shift D) u by one more inverse iteration: a Rayleigh quotient
+        # Rayleigh quotient u.H u by one more inverse iteration
         rayleigh = 1.0 / float(np.vdot(Du, rest)) - trial.shift
         decrease = trial.decrease + trial.shift * b * length - 0.5 * length**2 * min(rayleigh, 0.0)
         negligible = trial.norm < 1e-6 * self.radius

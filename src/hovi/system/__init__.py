@@ -1,1 +1,1 @@
-"""What the package asks of the operating system: files, signals, deadlines, threads."""
+"""Operating system services: files, interrupts, deadlines, threads."""

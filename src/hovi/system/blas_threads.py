@@ -1,7 +1,7 @@
-"""One thread of BLAS while hovi computes.
+"""Restricts BLAS to one thread while hovi computes.
 
-How BLAS shares a product out decides how it rounds, so the bytes of a motion would depend on the
-number of processors; and the blocks of a motion are small: two threads only wait for each other.
+The rounding of a threaded product depends on how BLAS splits it, so the bytes of a motion would
+depend on the number of processors; and the blocks of a motion are too small to gain from threads.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ Result = TypeVar("Result")
 
 
 def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """The function, which runs with one thread in every BLAS that the process has as it begins.
+    """A decorator: every BLAS that is loaded when the function is called runs one thread in it.
 
-    That of SciPy, where the function itself imports it, is left as it is: what hovi takes from
-    there multiplies by NumPy's.
+    SciPy's own BLAS is not restricted where the function itself is the first to import it: the
+    SciPy functions that hovi uses multiply with NumPy's BLAS.
     """
 
     @functools.wraps(function)
     def limited(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        blas = _blas("scipy.linalg" in sys.modules)
+        blas = _loaded_blas("scipy.linalg" in sys.modules)
         if all(library.num_threads == 1 for library in blas.lib_controllers):
             return function(*args, **kwargs)
         with blas.limit(limits=1):
@@ -36,6 +36,6 @@ def one_blas_thread(function: Callable[Arguments, Result]) -> Callable[Arguments
 
 
 @functools.cache
-def _blas(scipy_too: bool) -> ThreadpoolController:
-    """That of NumPy, and SciPy's own one once it is there; to find them takes some milliseconds."""
+def _loaded_blas(with_scipy: bool) -> ThreadpoolController:
+    """NumPy's BLAS, and SciPy's once it is loaded; finding them takes some milliseconds."""
     return ThreadpoolController().select(user_api="blas")

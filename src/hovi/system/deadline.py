@@ -1,4 +1,4 @@
-"""The moment at which work has to end."""
+"""Time limits."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import time
 
 
 class Deadline:
-    """So many seconds from now by the monotonic clock; never when None.
+    """A time limit that starts now, by the monotonic clock.
 
-    seconds: from now, in [s].
+    seconds: the limit, in [s]; no limit when None.
     """
 
     def __init__(self, seconds: float | None = None) -> None:
@@ -16,15 +16,15 @@ class Deadline:
 
     @property
     def seconds_left(self) -> float | None:
-        """Seconds left, 0 where time is up; None where there is no end."""
+        """Time left in [s], 0 once the deadline has passed; None without a limit."""
         return None if self._end is None else max(self._end - time.monotonic(), 0.0)
 
     @property
     def passed(self) -> bool:
-        """Whether time is up."""
+        """Whether the time limit is exceeded."""
         return self._end is not None and time.monotonic() > self._end
 
     def part(self, share: float) -> Deadline:
-        """The deadline of work that may take a share of what is left."""
+        """A deadline after a share, in [0, 1], of the time left."""
         left = self.seconds_left
         return Deadline(None if left is None else share * left)

@@ -1,8 +1,8 @@
-"""Ctrl-C that was heard during a call stays heard until the call returns.
+"""Ctrl-C ends the whole public call during which it is pressed.
 
-Many loops solve, look at how that ended, and solve again. Each solve that is interrupted keeps the
-best that it has, and what it was a part of has to end as well: once one was interrupted no other
-begins.
+Many loops solve repeatedly and decide by the outcome what to solve next. An interrupted solve
+returns its best point so far; the interrupt is recorded until the outermost call returns, so that
+no further solve starts.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Result = TypeVar("Result")
 
 @dataclass
 class _Call:
-    """The outermost call that is under way."""
+    """State of the outermost call in progress."""
 
     interrupted: bool = False
 
@@ -28,10 +28,10 @@ _outermost: ContextVar[_Call | None] = ContextVar("hovi_outermost_call", default
 
 
 def interruptible(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """The function, which remembers an interrupt until it or the call around it returns."""
+    """A decorator: an interrupt stays recorded until the outermost decorated call returns."""
 
     @functools.wraps(function)
-    def remembering(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+    def recording(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
         if _outermost.get() is not None:
             return function(*args, **kwargs)
         token = _outermost.set(_Call())
@@ -40,23 +40,26 @@ def interruptible(function: Callable[Arguments, Result]) -> Callable[Arguments, 
         finally:
             _outermost.reset(token)
 
-    return remembering
+    return recording
 
 
 def record_interrupt() -> None:
-    """An interrupt came; for whoever catches KeyboardInterrupt. Nothing outside of a call."""
+    """Record an interrupt, to be called where KeyboardInterrupt is caught.
+
+    Has no effect outside of an `interruptible` call.
+    """
     call = _outermost.get()
     if call is not None:
         call.interrupted = True
 
 
 def interrupted() -> bool:
-    """Whether one came during the call that is under way."""
+    """Whether an interrupt was recorded during the call in progress."""
     call = _outermost.get()
     return call is not None and call.interrupted
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt again where one came."""
+    """Raise KeyboardInterrupt if an interrupt was recorded."""
     if interrupted():
         raise KeyboardInterrupt

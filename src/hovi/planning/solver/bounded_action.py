@@ -152,7 +152,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         slope = float(np.vdot(model.gradient, step))
         return slope - float(np.sum(self.bounds.weights * self._rho * dy)), dy
 
-    def follow(self, fraction: float) -> None:
+    def apply_fraction(self, fraction: float) -> None:
         """The torques that the step taken foresees weight the next curvature."""
         pairs = zip(self.action.expansion.outputs, self._linear, strict=True)
         self._predicted = [
