@@ -1,4 +1,4 @@
-"""Joints that mimic others: against Pinocchio's RNEA, and against the same robot without them."""
+"""Mimic joints against Pinocchio's RNEA and against the same robot without couplings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task
 from hovi.robot.loading import load_robot
 from hovi.robot.mass_matrix import MassMatrix
-from hovi.robot.mimic_model import Coupling, Pull, coupled, uncoupled
+from hovi.robot.mimic_model import CoordinateMap, Coupling, coupled, uncoupled
 from hovi.robot.mimic_tags import read_couplings
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -51,7 +51,7 @@ CHAINS = {
 }
 
 
-def mimicking(name: str) -> Robot:
+def mimic_robot(name: str) -> Robot:
     joints, links = CHAINS[name]
     return load_robot(
         coupled(chain(joints), [Coupling(f"j{i}", leader, m, o) for leader, i, m, o in links])
@@ -76,7 +76,7 @@ def close(actual: Array, expected: Array, tolerance: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "baxter", "romeo", "tiago_pro", "pr2"])
-def test_torques_of_published_robots_are_those_of_pinocchio(name: str) -> None:
+def test_torques_of_published_robots_match_pinocchio(name: str) -> None:
     robot = load_robot(name, mimic=True)
     assert len(robot.couplings) == load_robot(name).nv - robot.nv > 0
     scene = Scene(robot, [Gravity()])
@@ -86,8 +86,8 @@ def test_torques_of_published_robots_are_those_of_pinocchio(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_first_derivatives_are_those_of_finite_differences(name: str) -> None:
-    robot = mimicking(name)
+def test_first_derivatives_match_finite_differences(name: str) -> None:
+    robot = mimic_robot(name)
     scene = Scene(robot, [Gravity()])
     q, v, a = points(robot)
     tau, J = scene.torques.linearize(q, v, a)
@@ -100,8 +100,8 @@ def test_first_derivatives_are_those_of_finite_differences(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_second_derivatives_are_those_of_casadi(name: str) -> None:
-    robot = mimicking(name)
+def test_second_derivatives_match_casadi(name: str) -> None:
+    robot = mimic_robot(name)
     scene = Scene(robot, [Gravity()])
     symbols = scene.terms.symbols
     space = None if robot.vector_joints else robot.space
@@ -118,9 +118,9 @@ def test_second_derivatives_are_those_of_casadi(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_the_mass_matrix_is_that_of_rnea(name: str) -> None:
-    """Column by column: CRBA itself is wrong with a spherical joint between leader and follower."""
-    robot = mimicking(name)
+def test_the_mass_matrix_matches_rnea(name: str) -> None:
+    """CRBA itself is wrong with a spherical joint between leader and follower."""
+    robot = mimic_robot(name)
     q, v, _ = points(robot)
     scene, still = Scene(robot), np.zeros_like(v)
     columns = [rnea(scene, q, still, still + e) for e in np.eye(robot.nv)]
@@ -130,17 +130,17 @@ def test_the_mass_matrix_is_that_of_rnea(name: str) -> None:
     robot.check_mass_matrix()
 
 
-def test_a_base_that_rises_faster_and_faster_feels_like_gravity() -> None:
-    robot = mimicking("two followers")
+def test_an_accelerating_base_is_equivalent_to_gravity() -> None:
+    robot = mimic_robot("two followers")
     lifted = Scene(robot, [MovingBase((0.0, 0.0, "4.905*t**2"))])
     q, v, a = points(robot)
     close(lifted.torques.torque(q, v, a), rnea(Scene(robot, [Gravity(9.81)]), q, v, a), 1e-12)
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_effects_reach_what_leads_through_what_follows(name: str) -> None:
-    """The torques of the robot without mimics, added up as virtual work does."""
-    bound, free = mimicking(name), load_robot(chain(CHAINS[name][0]))
+def test_effects_on_followers_act_on_their_leaders(name: str) -> None:
+    """Torques equal G^T times those of the uncoupled robot, by virtual work."""
+    bound, free = mimic_robot(name), load_robot(chain(CHAINS[name][0]))
     last = f"b{len(CHAINS[name][0]) - 1}"
     effects = [
         Gravity(),
@@ -149,7 +149,7 @@ def test_effects_reach_what_leads_through_what_follows(name: str) -> None:
         Drag(last, 0.3, wind=(0.0, 5.0, 0.0)),
     ]
     q, v, a = points(bound)
-    pull = Pull.of(bound.model, uncoupled(bound.model))
+    pull = CoordinateMap.of(bound.model, uncoupled(bound.model))
     of_all = pull.configurations(q), v @ pull.matrix.T, a @ pull.matrix.T
     expected = Scene(free, effects).inverse_dynamics(*of_all) @ pull.matrix
     close(Scene(bound, effects).inverse_dynamics(q, v, a), expected, 1e-13)
@@ -188,8 +188,8 @@ def loaded(tmp_path: Path, text: str, **options: object) -> Robot:
     return load_robot(path, **({"mimic": True} | options))  # type: ignore[arg-type]
 
 
-def test_a_tray_that_stays_level_is_planned_as_the_pendulum_that_it_is(tmp_path: Path) -> None:
-    """A last link that turns against the first by as much moves without turning: a point mass."""
+def test_a_tray_that_stays_level_moves_like_a_pendulum(tmp_path: Path) -> None:
+    """A last link that counter-rotates the first only translates: a point mass."""
     m1, c1, i1, m2, length = 1.3, 0.4, 0.11, 0.7, 0.9
     tray = loaded(
         tmp_path,
@@ -214,7 +214,7 @@ def test_a_tray_that_stays_level_is_planned_as_the_pendulum_that_it_is(tmp_path:
     np.testing.assert_allclose(found[0].trajectory.q, found[1].trajectory.q, atol=1e-9)
 
 
-def test_a_plan_of_the_panda_with_its_gripper_moves_it_as_planned(tmp_path: Path) -> None:
+def test_replayed_torques_of_the_panda_with_gripper_follow_the_plan(tmp_path: Path) -> None:
     robot = load_robot("panda", mimic=True)
     start = robot.pose("default")
     goal = start + np.array([0.5, -0.4, 0.3, 0.6, -0.2, 0.4, 0.5, 0.03])
@@ -230,8 +230,8 @@ def test_a_plan_of_the_panda_with_its_gripper_moves_it_as_planned(tmp_path: Path
     np.testing.assert_array_equal(again.sample(t).tau, solution.trajectory.sample(t).tau)
 
 
-def test_shapes_stand_where_those_of_the_free_robot_do() -> None:
-    """Of a robot whose leaders come after their followers in the URDF."""
+def test_shapes_are_placed_like_those_of_the_free_robot() -> None:
+    """For a robot whose leaders come after their followers in the URDF."""
     bound, free = (load_robot("romeo", mimic=each) for each in (True, False))
     q, follow = configurations(bound, 1, size=0.4)[0], free.neutral()
     for name in bound.joint_names:
@@ -241,13 +241,13 @@ def test_shapes_stand_where_those_of_the_free_robot_do() -> None:
         leader = bound.model.joints[bound.model.getJointId(coupling.leader)]
         place = free.model.joints[free.model.getJointId(coupling.follower)].idx_q
         follow[place] = coupling.multiplier * q[leader.idx_q] + coupling.offset
-    first, second = placed(bound, q), placed(free, follow)
+    first, second = placements(bound, q), placements(free, follow)
     assert len(first) == len(second) > 20
     for name, placement in first.items():
         np.testing.assert_allclose(placement, second[name], atol=1e-14)
 
 
-def placed(robot: Robot, q: Array) -> dict[str, Array]:
+def placements(robot: Robot, q: Array) -> dict[str, Array]:
     shapes = robot.visual
     assert shapes is not None
     data, places = robot.model.createData(), shapes.createData()
@@ -256,7 +256,7 @@ def placed(robot: Robot, q: Array) -> dict[str, Array]:
     return {shape.name: np.array(place.homogeneous) for shape, place in pairs}
 
 
-def test_distances_bend_with_joints_that_follow() -> None:
+def test_second_derivatives_of_distances_include_mimic_joints() -> None:
     robot = load_robot("baxter", mimic=True)
     distances = Distances(robot, Clearance(Box([0.2, 0.2, 0.2], [0.9, -0.3, 0.4])))
     q = configurations(robot, 2, size=0.4)
@@ -271,7 +271,7 @@ def test_distances_bend_with_joints_that_follow() -> None:
 
 
 def two_fingers(follows: str, kind: str = "revolute") -> str:
-    """A joint "b" with mass, and a joint "a" that follows it but comes first by its name."""
+    """A joint "b" with mass, and a joint "a" that follows it but sorts before it."""
     return urdf(
         LINK.format("left", 0.2, 1.0, 0.1),
         LINK.format("right", 0.3, 2.0, 0.2),
@@ -293,7 +293,7 @@ def test_a_leader_may_come_after_its_follower(tmp_path: Path) -> None:
     assert tau[0] == pytest.approx(both[1] - 2 * both[0], rel=1e-13)
 
 
-def test_limits_and_losses_of_a_follower_are_its_leaders(tmp_path: Path) -> None:
+def test_limits_and_losses_of_a_follower_are_transferred_to_its_leader(tmp_path: Path) -> None:
     text = two_fingers(mimic("b", -2.0, 1.0) + '<dynamics damping="0.5" friction="0.25"/>')
     robot = loaded(tmp_path, text)
     limits = urdf_limits(robot)
@@ -303,7 +303,7 @@ def test_limits_and_losses_of_a_follower_are_its_leaders(tmp_path: Path) -> None
     np.testing.assert_allclose([*robot.damping, *robot.friction], [2.0, 0.5])
 
 
-def test_followers_of_what_stands_still_stand_still(tmp_path: Path) -> None:
+def test_followers_of_fixed_joints_are_fixed(tmp_path: Path) -> None:
     text = urdf(
         LINK.format("left", 0.2, 1.0, 0.1),
         LINK.format("right", 0.3, 2.0, 0.2),
@@ -323,7 +323,7 @@ def test_followers_of_what_stands_still_stand_still(tmp_path: Path) -> None:
     np.testing.assert_allclose(turned, pin.utils.rotate("x", 0.3), atol=1e-15)
 
 
-def test_a_chain_of_mimics_follows_its_first(tmp_path: Path) -> None:
+def test_a_chain_of_mimics_follows_its_first_leader(tmp_path: Path) -> None:
     text = two_fingers(mimic("b", 2.0, 0.5)).replace("</robot>", "")
     text += LINK.format("tip", 0.1, 1.0, 0.1)
     text += joint("c", "right", "tip", 0.2, mimic("a", -3.0, 0.25)) + "</robot>"
@@ -339,7 +339,7 @@ def test_a_chain_of_mimics_follows_its_first(tmp_path: Path) -> None:
         ("c", {"c": 0.0, "d": 0.25}),
     ],
 )
-def test_a_locked_joint_of_a_chain_holds_what_follows_it(
+def test_a_locked_joint_of_a_chain_fixes_its_followers(
     tmp_path: Path, locked: str, held: dict[str, float]
 ) -> None:
     """Of a = 2 b + 0.5, c = -3 a + 0.25, d = -1.5 c + 0.25."""
@@ -354,30 +354,30 @@ def test_a_locked_joint_of_a_chain_holds_what_follows_it(
 
 
 def top(robot: Robot, stands: dict[str, float]) -> Array:
-    """Where the frame "top" is when the joints that move on their own stand so."""
+    """Position of the frame "top" at given positions of the independent joints."""
     data, q = robot.model.createData(), np.array([stands[name] for name in robot.joint_names])
     pin.framesForwardKinematics(robot.model, data, q)
     return np.array(data.oMf[robot.model.getFrameId("top")].homogeneous)
 
 
-def test_a_range_that_a_continuous_leader_cannot_keep_is_told(tmp_path: Path) -> None:
+def test_a_range_that_a_continuous_leader_cannot_enforce_is_reported(tmp_path: Path) -> None:
     text = two_fingers(mimic("b", -2.0, 0.3))
     turning = text.replace('<joint name="b" type="revolute"', '<joint name="b" type="continuous"')
     assert turning != text
-    told = "position range of a is not kept"
-    assert told in loaded(tmp_path, turning).describe()
-    assert told not in loaded(tmp_path, turning, mimic=False).describe()
-    assert told not in loaded(tmp_path, text).describe()
+    note = "position range of a is not enforced"
+    assert note in loaded(tmp_path, turning).describe()
+    assert note not in loaded(tmp_path, turning, mimic=False).describe()
+    assert note not in loaded(tmp_path, text).describe()
 
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        (two_fingers(mimic("nobody")), "'a' mimics 'nobody', which is no joint"),
+        (two_fingers(mimic("nobody")), "'a' mimics 'nobody', which does not exist"),
         (two_fingers(mimic("b", 0.5), "continuous"), "'a' mimics 'b', a continuous joint, 0.5"),
         (
             two_fingers(mimic("b")).replace("<limit", mimic("a") + "<limit", 1),
-            "mimics itself in the end",
+            "mimics itself through others",
         ),
         (
             urdf(
@@ -386,11 +386,13 @@ def test_a_range_that_a_continuous_leader_cannot_keep_is_told(tmp_path: Path) ->
                 joint("a", "base", "left", 0.0, mimic("b")),
                 joint("b", "left", "right"),
             ),
-            "'a' mimics 'b', which it carries itself",
+            "'a' mimics 'b', which comes after it in the chain",
         ),
     ],
 )
-def test_what_cannot_be_coupled_is_named(tmp_path: Path, text: str, sentence: str) -> None:
+def test_an_impossible_coupling_is_refused_by_name(
+    tmp_path: Path, text: str, sentence: str
+) -> None:
     with pytest.raises(ModelError, match=sentence):
         loaded(tmp_path, text)
 
@@ -404,14 +406,14 @@ def test_without_mimic_every_joint_moves_and_the_description_says_so(tmp_path: P
     assert "<mimic>" not in bound.describe()
 
 
-def test_the_command_tells_of_what_follows(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_lists_followers(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "panda", "--mimic"]) == 0
-    told = capsys.readouterr().out
-    assert "nq = 8" in told
-    assert "= panda_finger_joint1" in told
+    note = capsys.readouterr().out
+    assert "nq = 8" in note
+    assert "= panda_finger_joint1" in note
 
 
-def test_what_follows_stands_out_with_its_leader(tmp_path: Path) -> None:
+def test_followers_are_highlighted_with_their_leader(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
     limits = {"v": {"b": 1.2}}
     motion = plan(Scene(robot, [Gravity()]), [0.0], [1.0], 1.0, limits=limits).trajectory
@@ -422,7 +424,7 @@ def test_what_follows_stands_out_with_its_leader(tmp_path: Path) -> None:
     np.testing.assert_array_equal(flags["a"], flags["b"])
 
 
-def test_a_study_of_effects_takes_what_follows_along(tmp_path: Path) -> None:
+def test_an_effect_study_supports_mimic_joints(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b", -2.0, 0.3)))
     task = Task(
         Scene(robot, [Gravity()]), State([0.0]), State([0.5]), 0.5, PlanOptions(limits="none")
@@ -434,13 +436,13 @@ def test_a_study_of_effects_takes_what_follows_along(tmp_path: Path) -> None:
     assert rubbed.torque == pytest.approx(0.3 * speed, rel=1e-2)
 
 
-def test_what_follows_cannot_be_named_as_if_it_moved_alone(tmp_path: Path) -> None:
+def test_a_follower_cannot_be_named_as_an_independent_joint(tmp_path: Path) -> None:
     robot = loaded(tmp_path, two_fingers(mimic("b")))
     with pytest.raises(SceneError, match="no joint 'a': it mimics 'b'; name that joint"):
         Scene(robot, passive=["a"])
 
 
-def test_a_pose_of_an_srdf_gives_what_leads(tmp_path: Path) -> None:
+def test_a_pose_of_an_srdf_sets_the_leader(tmp_path: Path) -> None:
     srdf = tmp_path / "made.srdf"
     srdf.write_text(
         '<robot name="made"><group_state name="open" group="g"><joint name="a" value="0.9"/>'
@@ -453,7 +455,7 @@ def test_a_pose_of_an_srdf_gives_what_leads(tmp_path: Path) -> None:
 # Files and other processes
 
 
-def test_a_scene_file_says_mimic(tmp_path: Path) -> None:
+def test_a_scene_file_supports_mimic(tmp_path: Path) -> None:
     (tmp_path / "made.urdf").write_text(two_fingers(mimic("b")))
     scene = tmp_path / "scene.toml"
     scene.write_text(
@@ -467,8 +469,8 @@ def test_a_scene_file_says_mimic(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", CHAINS)
-def test_robots_and_scenes_go_to_other_processes(name: str) -> None:
-    scene = Scene(mimicking(name), [Gravity()])
+def test_robots_and_scenes_can_be_pickled(name: str) -> None:
+    scene = Scene(mimic_robot(name), [Gravity()])
     again = pickle.loads(pickle.dumps(scene))
     at = points(scene.robot)
     assert again.robot.couplings == scene.robot.couplings
@@ -477,7 +479,7 @@ def test_robots_and_scenes_go_to_other_processes(name: str) -> None:
     close(again.torques.torque(*at), scene.torques.torque(*at), 1e-15)
 
 
-def test_a_given_model_may_lock_joints_beside_its_mimics() -> None:
+def test_a_given_model_can_lock_joints_beside_its_mimic_joints() -> None:
     model = load_robot("pr2", mimic=True).model
     held = ["r_gripper_l_finger_joint", "l_gripper_l_finger_tip_joint", "torso_lift_joint"]
     robot, same = load_robot(model, locked=held), load_robot("pr2", mimic=True, locked=held)
@@ -488,7 +490,7 @@ def test_a_given_model_may_lock_joints_beside_its_mimics() -> None:
     close(rnea(Scene(robot), *at), rnea(Scene(same), *at), 1e-14)
 
 
-def test_the_description_shows_followers_of_what_stands_still(tmp_path: Path) -> None:
+def test_the_description_lists_followers_of_fixed_joints(tmp_path: Path) -> None:
     text = urdf(
         LINK.format("a", 0.0, 1.0, 0.1),
         LINK.format("b", 0.0, 1.0, 0.1),
@@ -502,6 +504,6 @@ def test_the_description_shows_followers_of_what_stands_still(tmp_path: Path) ->
     assert "second" not in loaded(tmp_path, text, locked="second").describe().split("Base:")[0]
 
 
-def test_the_description_says_when_nothing_mimics() -> None:
-    assert "no joint of it mimics another" in load_robot("ur5", mimic=True).describe()
-    assert "no joint of it mimics another" not in load_robot("ur5").describe()
+def test_the_description_says_if_no_joint_mimics_another() -> None:
+    assert "no joint mimics another" in load_robot("ur5", mimic=True).describe()
+    assert "no joint mimics another" not in load_robot("ur5").describe()

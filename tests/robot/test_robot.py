@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 
 NOT_A_URDF = {"cassie": "SDF"}
-"""Examples that cannot be loaded, and the reason that the error must give."""
+"""Examples that cannot be loaded, with a word of the error."""
 
 MASSLESS = {
     "bluevolta_bravo7_gripper": r"bravo_finger\d_joint",
@@ -28,7 +28,7 @@ MASSLESS = {
     "falcon_bravo7_gripper": r"bravo_finger\d_joint",
     "romeo": r"[LR](Finger\d\d|Thumb\d|Hand)",
 }
-"""Examples whose fingers have no mass, and the joints of these fingers."""
+"""Examples whose fingers have no mass, with a pattern of the joints of these fingers."""
 
 MESH_ARM = """<robot name="mesh_arm"><link name="base"/><link name="rod">
   <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
@@ -79,7 +79,7 @@ def mesh_arm(folder: Path, mesh: str) -> Path:
 # The shipped models
 
 
-def test_the_two_link_arm_has_the_torques_that_the_paper_prints(two_link: Robot) -> None:
+def test_the_two_link_arm_has_the_torques_printed_in_the_paper(two_link: Robot) -> None:
     model = two_link.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -9.8])
     data = model.createData()
@@ -89,7 +89,7 @@ def test_the_two_link_arm_has_the_torques_that_the_paper_prints(two_link: Robot)
         )
 
 
-def test_the_two_link_arm_lies_along_x_and_can_be_seen(two_link: Robot) -> None:
+def test_the_two_link_arm_lies_along_x_and_has_visual_geometry(two_link: Robot) -> None:
     assert two_link.joint_names == ("shoulder", "elbow")
     assert two_link.tip_frame == "tip"
     q = np.array([[0.0, 0.0], [np.pi / 2, 0.0], [0.0, np.pi / 2]])
@@ -100,7 +100,7 @@ def test_the_two_link_arm_lies_along_x_and_can_be_seen(two_link: Robot) -> None:
     assert two_link.visual_problem == ""
 
 
-def test_the_pendulum_swings_like_a_ball_on_a_string(models: Path) -> None:
+def test_the_pendulum_has_the_torque_of_a_point_mass(models: Path) -> None:
     robot = load_robot(models / "pendulum.urdf")
     q, a = np.array([0.7]), np.array([1.1])
     torque = pin.rnea(robot.model, robot.model.createData(), q, np.array([5.0]), a)
@@ -126,7 +126,7 @@ def test_every_example_loads_as_pinocchio_reads_it(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["talos_arm", "ur5", "solo8", *BUILT_IN_CODE])
-def test_an_example_moves_like_the_model_of_its_own_loader(name: str) -> None:
+def test_an_example_has_the_dynamics_of_its_own_loader(name: str) -> None:
     import example_robot_data
 
     oracle, robot = example_robot_data.load(name), load_robot(name)
@@ -152,12 +152,12 @@ def test_only_examples_with_massless_fingers_have_a_singular_mass_matrix(name: s
     load_robot(name, locked=fingers).check_mass_matrix()
 
 
-def test_an_unknown_example_is_answered_with_the_nearest_names() -> None:
+def test_an_unknown_example_is_refused_with_the_nearest_names() -> None:
     with pytest.raises(ModelError, match=r"'pnada'.*did you mean .*'panda'"):
         load_robot("pnada")
 
 
-def test_the_user_decides_about_the_free_flyer() -> None:
+def test_the_free_flyer_option_overrides_the_loader() -> None:
     assert load_robot("solo8").nv == 14
     assert load_robot("solo8", free_flyer=False).nv == 8
     assert load_robot("ur5", free_flyer=True).nv == 12
@@ -166,7 +166,7 @@ def test_the_user_decides_about_the_free_flyer() -> None:
 # Loading
 
 
-def test_a_missing_file_is_called_missing(tmp_path: Path) -> None:
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     for missing in (tmp_path / "arm.urdf", str(tmp_path / "arm"), "arm.urdf"):
         with pytest.raises(ModelError, match="no such file"):
             load_robot(missing)
@@ -179,7 +179,7 @@ def test_loading_reads_no_mesh(panda: Robot) -> None:
     assert "_visual_shapes" in vars(robot)
 
 
-def test_locked_joints_leave_model_and_shapes(panda: Robot) -> None:
+def test_locked_joints_are_removed_from_model_and_shapes(panda: Robot) -> None:
     full = load_robot("panda")
     assert (full.nv, panda.nv) == (9, 7)
     assert not set(FINGERS) & set(panda.joint_names)
@@ -192,7 +192,7 @@ def test_locked_joints_leave_model_and_shapes(panda: Robot) -> None:
     assert panda.frame_position(frame, q) == pytest.approx(full.frame_position(frame, padded))
 
 
-def test_an_unknown_joint_to_lock_is_answered_with_the_nearest_names() -> None:
+def test_an_unknown_joint_to_lock_is_refused_with_the_nearest_names() -> None:
     with pytest.raises(ModelError, match=r"'panda_finger_joint'.*did you mean"):
         load_robot("panda", locked=["panda_finger_joint"])
 
@@ -211,7 +211,7 @@ def test_a_pinocchio_model_is_copied(two_link: Robot) -> None:
     assert seen.visual.ngeoms == 6
 
 
-def test_anything_else_is_refused() -> None:
+def test_other_types_are_refused() -> None:
     with pytest.raises(ModelError, match="not int"):
         load_robot(3)  # type: ignore[arg-type]
 
@@ -219,7 +219,7 @@ def test_anything_else_is_refused() -> None:
 # Meshes
 
 
-def test_a_robot_without_its_meshes_loads_and_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_robot_without_its_meshes_loads_and_reports_what_is_missing(tmp_path: Path) -> None:
     robot = load_robot(mesh_arm(tmp_path, "package://somewhere/rod.stl"))
     assert robot.nv == 1
     assert robot.visual is None
@@ -261,7 +261,7 @@ def test_a_mesh_outside_the_package_is_never_read(tmp_path: Path, mesh: str) -> 
     assert load_robot(urdf, package_dirs=[tmp_path / "outside"]).nv == 1
 
 
-def test_a_link_that_leads_out_of_the_package_is_not_followed(tmp_path: Path) -> None:
+def test_a_symbolic_link_out_of_the_package_is_not_followed(tmp_path: Path) -> None:
     for folder in ("outside", "inside"):
         (tmp_path / folder).mkdir()
     (tmp_path / "outside" / "rod.stl").write_text(TRIANGLE)
@@ -271,7 +271,7 @@ def test_a_link_that_leads_out_of_the_package_is_not_followed(tmp_path: Path) ->
     assert "lies outside" in robot.visual_problem
 
 
-def test_a_package_may_itself_be_a_link(tmp_path: Path) -> None:
+def test_a_package_may_be_a_symbolic_link(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir()
     (tmp_path / "real" / "rod.stl").write_text(TRIANGLE)
     (tmp_path / "arm").symlink_to(tmp_path / "real")
@@ -294,7 +294,7 @@ def test_names_and_sizes_agree() -> None:
         assert value.shape == (6,)
 
 
-def test_limits_are_those_of_the_urdf(panda: Robot) -> None:
+def test_limits_match_the_urdf(panda: Robot) -> None:
     assert panda.lower[3] == -3.0718
     assert panda.velocity_limit[4] == 2.61
     assert panda.effort_limit[0] == 87.0
@@ -330,7 +330,7 @@ def test_a_bad_configuration_is_refused_by_name(
             two_link.check_velocity(q, "start")
 
 
-def test_a_coordinate_beyond_all_bounds_is_refused_by_name(two_link: Robot) -> None:
+def test_a_huge_coordinate_is_refused_by_name(two_link: Robot) -> None:
     with pytest.raises(InputError, match=r"start is 1e\+308 at joint 'elbow': at most 1e\+09"):
         two_link.check_configuration([0.0, 1e308], "start")
 
@@ -352,7 +352,7 @@ def test_a_quaternion_or_angle_without_unit_norm_is_refused() -> None:
 
 
 @pytest.mark.parametrize("shape", [(), (2,), (1, 3), (1, 1, 2)])
-def test_places_are_those_of_rows_of_configurations(
+def test_frame_positions_need_rows_of_configurations(
     two_link: Robot, shape: tuple[int, ...]
 ) -> None:
     with pytest.raises(InputError, match=re.escape(f"rows of shape (M, 2), got shape {shape}")):
@@ -360,12 +360,12 @@ def test_places_are_those_of_rows_of_configurations(
 
 
 @pytest.mark.parametrize("key", ["mimic", "free_flyer"])
-def test_a_switch_is_true_or_false(key: str) -> None:
+def test_options_must_be_true_or_false(key: str) -> None:
     with pytest.raises(InputError, match=f"got a str; give {key}=True or {key}=False"):
         load_robot("panda", **{key: "yes"})  # type: ignore[arg-type]
 
 
-def test_a_single_joint_to_lock_may_come_without_brackets() -> None:
+def test_a_single_name_can_be_locked() -> None:
     assert load_robot("ur5", locked="elbow_joint").nv == 5
 
 
@@ -373,7 +373,7 @@ def test_a_robot_prints_its_name_and_sizes(two_link: Robot) -> None:
     assert repr(two_link) == "<Robot 'two_link': nq = 2, nv = 2>"
 
 
-def test_an_unknown_frame_is_answered_with_the_nearest_names(two_link: Robot) -> None:
+def test_an_unknown_frame_is_refused_with_the_nearest_names(two_link: Robot) -> None:
     with pytest.raises(InputError, match=r"no frame 'tipp'.*'tip'"):
         two_link.frame_position("tipp", np.zeros((1, 2)))
 
@@ -401,7 +401,7 @@ def test_unequal_masses_are_not_singular(tmp_path: Path, models: Path, ratio: fl
 # Files and processes
 
 
-def test_a_stored_robot_holds_its_urdf_and_no_path(two_link: Robot, models: Path) -> None:
+def test_a_stored_robot_contains_its_urdf_and_no_path(two_link: Robot, models: Path) -> None:
     stored = json.loads(json.dumps(two_link.to_dict()))
     assert str(models) not in json.dumps(stored)
     assert stored["urdf"].encode() == (models / "two_link.urdf").read_bytes()
@@ -427,7 +427,7 @@ def test_a_stored_urdf_that_was_edited_is_refused(two_link: Robot) -> None:
 
 
 @pytest.mark.parametrize("key", ["name", "kind", "reference", "urdf", "locked", "free_flyer"])
-def test_a_stored_robot_that_is_not_whole_is_refused(two_link: Robot, key: str) -> None:
+def test_an_incomplete_stored_robot_is_refused(two_link: Robot, key: str) -> None:
     for damage in (None, 3):
         with pytest.raises(ModelError):
             Robot.from_dict({**two_link.to_dict(), key: damage})
@@ -439,14 +439,14 @@ def test_a_stored_armature_is_checked(two_link: Robot, armature: dict[str, objec
         Robot.from_dict({**two_link.to_dict(), "armature": armature})
 
 
-def test_a_pinocchio_model_cannot_be_read_from_a_file() -> None:
+def test_a_pinocchio_model_cannot_be_restored_from_a_file() -> None:
     stored = load_robot(pin.buildSampleModelManipulator()).to_dict()
     assert stored["urdf"] is None
     with pytest.raises(ModelError, match=r"was given as a pinocchio\.Model"):
         Robot.from_dict(json.loads(json.dumps(stored)))
 
 
-def test_a_robot_travels_to_another_process(two_link: Robot, panda: Robot) -> None:
+def test_a_robot_can_be_pickled(two_link: Robot, panda: Robot) -> None:
     given = load_robot(two_link.model, visual=two_link.visual)
     for robot in (two_link, panda, given):
         count = robot.visual.ngeoms if robot.visual else 0
@@ -456,7 +456,7 @@ def test_a_robot_travels_to_another_process(two_link: Robot, panda: Robot) -> No
         assert again.visual.ngeoms == count
 
 
-def test_sources_are_values(two_link: Robot) -> None:
+def test_sources_compare_by_value(two_link: Robot) -> None:
     stored = two_link.source.to_dict()
     assert RobotSource.from_dict(stored) == RobotSource.from_dict(stored)
 
@@ -464,7 +464,7 @@ def test_sources_are_values(two_link: Robot) -> None:
 # Words
 
 
-def test_the_description_names_what_a_scene_leaves_out() -> None:
+def test_the_description_lists_properties_that_need_an_effect() -> None:
     text = load_robot("talos_arm").describe()
     for words in ("7 joints", "nv = 7", "arm_left_2_joint", "damping", "dry friction", "armature"):
         assert words in text
@@ -472,12 +472,12 @@ def test_the_description_names_what_a_scene_leaves_out() -> None:
     assert "takes (cos, sin) of its angle" in load_robot("kinova").describe()
 
 
-def test_the_description_says_on_what_nothing_can_be_planned(tmp_path: Path, models: Path) -> None:
+def test_the_description_says_if_planning_is_not_possible(tmp_path: Path, models: Path) -> None:
     text = (models / "two_link.urdf").read_text()
     path = tmp_path / "light.urdf"
     path.write_text(re.sub(r'(<mass value=|i[xyz]{2}=)"[^"]*"', r'\1"0"', text))
     words = load_robot(path).describe()
-    assert "Nothing can be planned on it as it is: the mass matrix" in words
+    assert "Planning is not possible: the mass matrix" in words
     assert "'shoulder'" in words
 
 

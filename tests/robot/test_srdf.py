@@ -26,7 +26,7 @@ ARM = """<robot name="two_link">
 
 
 @pytest.mark.parametrize("name", ["panda", "z1", "talos", "solo12", "anymal"])
-def test_poses_are_those_that_pinocchio_reads(name: str) -> None:
+def test_poses_match_pinocchio(name: str) -> None:
     robot = load_robot(name)
     srdf = example_robot(name).srdf
     model = robot.model.copy()
@@ -38,7 +38,7 @@ def test_poses_are_those_that_pinocchio_reads(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["panda", "ur5", "anymal"])
-def test_checked_pairs_are_those_that_pinocchio_leaves_without_neighbours(name: str) -> None:
+def test_checked_pairs_match_pinocchio_without_adjacent_links(name: str) -> None:
     robot = load_robot(name)
     geometry = robot.collision
     assert geometry is not None
@@ -56,7 +56,7 @@ def test_checked_pairs_are_those_that_pinocchio_leaves_without_neighbours(name: 
     assert left
 
 
-def test_a_pose_is_neutral_but_for_its_joints(models: Path, tmp_path: Path) -> None:
+def test_joints_that_a_pose_does_not_list_are_neutral(models: Path, tmp_path: Path) -> None:
     (tmp_path / "arm.srdf").write_text(ARM)
     robot = load_robot(models / "two_link.urdf", srdf=tmp_path / "arm.srdf")
     assert {name: list(q) for name, q in robot.poses.items()} == {
@@ -98,7 +98,7 @@ def test_a_motion_is_planned_between_poses(models: Path, tmp_path: Path) -> None
         ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "no DOCTYPE"),
     ],
 )
-def test_a_broken_srdf_is_refused_in_a_sentence(text: str, words: str) -> None:
+def test_a_broken_srdf_is_refused_in_one_sentence(text: str, words: str) -> None:
     with pytest.raises(ModelError, match=words):
         parse_srdf(text)
 
@@ -110,6 +110,6 @@ def test_a_joint_with_too_many_numbers_is_named(models: Path, tmp_path: Path) ->
         robot.pose("bent")
 
 
-def test_a_missing_srdf_is_said(models: Path) -> None:
+def test_a_missing_srdf_is_refused(models: Path) -> None:
     with pytest.raises(HoviError, match="cannot read the SRDF"):
         load_robot(models / "two_link.urdf", srdf="nowhere.srdf")

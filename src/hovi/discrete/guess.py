@@ -111,7 +111,7 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
         ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
-        return robot.chart.carried((q, v, a), x @ c, dx @ c, ddx @ c)
+        return robot.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
 
     return curve
 
@@ -127,7 +127,7 @@ def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curv
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        return robot.chart.carried(base(t), _wound(robot, x * angle), dx * angle, ddx * angle)
+        return robot.chart.composed(base(t), _wound(robot, x * angle), dx * angle, ddx * angle)
 
     return curve
 

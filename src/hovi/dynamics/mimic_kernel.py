@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel, joints_without_kernel
-from hovi.robot.mimic_model import Pull, uncoupled
+from hovi.robot.mimic_model import CoordinateMap, uncoupled
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class MimicKernel:
     def __init__(self, model: pin.Model) -> None:
         free = uncoupled(model)
         self.kernel = InverseDynamicsKernel(free)
-        self.pull = Pull.of(model, free)
+        self.pull = CoordinateMap.of(model, free)
         self.G = self.pull.matrix  # (nv_all, nv)
         self._pulls = np.kron(np.eye(3), self.G)  # diag(G, G, G), (3 nv_all, 3 nv)
 

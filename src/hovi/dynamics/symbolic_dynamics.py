@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.errors import ModelError, nearest
-from hovi.robot.mimic_model import Pull, uncoupled
+from hovi.robot.mimic_model import CoordinateMap, uncoupled
 
 _Back = Callable[[casadi.SX, casadi.SX], list[casadi.SX]]
 
@@ -33,7 +33,7 @@ class RigidBodyFunctions:
 
     text: str
     frames: tuple[str, ...]
-    pull: Pull | None = None
+    pull: CoordinateMap | None = None
 
     @cached_property
     def inverse_dynamics(self) -> casadi.Function:
@@ -112,4 +112,4 @@ def casadi_functions(model: pin.Model) -> RigidBodyFunctions:
     if not len(model.mimicking_joints):
         return RigidBodyFunctions(archive(model), frames)
     free = uncoupled(model)
-    return RigidBodyFunctions(archive(free), frames, Pull.of(model, free))
+    return RigidBodyFunctions(archive(free), frames, CoordinateMap.of(model, free))

@@ -1,4 +1,4 @@
-"""The scenes and URDFs that travel with hovi."""
+"""The scenes and URDFs that ship with hovi."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _FOLDERS = (_PACKAGE / "models", _PACKAGE.parents[1] / "models")
 
 
 def example(name: str) -> Path:
-    """The path of a scene or URDF that travels with hovi.
+    """The path of a scene or URDF that ships with hovi.
 
-    name: "two_link_swing_up", "two_link.urdf" and so on; without an ending, a scene is looked
-        for first, then a URDF. Raises SceneError for any other name.
+    name: such as "two_link_swing_up" or "two_link.urdf"; without a suffix, a scene is preferred
+        to a URDF. Raises SceneError for an unknown name.
     """
     known = _shipped()
     for file_name in (name, f"{name}.toml", f"{name}.urdf"):
@@ -25,7 +25,7 @@ def example(name: str) -> Path:
 
 
 def example_scenes() -> list[str]:
-    """Names of the scenes that travel with hovi, sorted."""
+    """Names of the scenes that ship with hovi, sorted."""
     return sorted(path.stem for path in _shipped().values() if path.suffix == ".toml")
 
 

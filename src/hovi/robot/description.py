@@ -1,4 +1,4 @@
-"""A robot in words, for a terminal."""
+"""A summary of a robot as text."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
 
 
 def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -> str:
-    """The text of `hovi info`: joints, limits, mass, and what the URDF holds besides."""
+    """The text of `hovi info`: joints, limits, mass, and notes on the URDF."""
     sections = [
         _headline(name, model, source),
         "\n".join(_joint_table(model, _held_followers(source))),
@@ -30,12 +30,10 @@ def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -
     ]
     parts = [f"  {line}" for line in _opt_in_parts(model)]
     if parts:
-        sections.append(
-            "\n".join(["Simulated only where an effect of the scene names it:", *parts])
-        )
+        sections.append("\n".join(["Simulated only if the scene has the effect:", *parts]))
     notes = [f"  {line}" for line in _notes(model, source)]
     if notes:
-        sections.append("\n".join(["Worth knowing:", *notes]))
+        sections.append("\n".join(["Notes:", *notes]))
     return "\n\n".join(sections)
 
 
@@ -48,12 +46,12 @@ def _headline(name: str, model: pin.Model, source: RobotSource) -> str:
     }[source.kind]
     return (
         f"{name}: {_count(model.njoints - 1, 'joint')}, nq = {model.nq}, nv = {model.nv}, "
-        f"{mass:.6g} kg in motion, from {origin}"
+        f"{mass:.6g} kg of moving mass, from {origin}"
     )
 
 
 def _held_followers(source: RobotSource) -> dict[str, float]:
-    """Followers of what does not move, which stand where their offset says and are no joints."""
+    """Followers of fixed joints, which are fixed at their offset."""
     held = held_values(couplings_in(source), source.locked)
     return {name: value for name, value in held.items() if name not in source.locked}
 
@@ -123,22 +121,22 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
     mimics = [j.get("name", "") for j in robot.iterfind("joint") if j.find("mimic") is not None]
     mimics = [name for name in mimics if name in movable]
     if mimics and not source.mimic:
-        yield f"{_some(mimics)}: <mimic> counts with mimic=True only; the joint moves freely"
+        yield f"{_some(mimics)}: <mimic> is ignored without mimic=True; the joint moves freely"
     if source.mimic and not couplings_in(source):
-        yield "no joint of it mimics another: mimic=True changes nothing"
+        yield "no joint mimics another: mimic=True has no effect"
     unbounded = [name for name in _ranges_not_kept(model, robot) if source.mimic]
     if unbounded:
         yield (
-            f"the position range of {_some(unbounded)} is not kept, as what leads there is a "
+            f"the position range of {_some(unbounded)} is not enforced, since its leader is a "
             "continuous joint"
         )
     odd = [link.get("name", "") for link in robot.iterfind("link") if _breaks_triangle(link)]
     if odd:
-        yield f"no rigid body has the principal inertias that are written for {_some(odd)}"
+        yield f"the principal inertias of {_some(odd)} violate the triangle inequality"
 
 
 def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[str]:
-    """Followers with a range of their own whose leader has no plain position to bound."""
+    """Followers with a position range whose leader is a continuous joint."""
     for coupling in couplings_of(model):
         joint = robot.find(f"joint[@name='{coupling.follower}']")
         continuous = model.joints[model.getJointId(coupling.leader)].nq == 2

@@ -1,7 +1,7 @@
 """The robots of example-robot-data, read without the package's own loader.
 
-That loader opens every mesh of a robot (0.3 to 0.5 s). Here only its table is read: the places of
-the URDF and the SRDF, whether the base floats, and whether rotor inertias are in the SRDF.
+That loader opens every mesh of a robot (0.3 to 0.5 s). Here only its table is read: the paths of
+the URDF and the SRDF, whether the base floats, and whether the SRDF contains rotor inertias.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import pinocchio as pin
 from hovi.errors import ModelError, nearest
 
 BUILT_IN_CODE = ("human", "talos_legs")
-"""Robots whose loader changes the model after reading the URDF: the URDF alone is not the robot."""
+"""Robots whose loader modifies the model after reading the URDF."""
 
 
 @dataclass(frozen=True)
 class ExampleRobot:
     """One entry of the table.
 
-    package_dir: folder in which `package://` meshes are looked up. free_flyer: the base floats.
-    srdf: named poses and pairs of links that need no check; None where there is none.
-    rotors: whether the rotor inertias are to be read from it, too.
+    package_dir: folder in which `package://` meshes are looked up.
+    free_flyer: whether the base floats. srdf: path of the SRDF, or None.
+    rotors: whether rotor inertias are read from the SRDF.
     """
 
     name: str
@@ -36,12 +36,12 @@ class ExampleRobot:
 
 
 def example_names() -> tuple[str, ...]:
-    """Every name that example-robot-data knows, sorted."""
+    """The names of all robots in example-robot-data, sorted."""
     return tuple(sorted(_loaders().ROBOTS))
 
 
 def example_robot(name: str) -> ExampleRobot:
-    """The entry called `name`. Raises ModelError for an unknown name or a robot without a URDF."""
+    """The entry of a robot. Raises ModelError for an unknown name or a robot without a URDF."""
     loader = _loader_class(name)
     relative = Path(loader.path) / loader.urdf_subpath / loader.urdf_filename
     if not loader.urdf_filename:
@@ -68,7 +68,7 @@ def example_robot(name: str) -> ExampleRobot:
 
 
 def build_in_code(name: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
-    """Model, visual and collision geometry of a robot that only its own loader can build."""
+    """Model, visual and collision geometry of a robot of BUILT_IN_CODE."""
     wrapper = _loader_class(name)().robot
     return wrapper.model, wrapper.visual_model, wrapper.collision_model
 
@@ -87,7 +87,7 @@ def _loader_class(name: str) -> Any:
     robots = _loaders().ROBOTS
     if name not in robots:
         raise ModelError(
-            f"there is no example robot called {name!r}: {nearest(name, robots)} "
+            f"there is no example robot {name!r}: {nearest(name, robots)} "
             "(A path to a URDF file ends in .urdf.)"
         )
     return robots[name]

@@ -1,8 +1,9 @@
-"""The shapes of a robot, loaded when somebody looks at them: planning never waits for a mesh.
+"""The geometry of a robot, loaded on first access so that planning reads no mesh.
 
-Mesh names come from strangers, so each must lie inside its own package folder (or, for plain
+Mesh names are untrusted input: each file must lie inside its own package folder (or, for plain
 paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`). A shape
-whose mesh is missing or lies outside is left out and the reason is kept; the robot stays usable.
+whose mesh is missing or lies outside is left out and the reason is recorded; the robot stays
+usable.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ from hovi.robot.urdf.normalize import make_plain
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """What could be loaded (None for nothing), and what could not, in a sentence or ""."""
+    """The loaded geometry, or None, and a sentence about what is missing, or ""."""
 
     geometry: pin.GeometryModel | None
     problem: str
 
 
 def load_shapes(source: RobotSource, kind: str) -> Shapes:
-    """The "visual" or "collision" geometry of a source, its locked joints held."""
+    """The "visual" or "collision" geometry of a source, with its joints locked and coupled."""
     if source.urdf is None:
         return Shapes(None, f"robot {source.reference!r} was given without {kind} geometry.")
     text, problems = _with_found_meshes(source, kind)
@@ -48,7 +49,7 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
 
 
 def find_mesh(filename: str, source: RobotSource) -> Path:
-    """The file that a mesh name means. Raises ModelError when it escapes or does not exist."""
+    """The file of a mesh. Raises ModelError if it is outside its folder or does not exist."""
     candidates = list(_candidates(filename, source))
     for root, path in candidates:
         if not _inside(path, root):
@@ -62,7 +63,7 @@ def find_mesh(filename: str, source: RobotSource) -> Path:
 
 
 def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path]]:
-    """(folder that must contain the mesh, place of the mesh), in the order of search."""
+    """(folder that must contain the mesh, path of the mesh), in search order."""
     scheme, _, rest = filename.rpartition("://")
     if scheme in ("package", "model"):
         rest = rest.lstrip("/")
@@ -87,7 +88,7 @@ def _package_root(folder: Path) -> Path:
 
 
 def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
-    """Folders called `package`: in the package folders, or around the URDF file itself."""
+    """Folders named `package`: in the package folders, or around the URDF file."""
     for parent in _package_dirs(source):
         yield parent.absolute() / package
         if parent.name == package:
@@ -108,7 +109,7 @@ def _package_dirs(source: RobotSource) -> list[Path]:
 
 
 def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
-    """The URDF with absolute mesh names, without the shapes whose mesh is unusable, and why."""
+    """The URDF with absolute mesh paths, without shapes whose mesh is unusable; and the reasons."""
     robot = checked_urdf(source.urdf or "", source.reference)
     problems = []
     for link in robot.iterfind("link"):
@@ -124,7 +125,7 @@ def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
 
 
 def _find_files(element: ElementTree.Element, source: RobotSource) -> str:
-    """Replace the names of meshes and textures below an element by places; or say what is wrong."""
+    """Replace mesh and texture names by absolute paths; returns what is wrong, or ""."""
     for file in (*element.iter("mesh"), *element.iter("texture")):
         try:
             file.set("filename", f"file://{find_mesh(file.get('filename', ''), source)}")
@@ -141,7 +142,7 @@ def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
 
 
 def _inside(path: Path, folder: Path) -> bool:
-    """By name and by what symbolic links lead to."""
+    """Whether a path is inside a folder, before and after following symbolic links."""
     named = path.is_relative_to(os.path.normpath(folder.absolute()))
     return named and path.resolve().is_relative_to(folder.resolve())
 

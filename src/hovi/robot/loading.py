@@ -1,4 +1,4 @@
-"""load_robot: from a file, the name of an example or a Pinocchio model to a `Robot`."""
+"""Loads a `Robot` from a file, by the name of an example, or from a Pinocchio model."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
 from hovi.robot.source import RobotSource, text_hash
 from hovi.robot.srdf import read_srdf_file
-from hovi.robot.urdf.check import MAXIMUM_FREEDOM, read_urdf
+from hovi.robot.urdf.check import MAXIMUM_DOF, read_urdf
 
 
 def is_path(text: str) -> bool:
-    """Whether a text means a file and not the name of an example."""
+    """Whether a string is a file path rather than the name of an example."""
     return text.lower().endswith((".urdf", ".xml", ".xacro")) or "/" in text or "\\" in text
 
 
 def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
-    """Names as a tuple; a single one may come without brackets."""
+    """Names as a tuple; a single string counts as one name."""
     return (values,) if isinstance(values, str | Path) else tuple(values)
 
 
@@ -36,7 +36,7 @@ def file_source(
     srdf: Path | None = None,
     mimic: bool = False,
 ) -> RobotSource:
-    """The source of a URDF file, and of an SRDF. Raises ModelError when one cannot be read."""
+    """The source of a URDF file and an SRDF file. Raises ModelError if one cannot be read."""
     text = read_urdf(path)
     return RobotSource(
         kind="urdf",
@@ -60,7 +60,7 @@ def example_source(
     srdf: Path | None = None,
     mimic: bool = False,
 ) -> RobotSource:
-    """The source of an example robot, its own SRDF included. Raises ModelError for a bad name."""
+    """The source of an example robot with its SRDF. Raises ModelError for an unknown name."""
     example = example_robot(name)
     text = read_urdf(example.urdf)
     semantics = srdf or example.srdf
@@ -91,18 +91,18 @@ def load_robot(
     srdf: str | Path | None = None,
     mimic: bool = False,
 ) -> Robot:
-    """Load a robot. Any model loads; what cannot be planned on is refused by the problem.
+    """Load a robot. Models that do not support planning load as well; the problem refuses them.
 
     x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
-        pinocchio.Model, which is copied. A text that ends in .urdf or holds a separator is a path.
+        pinocchio.Model, which is copied. A string with a separator or ending in .urdf is a path.
     package_dirs: folders in which `package://` meshes are looked up.
-    free_flyer: whether the base floats; left out, it is fixed, or as the example's loader says.
-    locked: joints held at the neutral configuration; a single name may come without brackets.
-    visual, collision: geometry that goes with a pinocchio.Model.
-    srdf: path of an SRDF with named poses; an example robot's own is found without it.
-    mimic: whether the URDF's joints with a <mimic> tag follow the joints that they name, and so
-        take no place in q; otherwise they move freely. A pinocchio.Model says so itself.
-    Raises ModelError: no such file or name, a URDF that breaks a rule, an unknown joint to lock;
+    free_flyer: whether the base floats; by default it is fixed, or as the example's loader says.
+    locked: joints to fix at the neutral configuration, or a single name.
+    visual, collision: geometry of a pinocchio.Model.
+    srdf: path of an SRDF with named poses; by default an example robot uses its own.
+    mimic: whether joints with a <mimic> tag follow their leaders, without coordinates of their own
+        in q; otherwise they move freely. A pinocchio.Model has its own couplings.
+    Raises ModelError for an unknown file or name, an invalid URDF, an unknown joint to lock;
     InputError for a mimic or free_flyer that is neither True nor False.
     """
     expect(mimic, bool, "mimic=True or mimic=False")
@@ -132,9 +132,9 @@ def _from_model(
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
     srdf: Path | None = None,
 ) -> Robot:
-    if model.nv > MAXIMUM_FREEDOM:
+    if model.nv > MAXIMUM_DOF:
         raise ModelError(
-            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_FREEDOM} are "
+            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_DOF} are "
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]

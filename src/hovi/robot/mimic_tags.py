@@ -1,8 +1,8 @@
 """Joints with a <mimic> tag: read from a URDF, and coupled in a model of free joints.
 
-Pinocchio reads from a URDF only those whose leader it meets first, and drops the limits and
-losses of all. Here a model is built with every joint on its own, then put in an order in which
-leaders come first, and then coupled.
+Pinocchio's URDF parser couples only joints that come after their leader, and drops the limits,
+damping and friction of mimic joints. Here the model is built with all joints free, then reordered
+such that leaders come first, and then coupled.
 """
 
 from __future__ import annotations
@@ -13,22 +13,21 @@ import numpy as np
 import pinocchio as pin
 
 from hovi.errors import ModelError
-from hovi.robot.mimic_model import CURE, Coupling, check_coupling, coupled
+from hovi.robot.mimic_model import REMEDY, Coupling, check_coupling, coupled
 from hovi.robot.reordered_model import axis, continuous_joint, rebuilt
 from hovi.robot.urdf.check import checked_urdf
 
-_LARGEST = float(np.finfo(float).max)
+_NO_LIMIT = float(np.finfo(float).max)
 """Pinocchio's limit where a URDF states none."""
 
 
 def read_couplings(
     text: str, name: str = "robot.urdf", locked: Collection[str] = ()
 ) -> tuple[Coupling, ...]:
-    """The <mimic> tags of a URDF's movable joints, followed to joints that mimic no other.
+    """The <mimic> tags of a URDF's movable joints, with chains resolved to their first leader.
 
-    name: what to call the URDF in a message. locked: joints that stand still although they mimic
-    others, where chains end too. Raises ModelError for a leader that does not exist
-    and for joints that mimic each other in a ring.
+    name: of the URDF, for messages. locked: joints that are fixed even if they mimic others; chains
+    end there. Raises ModelError for a leader that does not exist and for cyclic couplings.
     """
     joints = {joint.get("name", ""): joint for joint in checked_urdf(text, name).iterfind("joint")}
     stated = {}
@@ -39,7 +38,7 @@ def read_couplings(
         leader = mimic.get("joint", "")
         if leader not in joints:
             raise ModelError(
-                f"URDF {name!r}: joint {follower!r} mimics {leader!r}, which is no joint of it: "
+                f"URDF {name!r}: joint {follower!r} mimics {leader!r}, which does not exist: "
                 "correct that name, or load the robot without mimic=True."
             )
         factor, offset = float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))
@@ -47,11 +46,11 @@ def read_couplings(
             leader, factor = "", 0.0
         stated[follower] = Coupling(follower, leader, factor, offset)
     following = {name: coupling for name, coupling in stated.items() if name not in locked}
-    return tuple(_to_the_end(coupling, following) for coupling in stated.values())
+    return tuple(_resolved(coupling, following) for coupling in stated.values())
 
 
-def _to_the_end(coupling: Coupling, following: Mapping[str, Coupling]) -> Coupling:
-    """The coupling with a leader that follows no other joint."""
+def _resolved(coupling: Coupling, following: Mapping[str, Coupling]) -> Coupling:
+    """The coupling with the first leader of its chain."""
     for _ in following:
         if coupling.leader not in following:
             return coupling
@@ -61,11 +60,11 @@ def _to_the_end(coupling: Coupling, following: Mapping[str, Coupling]) -> Coupli
         coupling = Coupling(coupling.follower, before.leader, factor, offset)
     if coupling.leader not in following:
         return coupling
-    raise ModelError(f"joint {coupling.follower!r} mimics itself in the end: break that ring.")
+    raise ModelError(f"joint {coupling.follower!r} mimics itself through others: break that cycle.")
 
 
 def held_values(couplings: Iterable[Coupling], locked: Sequence[str]) -> dict[str, float]:
-    """Where joints stand that cannot move: locked ones at 0, followers of such at their offset."""
+    """Positions of fixed joints: 0 for locked ones, the offset for their followers."""
     held = dict.fromkeys(locked, 0.0)
     for coupling in couplings:
         if coupling.leader == "" or coupling.leader in locked:
@@ -74,22 +73,22 @@ def held_values(couplings: Iterable[Coupling], locked: Sequence[str]) -> dict[st
 
 
 def with_mimics(model: pin.Model, couplings: Sequence[Coupling]) -> pin.Model:
-    """A model of free joints, leaders first, with followers that follow.
+    """A model of free joints, leaders first, with its followers turned into mimic joints.
 
-    Its limits keep followers in their own, too, and its armature and losses hold their share:
-    those of a follower count multiplier^2 times at the leader, dry friction |multiplier| times.
+    The limits of a leader are tightened to those of its followers, and the followers' armature and
+    damping are added with the factor multiplier^2, their dry friction with |multiplier|.
     """
     model = model.copy()
     for coupling in couplings:
-        _hand_over(model, coupling)
+        _transfer_properties(model, coupling)
     return coupled(model, couplings)
 
 
 def leaders_first(model: pin.Model, couplings: Sequence[Coupling]) -> pin.Model:
-    """The model with joints in an order in which leaders come before their followers.
+    """The model with its joints reordered such that leaders come before their followers.
 
-    A follower becomes a joint of as many numbers as its leader: (cos, sin) or an angle.
-    Raises ModelError for couplings that no such model has.
+    A follower gets the coordinates of its leader: (cos, sin) or an angle.
+    Raises ModelError if there is no such order, or a coupling is not possible.
     """
     by_id = {model.getJointId(c.follower): c for c in couplings}
     for coupling in couplings:
@@ -101,7 +100,7 @@ def leaders_first(model: pin.Model, couplings: Sequence[Coupling]) -> pin.Model:
         coupling = by_id.get(joint.id)
         if coupling is None:
             return joint
-        return _like(joint, model.joints[model.getJointId(coupling.leader)], coupling)
+        return _matching_joint(joint, model.joints[model.getJointId(coupling.leader)], coupling)
 
     same = order == list(range(1, model.njoints))
     if same and all(replacement(joint) is joint for joint in list(model.joints)[1:]):
@@ -109,8 +108,10 @@ def leaders_first(model: pin.Model, couplings: Sequence[Coupling]) -> pin.Model:
     return rebuilt(model, order, replacement)
 
 
-def _like(joint: pin.JointModel, leader: pin.JointModel, coupling: Coupling) -> pin.JointModel:
-    """A follower with as many numbers in q as its leader."""
+def _matching_joint(
+    joint: pin.JointModel, leader: pin.JointModel, coupling: Coupling
+) -> pin.JointModel:
+    """A joint like the follower that has as many coordinates in q as its leader."""
     if joint.nq == leader.nq:
         return joint
     about = axis(joint)[1]
@@ -118,14 +119,14 @@ def _like(joint: pin.JointModel, leader: pin.JointModel, coupling: Coupling) -> 
         return pin.JointModelRevoluteUnaligned(about)
     if not about.any():
         raise ModelError(
-            f"joint {coupling.follower!r} slides and mimics {coupling.leader!r}, a continuous "
-            "joint, which has no angle to count" + CURE
+            f"joint {coupling.follower!r} is prismatic and mimics {coupling.leader!r}, a "
+            "continuous joint, whose angle is not unique" + REMEDY
         )
     return continuous_joint(about)
 
 
 def _order(model: pin.Model, pairs: Sequence[tuple[int, int]]) -> Iterator[int]:
-    """Joints depth first, (leader, follower) in this order, otherwise as they were."""
+    """Joints depth first, leaders before followers, otherwise in their original order."""
     waiting = [0]
     while waiting:
         joint = waiting.pop()
@@ -136,7 +137,7 @@ def _order(model: pin.Model, pairs: Sequence[tuple[int, int]]) -> Iterator[int]:
 
 
 def _sorted(model: pin.Model, children: list[int], pairs: Sequence[tuple[int, int]]) -> list[int]:
-    """Branches of a joint, each after those with leaders of its followers."""
+    """The branches at a joint, each after the branches with the leaders of its followers."""
     branches = {child: set(model.subtrees[child]) for child in children}
     done: list[int] = []
     while len(done) < len(children):
@@ -153,13 +154,13 @@ def _sorted(model: pin.Model, children: list[int], pairs: Sequence[tuple[int, in
         ]
         if not ready:
             names = " and ".join(repr(str(model.names[child])) for child in left[:2])
-            raise ModelError(f"the branches of {names} mimic joints of each other" + CURE)
+            raise ModelError(f"the branches of {names} mimic joints of each other" + REMEDY)
         done.append(ready[0])
     return done
 
 
-def _hand_over(model: pin.Model, coupling: Coupling) -> None:
-    """Put the limits, armature and losses of a follower upon its leader, in place."""
+def _transfer_properties(model: pin.Model, coupling: Coupling) -> None:
+    """Apply the limits, armature, damping and friction of a follower to its leader."""
     ends = coupling.leader, coupling.follower
     leader, follower = (model.joints[model.getJointId(name)] for name in ends)
     i, j, size = leader.idx_v, follower.idx_v, abs(coupling.multiplier)
@@ -167,34 +168,34 @@ def _hand_over(model: pin.Model, coupling: Coupling) -> None:
     shares |= dict.fromkeys(("lowerDryFrictionLimit", "upperDryFrictionLimit"), size)
     for key, share in shares.items():
         values = getattr(model, key)
-        _put(model, key, i, values[i] + share * values[j])
+        _set_entry(model, key, i, values[i] + share * values[j])
     own, speed = model.upperVelocityLimit[i], model.upperVelocityLimit[j] / size
     if speed > 0.0 and (own == 0.0 or speed < own):
-        _put(model, "upperVelocityLimit", i, speed)
-        _put(model, "lowerVelocityLimit", i, -speed)
+        _set_entry(model, "upperVelocityLimit", i, speed)
+        _set_entry(model, "lowerVelocityLimit", i, -speed)
     if leader.nq == 1:
-        _narrow(model, leader.idx_q, follower.idx_q, coupling)
+        _tighten_range(model, leader.idx_q, follower.idx_q, coupling)
 
 
-def _narrow(model: pin.Model, i: int, j: int, coupling: Coupling) -> None:
-    """Keep place i of q where place j stays within its range, too.
+def _tighten_range(model: pin.Model, i: int, j: int, coupling: Coupling) -> None:
+    """Tighten the range of q[i], the leader, such that q[j], the follower, keeps its own.
 
-    Published robots state ranges that exclude each other (a follower at -1 times its leader with
-    the leader's own range): then that of the leader counts.
+    In published robots the two may be disjoint (a follower at -1 times its leader with the
+    leader's own range): then the leader keeps its range.
     """
     ends = []
     for end in (model.lowerPositionLimit[j], model.upperPositionLimit[j]):
-        free = abs(end) >= _LARGEST
+        free = abs(end) >= _NO_LIMIT
         sign = np.sign(end) * np.sign(coupling.multiplier)
-        ends.append(sign * _LARGEST if free else (end - coupling.offset) / coupling.multiplier)
+        ends.append(sign * _NO_LIMIT if free else (end - coupling.offset) / coupling.multiplier)
     lower = max(model.lowerPositionLimit[i], min(ends))
     upper = min(model.upperPositionLimit[i], max(ends))
     if lower < upper:
-        _put(model, "lowerPositionLimit", i, lower)
-        _put(model, "upperPositionLimit", i, upper)
+        _set_entry(model, "lowerPositionLimit", i, lower)
+        _set_entry(model, "upperPositionLimit", i, upper)
 
 
-def _put(model: pin.Model, key: str, place: int, value: float) -> None:
+def _set_entry(model: pin.Model, key: str, index: int, value: float) -> None:
     values = np.array(getattr(model, key))
-    values[place] = value
+    values[index] = value
     setattr(model, key, values)

@@ -1,4 +1,4 @@
-"""From a source to a Pinocchio model: build, give armature, lock and couple joints, check M(q)."""
+"""From a source to a Pinocchio model: build, set armature, lock and couple joints, check M(q)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ Array = npt.NDArray[np.float64]
 
 
 def build_full_model(source: RobotSource) -> pin.Model:
-    """The model of a source's URDF, every joint on its own and none locked. Raises ModelError.
+    """The model of a source's URDF with all joints free: none coupled, none locked.
 
-    Where joints mimic others, those come first: Pinocchio couples them in no other order.
+    Leaders of mimic joints come first, since Pinocchio couples them in no other order. Raises
+    ModelError.
     """
     if source.urdf is None:
         raise ModelError(
-            f"robot {source.reference!r} was given as a pinocchio.Model, which no file can hold: "
+            f"robot {source.reference!r} was given as a pinocchio.Model, which files do not store: "
             "load it again with hovi.load_robot(model)."
         )
     text = plain_urdf(source.urdf, source.reference)
@@ -35,26 +36,26 @@ def build_full_model(source: RobotSource) -> pin.Model:
     except (ValueError, RuntimeError) as error:
         raise ModelError(
             f"Pinocchio cannot read the URDF {source.reference!r}: {error}; "
-            "its parser's own words are on stderr."
+            "its parser's own messages are on stderr."
         ) from error
     if len(set(model.names)) < len(model.names):
         raise ModelError(
-            f"robot {source.reference!r} has a joint 'root_joint', which is what its floating base "
-            "is called: give that joint another name, or load the robot without free_flyer."
+            f"robot {source.reference!r} has a joint 'root_joint', the name of its floating base: "
+            "rename that joint, or load the robot without free_flyer."
         )
     model = _with_armature(model, source.armature)
     return leaders_first(model, _moving(couplings_in(source), source.locked))
 
 
 def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
-    """The couplings that a source's URDF states, if the robot is to have them."""
+    """The couplings of a source's URDF; none unless `source.mimic`."""
     if not source.mimic:
         return ()
     return read_couplings(source.urdf or "", source.reference, source.locked)
 
 
 def build_model(source: RobotSource) -> pin.Model:
-    """The model of a source: locked joints taken out, mimics coupled. Raises ModelError."""
+    """The model of a source, without locked joints, mimic joints coupled. Raises ModelError."""
     model = build_full_model(source)
     return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
 
@@ -65,9 +66,9 @@ def locked_and_coupled(
     locked: Sequence[str],
     couplings: Sequence[Coupling] = (),
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
-    """Model and geometry with some joints held and the couplings of the others.
+    """Model and geometry with some joints locked and the others coupled.
 
-    The `locked` joints are held at the neutral configuration, and their followers at the offset.
+    The `locked` joints are fixed at the neutral configuration, and their followers at the offset.
     """
     joint_ids(model, locked)
     shapes = list(geometry or [])
@@ -90,9 +91,9 @@ def locked_and_coupled(
 def locked_model(
     model: pin.Model, geometry: list[pin.GeometryModel], locked: Sequence[str]
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
-    """As `locked_and_coupled` for a model with couplings of its own, which stay."""
+    """As `locked_and_coupled`, for a model that has couplings of its own and keeps them."""
     couplings = couplings_of(model) if locked else ()
-    if couplings:  # Pinocchio does not take a leader out
+    if couplings:  # Pinocchio cannot remove a leader
         model = leaders_first(uncoupled(model), couplings)
     return locked_and_coupled(model, geometry, locked, couplings)
 
@@ -115,17 +116,17 @@ def joint_ids(model: pin.Model, names: Iterable[str]) -> list[int]:
 
 
 def frame_id(model: pin.Model, name: str) -> int:
-    """Pinocchio's index of a frame; of the link where a joint bears the same name."""
+    """Pinocchio's index of a frame; that of the link if a joint has the same name."""
     same = [i for i, frame in enumerate(model.frames) if frame.name == name]
     return next((i for i in same if model.frames[i].type == pin.BODY), same[0])
 
 
 def check_mass_matrix(model: pin.Model) -> None:
-    """Refuse a model whose mass matrix M(q) is singular to working precision.
+    """Raise ModelError if the mass matrix M(q) is singular to working precision.
 
-    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations (at
-    the neutral one a sound robot may be singular: a bob that hangs straight down resists no
-    turn about the vertical). Raises ModelError naming the joints that nothing resists.
+    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations. The
+    neutral one is no criterion: a pendulum that hangs straight down has no inertia about the
+    vertical. The message names the joints without inertia.
     """
     if model.nv == 0:
         return
@@ -154,7 +155,7 @@ def _sample_configurations(model: pin.Model) -> Iterator[Array]:
 
 
 def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
-    """Name the joints with the largest shares (nv,) in the directions without inertia."""
+    """A message that names the joints with the largest shares (nv,) in the null space of M."""
     joints = [
         index
         for index, joint in enumerate(model.joints[1:], start=1)
@@ -164,9 +165,9 @@ def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
     moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
     more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
     return (
-        f"the mass matrix of robot {model.name!r} is singular to working precision, as nothing "
-        f"resists joint {moved}{more}: give what it moves a mass and an inertia, or lock it with "
-        f"locked={names!r}."
+        f"the mass matrix of robot {model.name!r} is singular to working precision: there is no "
+        f"inertia at joint {moved}{more}; give the links that it moves a mass and an inertia, or "
+        f"lock it with locked={names!r}."
     )
 
 

@@ -1,4 +1,4 @@
-"""A Pinocchio model built once more, with its joints in another order or of other kinds."""
+"""Rebuilds a Pinocchio model with its joints reordered or replaced."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pinocchio as pin
 
 Array = npt.NDArray[np.float64]
 
-IN_V = (
+PER_VELOCITY = (
     "armature",
     "damping",
     "rotorInertia",
@@ -22,38 +22,38 @@ IN_V = (
     "lowerDryFrictionLimit",
     "upperDryFrictionLimit",
 )
-"""What a model holds per velocity."""
-IN_Q = ("lowerPositionLimit", "upperPositionLimit")
-"""What it holds per number of q."""
+"""Attributes of a model with one entry per velocity."""
+PER_CONFIGURATION = ("lowerPositionLimit", "upperPositionLimit")
+"""Attributes with one entry per coordinate of q."""
 
 Replacement = Callable[[pin.JointModel], pin.JointModel]
 
 
 def rebuilt(model: pin.Model, order: Sequence[int], replacement: Replacement) -> pin.Model:
-    """The same bodies and frames on joints in another order, each after the one that carries it.
+    """The same bodies and frames with the joints in another order, each after its parent.
 
     order: Pinocchio's indices of all joints but the universe, depth first.
-    replacement: what takes the place of a joint. What is stated per coordinate (limits, armature,
-        losses) goes along with joints that keep their size; others get none.
+    replacement: returns the joint that replaces a joint. Joints that keep their dimension keep
+        their limits, armature, damping and friction; others get the defaults.
     """
     built = pin.Model()
     built.name, built.gravity = model.name, model.gravity
-    places = {0: 0}
+    new_index = {0: 0}
     for index in order:
         joint = replacement(model.joints[index])
-        at = places[model.parents[index]], joint, model.jointPlacements[index]
-        places[index] = built.addJoint(*at, str(model.names[index]))
-        built.appendBodyToJoint(places[index], model.inertias[index], pin.SE3.Identity())
+        at = new_index[model.parents[index]], joint, model.jointPlacements[index]
+        new_index[index] = built.addJoint(*at, str(model.names[index]))
+        built.appendBodyToJoint(new_index[index], model.inertias[index], pin.SE3.Identity())
     for frame in list(model.frames)[1:]:
-        joint = places[frame.parentJoint]
+        joint = new_index[frame.parentJoint]
         parts = frame.name, joint, frame.parentFrame, frame.placement, frame.type, frame.inertia
         built.addFrame(pin.Frame(*parts), False)
-    _copy_numbers(model, built, places)
+    _copy_numbers(model, built, new_index)
     return built
 
 
 def axis(joint: pin.JointModel) -> tuple[Array, Array]:
-    """The motion of a joint of one velocity in its own frame: along and about, each (3,)."""
+    """The axis of a joint with one velocity, in its own frame: linear and angular, each (3,)."""
     data = joint.createData()
     q = np.zeros(joint.idx_q + 2)
     q[joint.idx_q] = float(joint.nq == 2)  # (cos, sin) of 0
@@ -63,7 +63,7 @@ def axis(joint: pin.JointModel) -> tuple[Array, Array]:
 
 
 def continuous_joint(about: Array) -> pin.JointModel:
-    """A continuous joint about any axis (3,): from Python, only a URDF makes one."""
+    """A continuous joint about any axis (3,); in Python it can only be created from a URDF."""
     numbers = " ".join(repr(float(x)) for x in about)
     return pin.buildModelFromXML(
         '<robot name="one"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
@@ -71,11 +71,11 @@ def continuous_joint(about: Array) -> pin.JointModel:
     ).joints[1]
 
 
-def _copy_numbers(model: pin.Model, built: pin.Model, places: dict[int, int]) -> None:
-    for keys, start, size in ((IN_V, "idx_v", "nv"), (IN_Q, "idx_q", "nq")):
+def _copy_numbers(model: pin.Model, built: pin.Model, new_index: dict[int, int]) -> None:
+    for keys, start, size in ((PER_VELOCITY, "idx_v", "nv"), (PER_CONFIGURATION, "idx_q", "nq")):
         for key in keys:
             values = np.array(getattr(built, key))
-            for index, place in list(places.items())[1:]:
+            for index, place in list(new_index.items())[1:]:
                 old, new = model.joints[index], built.joints[place]
                 count = getattr(new, size)
                 if count == getattr(old, size):

@@ -1,9 +1,9 @@
 """A robot: its model, its limits and names, and the group operations of its configuration space.
 
 Coordinates follow Pinocchio: q (nq,) in [rad] or [m], v and a (nv,). Continuous, spherical and
-floating joints have nq != nv: their q moves by `integrate` and is compared by `difference`, never
-by + and -. Limits are those of the URDF as Pinocchio reads them: a missing limit is the largest
-double, a velocity or effort limit of 0 in the file stays 0.
+floating joints have nq != nv: use `integrate` and `difference` on their q, never + and -. Limits
+are those of the URDF as Pinocchio reads them: a missing limit is the largest double, a velocity or
+effort limit of 0 in the file stays 0.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot that is ready to be put into a scene. Made by `load_robot`.
+    """A robot, created by `load_robot`.
 
-    name: what the user calls it.
-    model: its Pinocchio model, locked joints taken out; treat it as read-only.
-    source: where it came from.
-    given: visual and collision geometry handed over together with a pinocchio.Model.
+    name: the user's name for it.
+    model: its Pinocchio model without the locked joints; treat it as read-only.
+    source: the URDF and options that it was built from.
+    given: visual and collision geometry passed together with a pinocchio.Model.
     """
 
     name: str
@@ -49,7 +49,7 @@ class Robot:
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None] = (None, None)
 
     def __repr__(self) -> str:
-        """A name and sizes, for a terminal; `describe` says more."""
+        """Name and dimensions, for a terminal; see `describe` for more."""
         return f"<Robot {self.name!r}: nq = {self.nq}, nv = {self.nv}>"
 
     # Sizes and names
@@ -66,13 +66,13 @@ class Robot:
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """The joints that move on their own, in Pinocchio's order: none that mimics another."""
+        """The independent joints, in Pinocchio's order; joints that mimic others are left out."""
         pairs = zip(self.model.names, self.model.joints, strict=True)
         return tuple(name for name, joint in list(pairs)[1:] if joint.nv)
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
-        """The joints that mimic others, and how."""
+        """The couplings of the joints that mimic others."""
         return couplings_of(self.model)
 
     @cached_property
@@ -87,25 +87,25 @@ class Robot:
 
     @property
     def sliding(self) -> npt.NDArray[np.bool_]:
-        """Which coordinates are lengths, (nv,)."""
+        """Which coordinates are lengths rather than angles, (nv,)."""
         return np.array([units == LENGTH for units in self.coordinate_units], dtype=bool)
 
     @cached_property
     def space(self) -> ConfigurationSpace:
         """The configuration space as a product of vector spaces and groups.
 
-        It does not fit where a joint is of a kind that has no place in it: see `unplanned_joints`.
+        Not valid if there are joints of an unsupported kind: see `unplanned_joints`.
         """
         return self._space[0]
 
     @cached_property
     def chart(self) -> Chart:
-        """The charts q0 (+) x of its configuration space."""
+        """The charts q0 (+) x of the configuration space."""
         return Chart(self.space)
 
     @property
     def unplanned_joints(self) -> tuple[str, ...]:
-        """Joints whose configurations are neither vectors nor of one of the known groups."""
+        """Joints whose configurations are neither vectors nor elements of a supported group."""
         return self._space[1]
 
     @cached_property
@@ -113,9 +113,9 @@ class Robot:
         return configuration_space(self.model)
 
     def hint(self, name: str, valid: Iterable[str] | None = None) -> str:
-        """The end of a sentence about a joint that does not move on its own, or does not exist.
+        """The end of a message about a joint that is not independent, or does not exist.
 
-        valid: what would have been accepted; `joint_names` when None.
+        valid: the accepted names; `joint_names` when None.
         """
         for coupling in self.couplings:
             if coupling.follower == name:
@@ -123,7 +123,7 @@ class Robot:
         return nearest(name, self.joint_names if valid is None else valid)
 
     def joint_at(self, place: int) -> str:
-        """The joint to which a place in v belongs."""
+        """The joint that the entry of v at index `place` belongs to."""
         pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
         return next(n for n, joint in pairs if joint.idx_v <= place < joint.idx_v + joint.nv)
 
@@ -135,12 +135,12 @@ class Robot:
 
     @cached_property
     def vector_joints(self) -> bool:
-        """Whether every joint has nq = nv, so that configurations add like vectors."""
+        """Whether every joint has nq = nv, so that configurations form a vector space."""
         return not self.manifold_joints
 
     @property
     def curved_space(self) -> ConfigurationSpace | None:
-        """The configuration space; None where configurations are vectors."""
+        """The configuration space; None if it is a vector space."""
         return None if self.vector_joints else self.space
 
     @cached_property
@@ -150,12 +150,12 @@ class Robot:
 
     @cached_property
     def tip_frame(self) -> str:
-        """The last link (or operational frame) of the model: where a tool would sit."""
+        """The last link (or operational frame) of the model, where a tool is mounted."""
         kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
         links = [frame.name for frame in self.model.frames if frame.type in kinds]
         return links[-1] if links else self.frame_names[-1]
 
-    # What the URDF says
+    # Properties from the URDF
 
     @property
     def lower(self) -> Array:
@@ -192,11 +192,11 @@ class Robot:
         """Reflected rotor inertia of the joints, (nv,), in [kg m^2] or [kg]."""
         return np.array(self.model.armature, dtype=float)
 
-    # What the SRDF says
+    # Properties from the SRDF
 
     @cached_property
     def poses(self) -> dict[str, Array]:
-        """Named configurations (nq,) of the SRDF; none where there is no SRDF.
+        """Named configurations (nq,) of the SRDF; empty without an SRDF.
 
         Raises ModelError for an SRDF that cannot be read.
         """
@@ -204,37 +204,39 @@ class Robot:
 
     @cached_property
     def semantics(self) -> Srdf:
-        """Poses and pairs of links that need no check for collisions, as the SRDF states them."""
+        """Named poses and disabled collision pairs of the SRDF."""
         text = self.source.srdf
         return Srdf({}, frozenset()) if text is None else parse_srdf(text, self.name)
 
     def pose(self, name: str) -> Array:
-        """The configuration (nq,) that the SRDF calls `name`. Raises InputError."""
+        """The SRDF's configuration `name`, (nq,). Raises InputError for an unknown name."""
         if name in self.poses:
             return self.poses[name].copy()
-        known = nearest(name, self.poses) if self.poses else "it has no SRDF that names any."
+        known = (
+            nearest(name, self.poses) if self.poses else "its SRDF, if it has one, defines none."
+        )
         raise InputError(f"robot {self.name!r} has no pose {name!r}: {known}")
 
     # Shapes
 
     @property
     def visual(self) -> pin.GeometryModel | None:
-        """What the robot looks like, loaded at the first look; None where nothing was found."""
+        """Visual geometry, loaded on first access; None if none was found."""
         return self._visual_shapes.geometry
 
     @property
     def collision(self) -> pin.GeometryModel | None:
-        """Its collision shapes, loaded at the first look; None where nothing was found."""
+        """Collision geometry, loaded on first access; None if none was found."""
         return self._collision_shapes.geometry
 
     @property
     def collision_problem(self) -> str:
-        """Why `collision` is None or incomplete, in a sentence; "" where nothing is missing."""
+        """Why `collision` is None or incomplete, as a sentence; "" if it is complete."""
         return self._collision_shapes.problem
 
     @property
     def visual_problem(self) -> str:
-        """Why `visual` is None or incomplete, in a sentence; "" where nothing is missing."""
+        """Why `visual` is None or incomplete, as a sentence; "" if it is complete."""
         return self._visual_shapes.problem
 
     @cached_property
@@ -270,7 +272,7 @@ class Robot:
         return self.space.difference(q0, q1)
 
     def frame_position(self, frame: str, q: Array) -> Array:
-        """Where a frame's origin is in the world, in [m]: q (M, nq) -> (M, 3)."""
+        """Position of a frame's origin in the world frame, in [m]: q (M, nq) -> (M, 3)."""
         if frame not in self.frame_names:
             raise InputError(
                 f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
@@ -281,7 +283,7 @@ class Robot:
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.
 
-        name: what the argument is called, for the message. Raises InputError.
+        name: of the argument, for the message. Raises InputError.
         """
         checked = configuration.check_vector(q, name, *self._entries)
         if self.vector_joints:
@@ -291,7 +293,7 @@ class Robot:
 
     @cached_property
     def _entries(self) -> tuple[tuple[str, ...], str]:
-        """What the entries of q are called, and a hint where joints have several."""
+        """Names of the entries of q, and a hint about joints with nq != nv."""
         return (
             configuration.entry_names(self.model, "nq"),
             configuration.manifold_hint(self.model),
@@ -308,37 +310,37 @@ class Robot:
     # Text and files
 
     def describe(self) -> str:
-        """What the robot is, for a terminal: joints, limits, mass, and what a scene must name."""
+        """A summary for a terminal: joints, limits, mass, and properties that need an effect."""
         text = describe(self.name, self.model, self.source, self.tip_frame)
         names = ", ".join(repr(name) for name in self.poses)
-        text += f"\n\nPoses that its SRDF names: {names}." if names else ""
+        text += f"\n\nPoses of its SRDF: {names}." if names else ""
         try:
             self.check_mass_matrix()
         except ModelError as singular:
-            text += f"\n\nNothing can be planned on it as it is: {singular}"
+            text += f"\n\nPlanning is not possible: {singular}"
         return text
 
     def to_dict(self) -> dict[str, Any]:
-        """A JSON-able dictionary that holds the URDF and no path of this machine."""
+        """A JSON-compatible dictionary with the text of the URDF and without local paths."""
         return {"name": self.name, **self.source.to_dict()}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], package_dirs: Iterable[str | Path] = ()) -> Robot:
-        """The robot that `to_dict` wrote, built from the URDF's text.
+        """The robot from the result of `to_dict`, built from the text of its URDF.
 
-        package_dirs: folders in which the meshes are found on this machine.
-        Raises ModelError, also for a robot that was given as a pinocchio.Model.
+        package_dirs: local folders that contain the packages of its meshes.
+        Raises ModelError, also for a robot that was loaded from a pinocchio.Model.
         """
         if not isinstance(data, Mapping) or not isinstance(data.get("name"), str):
-            raise ModelError("a stored robot needs a text under 'name'.")
+            raise ModelError("a stored robot needs a string under 'name'.")
         source = RobotSource.from_dict(data, tuple(str(folder) for folder in package_dirs))
         return cls(data["name"], robot_model.build_model(source), source)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a worker process needs: the fields, without shapes that are loaded on demand."""
+        """The fields, without geometry that is loaded on demand."""
         state = {field.name: getattr(self, field.name) for field in fields(self)}
         return {**state, "model": PortableModel.of(self.model)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """The robot of what `__getstate__` gave."""
+        """Restore the fields."""
         self.__dict__.update({**state, "model": state["model"].model()})

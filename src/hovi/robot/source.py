@@ -1,4 +1,4 @@
-"""Where a robot came from: enough to build the same model again, here or on another machine."""
+"""The source of a robot: all that is needed to build the same model again on any machine."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ class RobotSource:
     """The text and the options that a model is built from.
 
     kind: "urdf" (a file), "example" (a name of example-robot-data) or "model" (a pinocchio.Model).
-    reference: the file's name, the example's name or the model's name; never a path.
-    urdf: the URDF's text; None for kind "model", which has none.
+    reference: the name of the file, the example or the model; never a path.
+    urdf: the text of the URDF; None for kind "model".
     sha256: of that text in UTF-8, in hexadecimal.
     package_dirs: folders in which `package://` meshes are looked up.
-    locked: joints held at the neutral configuration and so no longer part of the model.
-    free_flyer: the base floats.
-    folder: the folder of the URDF file, for its meshes; "" when the file is not at hand.
+    locked: joints fixed at the neutral configuration, which are not part of the model.
+    free_flyer: whether the base floats.
+    folder: folder of the URDF file, for its meshes; "" if unknown.
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
-    srdf: the text of the SRDF that goes with the URDF; None where there is none.
-    mimic: whether the joints with a <mimic> tag follow others.
+    srdf: the text of the SRDF, or None.
+    mimic: whether joints with a <mimic> tag follow their leaders.
     """
 
     kind: SourceKind
@@ -43,7 +43,7 @@ class RobotSource:
     mimic: bool = False
 
     def to_dict(self) -> dict[str, Any]:
-        """A JSON-able dictionary without any path of this machine."""
+        """A JSON-compatible dictionary without local paths."""
         return {
             "kind": self.kind,
             "reference": self.reference,
@@ -58,7 +58,7 @@ class RobotSource:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], package_dirs: tuple[str, ...] = ()) -> RobotSource:
-        """The source that `to_dict` wrote. Raises ModelError when it is not whole."""
+        """The source from the result of `to_dict`. Raises ModelError if it is incomplete."""
         kind = _entry(data, "kind", str)
         if kind not in get_args(SourceKind):
             raise ModelError(

@@ -1,8 +1,8 @@
-"""What an SRDF says beside a URDF: named poses, and links that need no check for collisions.
+"""Reads SRDF files: named poses, and pairs of links without collision checking.
 
 An SRDF is XML: `<group_state name="ready"><joint name="elbow" value="1.2"/></group_state>` and
-`<disable_collisions link1="hand" link2="finger"/>`. Groups do not matter here: states of one name
-are taken together, and what they leave out is neutral.
+`<disable_collisions link1="hand" link2="finger"/>`. Groups are ignored: states of the same name are
+merged, and joints that they do not list are neutral.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MAXIMUM_BYTES = 8_000_000
 class Srdf:
     """The parts of an SRDF that hovi reads.
 
-    states: values by joint by name of the pose, in [rad] or [m].
-    disabled: unordered pairs of links whose collisions are not to be checked.
+    states: joint positions by joint and name of the pose, in [rad] or [m].
+    disabled: unordered pairs of links that are not checked for collisions.
     """
 
     states: Mapping[str, Mapping[str, tuple[float, ...]]]
@@ -41,9 +41,8 @@ class Srdf:
     def poses(self, model: pin.Model) -> dict[str, Array]:
         """Configurations (nq,) by name: neutral, except for the joints that a state lists.
 
-        Joints that the model does not have, or that mimic others, are passed over, and so are
-        states of such joints alone. Raises ModelError for a joint that is given the wrong count
-        of numbers.
+        Joints that the model does not have, or that mimic others, are ignored, and so are states
+        without any other joint. Raises ModelError for a joint with the wrong number of values.
         """
         pairs = zip(model.names, model.joints, strict=True)
         known = {name for name, joint in list(pairs)[1:] if joint.nv}
@@ -56,7 +55,7 @@ class Srdf:
 
 
 def read_srdf_file(path: Path) -> str:
-    """The text of an SRDF file. Raises ModelError: no such file, too large, not UTF-8."""
+    """The text of an SRDF file. Raises ModelError if it is missing, too large or not UTF-8."""
     try:
         require_file(path, MAXIMUM_BYTES)
         return path.read_bytes().decode()
@@ -67,9 +66,9 @@ def read_srdf_file(path: Path) -> str:
 
 
 def parse_srdf(text: str, name: str = "robot.srdf") -> Srdf:
-    """The poses and pairs of an SRDF's text.
+    """The poses and disabled pairs in the text of an SRDF.
 
-    name: what to call the SRDF in messages. Raises ModelError in one sentence.
+    name: of the SRDF, for messages. Raises ModelError.
     """
     root = _root(text, name)
     states: dict[str, dict[str, tuple[float, ...]]] = {}
@@ -85,7 +84,7 @@ def parse_srdf(text: str, name: str = "robot.srdf") -> Srdf:
 
 
 class _Builder(ElementTree.TreeBuilder):
-    """Builds a tree, but refuses what entities would need."""
+    """Builds an element tree, but refuses the DOCTYPE that entities need."""
 
     def doctype(self, *_: object) -> NoReturn:
         raise ModelError("an SRDF needs no DOCTYPE and no entities: delete that declaration.")
@@ -144,10 +143,10 @@ def _configuration(model: pin.Model, name: str, values: Mapping[str, tuple[float
 def checked_pairs(
     model: pin.Model, geometry: pin.GeometryModel, disabled: frozenset[frozenset[str]]
 ) -> list[tuple[int, int]]:
-    """Pairs of shapes, by place in the geometry, that self-collision is about.
+    """Pairs of shapes to check for self-collision, by index in the geometry.
 
-    Shapes of two links on different joints, neither of which carries the other directly, unless
-    the pair is disabled.
+    All shapes on two different joints of which neither is the parent of the other, unless the pair
+    is disabled.
     """
     shapes = list(geometry.geometryObjects)
     links = [str(model.frames[shape.parentFrame].name) for shape in shapes]

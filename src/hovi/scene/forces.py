@@ -185,7 +185,7 @@ def _turned_back(scene: Scene, momentum: ca.SX) -> ca.SX:
     """
     v, turned = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
     for factor in scene.robot.space.curved:
-        i, places = factor.v, list(factor.group.places)
+        i, places = factor.v, list(factor.group.se3_indices)
         p, twist = ca.SX.zeros(6), ca.SX.zeros(6)
         p[places], twist[places] = momentum[i], v[i]
         moment = ca.cross(p[:3], twist[:3]) + ca.cross(p[3:], twist[3:])

@@ -1,4 +1,4 @@
-"""Charts: Pinocchio's Jacobians, finite differences, curves that are known."""
+"""Charts against Pinocchio's Jacobians, finite differences and known curves."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def bases(space: ConfigurationSpace) -> Array:
 
 @pytest.mark.parametrize("size", [0.0, 1e-9, 0.5, 3.0, 5.0])
 @pytest.mark.parametrize("name", CURVED)
-def test_jacobians_are_those_of_pinocchio(name: str, size: float) -> None:
+def test_jacobians_match_pinocchio(name: str, size: float) -> None:
     space = ConfigurationSpace((name,))
     model, x = model_of(GROUPS[name]), vectors(space, size)
     expected = np.array([pin.dIntegrate(model, pin.neutral(model), y)[1] for y in x])
@@ -49,10 +49,10 @@ def test_jacobians_are_those_of_pinocchio(name: str, size: float) -> None:
 
 @pytest.mark.parametrize("size", [1.0, 5.0, 6.2])
 @pytest.mark.parametrize("name", CURVED)
-def test_jacobians_are_those_of_their_series_up_to_a_full_turn(name: str, size: float) -> None:
+def test_jacobians_match_their_series_up_to_a_full_turn(name: str, size: float) -> None:
     """J = sum_k (-ad)^k / (k + 1)! in extended precision: Pinocchio loses digits towards 2 pi."""
     space = ConfigurationSpace((name,))
-    places, x = list(GROUPS[name].places), vectors(space, size)
+    places, x = list(GROUPS[name].se3_indices), vectors(space, size)
     twists = np.zeros((POINTS, 6), dtype=np.longdouble)
     twists[:, places] = x
     for e in np.eye(space.nv):
@@ -71,7 +71,7 @@ def test_jacobians_are_those_of_their_series_up_to_a_full_turn(name: str, size: 
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("name", CURVED)
-def test_velocity_and_acceleration_are_rates_of_the_curve(name: str, size: float) -> None:
+def test_velocity_and_acceleration_are_derivatives_of_the_curve(name: str, size: float) -> None:
     space = ConfigurationSpace((name,))
     chart = Chart(space)
     x, dx, ddx = vectors(space, size), vectors(space, 1.0, 1), vectors(space, 1.0, 2)
@@ -88,7 +88,7 @@ def test_velocity_and_acceleration_are_rates_of_the_curve(name: str, size: float
     np.testing.assert_allclose(chart.rates(x, v, a), (dx, ddx), atol=1e-12)
 
 
-def test_a_curve_carried_by_another_has_the_rates_of_their_product() -> None:
+def test_a_composed_curve_has_the_rates_of_the_product() -> None:
     space = ConfigurationSpace(MIXED)
     chart, h = Chart(space), 1e-4
     first = [vectors(space, 0.7, seed) for seed in range(3)]
@@ -98,7 +98,7 @@ def test_a_curve_carried_by_another_has_the_rates_of_their_product() -> None:
         moved = [
             (x + t * dx + t * t / 2 * ddx, dx + t * ddx, ddx) for x, dx, ddx in (first, second)
         ]
-        return chart.carried(chart.jet(bases(space), *moved[0]), *moved[1])
+        return chart.composed(chart.jet(bases(space), *moved[0]), *moved[1])
 
     (q, v, a), there, back = at(0.0), at(h), at(-h)
     rate = (space.difference(q, there[0]) - space.difference(q, back[0])) / (2 * h)

@@ -1,4 +1,4 @@
-"""Configuration spaces: products of groups, told from Pinocchio's joints."""
+"""Configuration spaces as products of groups, built from Pinocchio's joints."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hovi.robot.space.configuration_space import ConfigurationSpace, configurati
 from samples.manifold_robots import configurations, with_arm
 
 
-def test_parts_are_told_from_the_joints() -> None:
+def test_parts_follow_from_the_joints() -> None:
     assert configuration_space(with_arm("free-flyer"))[0].parts == ("SE(3)", 1, "SO(2)", 1)
     assert load_robot("kinova").space.parts == ("SO(2)", 2, "SO(2)", 1, "SO(2)")
     assert load_robot("ur5").space.parts == (6,)
@@ -28,7 +28,7 @@ def test_parts_are_told_from_the_joints() -> None:
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "spherical", "planar", "continuous"])
-def test_products_move_as_in_pinocchio(base: str) -> None:
+def test_products_integrate_as_in_pinocchio(base: str) -> None:
     robot = load_robot(with_arm(base))
     q0, q1 = configurations(robot, 5, 1), configurations(robot, 5, 2)
     d = np.array([pin.difference(robot.model, x, y) for x, y in zip(q0, q1, strict=True)])
@@ -37,7 +37,7 @@ def test_products_move_as_in_pinocchio(base: str) -> None:
     np.testing.assert_allclose(np.abs(robot.integrate(q0, d)), np.abs(q1), atol=1e-12)
 
 
-def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
+def test_full_turns_are_closest_to_the_expected_difference() -> None:
     space = ConfigurationSpace((1, "SO(2)", "SE(2)", "SO(3)", "SE(3)"))
     random = np.random.default_rng(0)
     q0 = space.normalized(random.normal(size=(20, space.nq)))
@@ -68,7 +68,7 @@ def test_full_turns_are_those_nearest_to_what_is_expected() -> None:
         ((2, "SO(2)", 1), 4, 4),
     ],
 )
-def test_numbers_that_are_not_the_space_s_are_refused(
+def test_vectors_of_the_wrong_length_are_refused(
     parts: tuple[int | str, ...], q: int, dq: int
 ) -> None:
     space = ConfigurationSpace(parts)
@@ -84,13 +84,13 @@ def test_numbers_that_are_not_the_space_s_are_refused(
         space.difference_near(right, right, by[:, 1:])
 
 
-def test_numbers_of_a_configuration_are_named_by_what_they_are() -> None:
+def test_entries_of_a_configuration_are_named() -> None:
     robot = load_robot(with_arm("free-flyer"))
     base, arm = ("x", "y", "z", "qx", "qy", "qz", "qw"), ("j1", "j2[cos]", "j2[sin]", "j3")
     assert robot.space.names(robot.coordinate_names) == (*(f"j0[{part}]" for part in base), *arm)
 
 
 @pytest.mark.parametrize("parts", [(0,), (-1,), ("SO(4)",), (1.5,), (True,)])
-def test_what_is_no_part_is_refused(parts: tuple) -> None:  # type: ignore[type-arg]
+def test_an_invalid_part_is_refused(parts: tuple) -> None:  # type: ignore[type-arg]
     with pytest.raises(InputError, match="a part of a configuration space"):
         ConfigurationSpace(parts)

@@ -1,4 +1,4 @@
-"""The table of joint kinds, held against Pinocchio's joints themselves."""
+"""The table of joint kinds against Pinocchio's joints."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def motion_subspace(model: pin.Model, q: Array) -> Array:
 # What is in the table
 
 
-def test_every_type_of_joint_that_pinocchio_has_is_of_one_kind() -> None:
+def test_every_joint_type_of_pinocchio_has_one_kind() -> None:
     names = [name for kind in JOINT_KINDS for name in kind.names]
     assert sorted(names) == sorted(TYPES)
 
 
 @EVERY_TYPE
-def test_coordinates_that_move_without_turning_are_lengths(name: str) -> None:
+def test_coordinates_without_rotation_are_lengths(name: str) -> None:
     model = alone(name)
     S = motion_subspace(model, pin.neutral(model))
     slides = [bool(column[:3].any() and not column[3:].any()) for column in S.T]
@@ -64,7 +64,7 @@ def test_coordinates_that_move_without_turning_are_lengths(name: str) -> None:
 
 
 @EVERY_TYPE
-def test_sizes_are_those_of_the_joint(name: str) -> None:
+def test_dimensions_match_the_joint(name: str) -> None:
     joint = alone(name).joints[1]
     kind = kind_of(joint)
     assert kind.units is not None
@@ -73,7 +73,7 @@ def test_sizes_are_those_of_the_joint(name: str) -> None:
 
 
 @EVERY_TYPE
-def test_configurations_move_as_in_pinocchio(name: str) -> None:
+def test_configurations_integrate_as_in_pinocchio(name: str) -> None:
     model = alone(name)
     space, unknown = configuration_space(model)
     assert unknown == ()
@@ -82,7 +82,7 @@ def test_configurations_move_as_in_pinocchio(name: str) -> None:
 
 
 @EVERY_TYPE
-def test_configurations_change_at_a_velocity_as_integrate_says(name: str) -> None:
+def test_the_configuration_rate_is_the_derivative_of_integrate(name: str) -> None:
     model, h = alone(name), 1e-5
     q, v = random_configuration(model), np.linspace(-0.7, 1.1, model.nv)
     symbols = ca.SX.sym("q", model.nq), ca.SX.sym("v", model.nv)
@@ -92,8 +92,8 @@ def test_configurations_change_at_a_velocity_as_integrate_says(name: str) -> Non
 
 
 @EVERY_TYPE
-def test_the_kernel_serves_axes_that_a_joint_s_own_motion_leaves_alone(name: str) -> None:
-    """Anywhere if they do not turn about each other, as a base if they do, else nowhere."""
+def test_the_kernel_supports_axes_unchanged_by_their_own_motion(name: str) -> None:
+    """Anywhere if constant, as a base if not, else nowhere."""
     model = alone(name)
     S = motion_subspace(model, pin.neutral(model))
     fixed = np.allclose(S, motion_subspace(model, random_configuration(model)), atol=1e-12)
@@ -105,7 +105,7 @@ def test_the_kernel_serves_axes_that_a_joint_s_own_motion_leaves_alone(name: str
 
 @pytest.mark.parametrize("word", ["revolute", "continuous", "prismatic", "floating", "planar"])
 @pytest.mark.parametrize("axis", ["0 0 1", "0.6 0 0.8"])
-def test_reports_use_a_urdf_s_words(word: str, axis: str) -> None:
+def test_reports_use_the_joint_types_of_urdf(word: str, axis: str) -> None:
     model = pin.buildModelFromXML(
         f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{word}">'
         f'<parent link="a"/><child link="b"/><axis xyz="{axis}"/>'
@@ -123,23 +123,25 @@ def test_followers_have_no_coordinates() -> None:
     assert [each.q for each in coordinate_units(model)] == ["rad"]
 
 
-def test_a_composite_is_what_its_members_are(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_composite_has_the_properties_of_its_members(monkeypatch: pytest.MonkeyPatch) -> None:
     composite = pin.JointModelComposite()
     for name in ("PX", "HZ", "RUBZ"):
         composite.addJoint(JOINTS[name])
     model = chain([composite])
     assert kind_of(model.joints[1]) is COMPOSITE
     assert configuration_space(model)[0].parts == (2, "SO(2)")
-    forget(monkeypatch, "HZ")
+    remove_kind(monkeypatch, "HZ")
     assert configuration_space(model)[1] == ("j0",)
 
 
-def forget(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def remove_kind(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.delitem(joint_kinds._BY_NAME, f"JointModel{name}")
 
 
-def test_what_the_table_does_not_know_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    forget(monkeypatch, "HX")
+def test_a_joint_type_missing_from_the_table_is_refused_by_name(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    remove_kind(monkeypatch, "HX")
     robot = load_robot(chain([JOINTS["RX"], JOINTS["HX"], JOINTS["PY"]]))
     assert "JointModelHX" in robot.describe()
     assert [each.q for each in robot.coordinate_units] == ["rad", "rad", "m"]
@@ -151,7 +153,7 @@ def test_what_the_table_does_not_know_is_refused_by_name(monkeypatch: pytest.Mon
 
 
 def test_no_other_file_compares_the_names_of_joint_types() -> None:
-    """Elsewhere a type is named only where a joint of it is made, as in pin.JointModelRX()."""
+    """Elsewhere joint types are only constructed, as in pin.JointModelRX()."""
     asks = re.compile(r"shortname|classname|(?<!pin\.)JointModel[A-Z]|isinstance\([^)]*JointModel")
     source = Path(hovi.__file__).parent
     files = {path for path in source.rglob("*.py") if asks.search(path.read_text())}

@@ -1,4 +1,4 @@
-"""The groups of joints: Pinocchio's own integrate and difference, and the axioms."""
+"""The Lie groups of joints: against Pinocchio's integrate and difference, and group axioms."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def samples(group: Group, count: int, seed: int = 0) -> np.ndarray:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
-def test_elements_move_as_in_pinocchio(group: Group, size: float) -> None:
+def test_integrate_matches_pinocchio(group: Group, size: float) -> None:
     model, g = model_of(group), samples(group, 100)
     d = size * np.random.default_rng(1).uniform(-1, 1, (100, group.nv))
     expected = [pin.integrate(model, x, y) for x, y in zip(g, d, strict=True)]
@@ -29,7 +29,7 @@ def test_elements_move_as_in_pinocchio(group: Group, size: float) -> None:
 
 
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
-def test_differences_are_those_of_pinocchio(group: Group) -> None:
+def test_difference_matches_pinocchio(group: Group) -> None:
     model = model_of(group)
     g0, g1 = samples(group, 200, 2), samples(group, 200, 3)
     expected = np.array([pin.difference(model, x, y) for x, y in zip(g0, g1, strict=True)])
@@ -64,7 +64,7 @@ def test_a_quaternion_and_its_negative_are_the_same_rotation() -> None:
 
 @pytest.mark.parametrize("size", [1.0 - 1e-12, 1.0 + 1e-12])
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
-def test_series_and_closed_forms_meet(group: Group, size: float) -> None:
+def test_series_and_closed_forms_agree(group: Group, size: float) -> None:
     g, d = samples(group, 50), np.random.default_rng(1).normal(size=(50, group.nv))
     turn = list(group.angular)
     d[:, turn] *= size / np.linalg.norm(d[:, turn], axis=1, keepdims=True)
@@ -76,7 +76,7 @@ def test_series_and_closed_forms_meet(group: Group, size: float) -> None:
 
 @pytest.mark.parametrize("turns", [-2, -1, 0, 1, 3])
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS)
-def test_full_turns_are_those_that_are_expected(group: Group, turns: int) -> None:
+def test_full_turns_are_closest_to_the_expected_difference(group: Group, turns: int) -> None:
     g, d = samples(group, 50), np.random.default_rng(1).normal(size=(50, group.nv))
     turn = list(group.angular)
     size = np.linalg.norm(d[:, turn], axis=1, keepdims=True)

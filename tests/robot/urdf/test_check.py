@@ -121,7 +121,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("what", BROKEN)
-def test_a_broken_urdf_is_refused_with_one_sentence_that_names_the_culprit(what: str) -> None:
+def test_a_broken_urdf_is_refused_by_a_sentence_with_the_element(what: str) -> None:
     old, new, words = BROKEN[what]
     text = ARM.replace(old, new)
     assert text != ARM
@@ -136,11 +136,11 @@ def test_a_broken_urdf_is_refused_with_one_sentence_that_names_the_culprit(what:
         assert word in message
 
 
-def test_the_unbroken_urdf_passes() -> None:
+def test_the_valid_urdf_passes() -> None:
     check_urdf(ARM)
 
 
-def test_every_rule_is_broken_by_some_case() -> None:
+def test_every_rule_is_violated_by_some_case() -> None:
     import xml.etree.ElementTree as ElementTree
 
     broken = set()
@@ -158,7 +158,7 @@ def test_plain_numbers_pass(mass: str) -> None:
     check_urdf(ARM.replace('value="2.0"', f'value="{mass}"'))
 
 
-def test_links_are_counted_before_anything_else_is_looked_at() -> None:
+def test_links_are_counted_before_other_checks() -> None:
     with pytest.raises(ModelError, match="more than 1000 links"):
         check_urdf('<robot name="x">' + '<link mass="NaN"/>' * 20_000)
 
@@ -176,7 +176,7 @@ def test_entities_are_never_expanded() -> None:
         check_urdf(bomb)
 
 
-def test_a_file_that_is_not_there_or_not_text_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_binary_file_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"'.*gone\.urdf': no such file"):
         read_urdf(tmp_path / "gone.urdf")
     with pytest.raises(ModelError, match="that is a folder"):

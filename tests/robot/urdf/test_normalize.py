@@ -1,4 +1,4 @@
-"""Pinocchio reads from the plain text what the check has read, whatever the spelling."""
+"""Pinocchio reads from the normalized text what the check has read, for any spelling."""
 
 from __future__ import annotations
 
@@ -48,7 +48,9 @@ def test_an_axis_is_read_as_it_is_written(axis: str, tmp_path: Path) -> None:
     ],
     ids=["instruction", "encoding", "extension", "no dynamics", "inside an axis", "namespace"],
 )
-def test_what_is_not_for_the_model_does_no_harm(change: tuple[str, str], tmp_path: Path) -> None:
+def test_content_that_pinocchio_does_not_use_is_harmless(
+    change: tuple[str, str], tmp_path: Path
+) -> None:
     text = ARM.replace('<?xml version="1.0"?>', '<?xml version="1.0" encoding="utf-8"?>')
     assert change[0] in text
     path = tmp_path / "arm.urdf"
@@ -61,7 +63,7 @@ def test_what_is_not_for_the_model_does_no_harm(change: tuple[str, str], tmp_pat
 
 
 @pytest.mark.parametrize("name", example_names())
-def test_published_robots_are_the_same_to_the_last_bit(name: str) -> None:
+def test_published_robots_are_bitwise_unchanged(name: str) -> None:
     try:
         text = example_robot(name).urdf.read_text()
     except ModelError:
@@ -74,11 +76,11 @@ def test_a_second_root_joint_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(ARM.replace('joint name="shoulder"', 'joint name="root_joint"'))
     assert load_robot(path).joint_names == ("root_joint", "elbow")
-    with pytest.raises(ModelError, match="'root_joint', which is what its floating base is called"):
+    with pytest.raises(ModelError, match="'root_joint', the name of its floating base"):
         load_robot(path, free_flyer=True)
 
 
-def test_a_link_that_is_called_like_a_joint_is_found(tmp_path: Path) -> None:
+def test_a_link_with_the_name_of_a_joint_is_found(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     path.write_text(ARM.replace('joint name="shoulder"', 'joint name="tip"'))
     q = np.array([[0.3, 0.7]])

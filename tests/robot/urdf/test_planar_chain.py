@@ -29,7 +29,7 @@ def test_positive_angles_lift_against_gravity(tmp_path: Path) -> None:
     assert torque == pytest.approx([3.0 * 9.81 * 1.0], rel=1e-14)
 
 
-def test_a_chain_shows_itself(tmp_path: Path) -> None:
+def test_a_chain_has_visual_geometry(tmp_path: Path) -> None:
     robot = load_robot(write_chain(tmp_path / "chain.urdf", 4))
     assert robot.visual is not None
     assert robot.visual.ngeoms == 8
@@ -38,13 +38,13 @@ def test_a_chain_shows_itself(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("n", [0, -1, 251, 2.0, True, "3"])
-def test_a_chain_of_no_sensible_length_is_refused(n: object) -> None:
+def test_an_invalid_number_of_links_is_refused(n: object) -> None:
     with pytest.raises(InputError, match="1 to 250 links"):
         chain(n)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_link_without_size_or_mass_is_refused(value: float) -> None:
+def test_a_link_without_positive_length_and_mass_is_refused(value: float) -> None:
     with pytest.raises(InputError, match="positive length and mass"):
         chain(2, length=value)
     with pytest.raises(InputError, match="positive length and mass"):

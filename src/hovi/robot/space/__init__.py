@@ -1,1 +1,1 @@
-"""The configuration space: groups that joints move on, charts, derivatives in the tangent space."""
+"""The configuration space: Lie groups of the joints, charts, tangent-space derivatives."""

@@ -1,9 +1,9 @@
 """The chart of an interval, q(t) = q0 (+) x(t).
 
 Velocities and accelerations are v = J(x) x' and a = J(x) x'' + J' x' with J the right Jacobian of
-exp; the far end enters by x1 = q1 (-) q0 and x1' = J(x1)^-1 v1. The chart moves with the interval's
-first node, so that L_d is a function on TQ x TQ that keeps the left symmetries of L. For plain
-coordinates and continuous joints x is what is added, and none of this is needed.
+exp; at the end node x1 = q1 (-) q0 and x1' = J(x1)^-1 v1. The chart is centered at the interval's
+first node, so that L_d is a function on TQ x TQ with the left symmetries of L. For vector
+coordinates and continuous joints J is the identity.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ class Chart:
         return self.jets_from(q0, np.stack([x, dx, ddx]))
 
     def jets_from(self, q0: Array, x: Array) -> Jet:
-        """As `jet` for (x, x', x''), (3, P, nv); each of q0 (B, nq) is that of P / B points."""
+        """As `jet` for (x, x', x''), (3, P, nv); each row of q0 (B, nq) belongs to P / B points."""
         v, a = rates(self.space.layout, x)
         of_each = x[0].reshape(len(q0), -1, self.space.nv)
         return self.space.integrate(q0[:, None], of_each).reshape(len(v), -1), v, a
 
     def rates(self, x: Array, v: Array, a: Array | None = None) -> tuple[Array, Array]:
-        """(x', x'') of a curve that is at x with velocity v and acceleration a (zero if None)."""
+        """(x', x'') of a curve at x with velocity v and acceleration a (zero if None)."""
         return local_rates(self.space.layout, x, v, np.zeros_like(x) if a is None else a)
 
     def difference_slopes(self, x: Array) -> Array:
@@ -50,8 +50,8 @@ class Chart:
         columns = self.rates(-np.repeat(x, n, axis=0), each)[0]  # of J(-x)^-1
         return -columns.reshape(P, n, n).swapaxes(1, 2)
 
-    def carried(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
+    def composed(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q(t) (+) x(t) for a curve q(t) with the jet (q, v, a)."""
         q, v, a = jet
-        seen, turned = rates(self.space.layout, np.stack([x, dx, ddx]), np.stack([v, a]))
-        return self.space.integrate(q, x), seen, turned
+        velocity, acceleration = rates(self.space.layout, np.stack([x, dx, ddx]), np.stack([v, a]))
+        return self.space.integrate(q, x), velocity, acceleration

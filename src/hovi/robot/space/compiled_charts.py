@@ -1,7 +1,6 @@
-"""What charts do to many points and intervals at a time, by the compiled module.
+"""Chart operations on batches of points and intervals, by the compiled module.
 
-portable: by instructions that every processor has, instead of the fastest that this one has; it
-is there to compare the two.
+portable: use the baseline instruction set instead of the fastest available one, for comparison.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ def rates(
 def local_rates(
     layout: Layout, x: Array, v: Array, a: Array, portable: bool = False
 ) -> tuple[Array, Array]:
-    """(x', x'') of curves that are at x with velocities v and accelerations a, all (P, n)."""
+    """(x', x'') of curves at x with velocities v and accelerations a, all (P, n)."""
     out = np.empty((2, *x.shape))
     rows = np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
     native.local_rates(layout, *rows, out, portable)
@@ -42,7 +41,7 @@ def local_rates(
 
 @dataclass(frozen=True, eq=False)
 class CompiledCharts:
-    """The chain rule in the charts of B intervals of one scheme, in m columns of n numbers.
+    """The chain rule in the charts of B intervals of one scheme, with m columns of n components.
 
     layout: of the configuration space. table: shape (Q, 3, m). weights: shape (Q,).
     h: lengths of the intervals, shape (B,). x: (x, x', x'') at the points, shape (3, B Q, n).

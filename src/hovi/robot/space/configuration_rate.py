@@ -1,6 +1,6 @@
-"""How configurations change at a velocity: q' = G(q) v for every kind of joint.
+"""The rate of change of a configuration, q' = G(q) v, for every kind of joint.
 
-The expression that belongs to Pinocchio's `integrate`: d/ds of q (+) s v at s = 0.
+It is d/ds of q (+) s v at s = 0, with Pinocchio's `integrate`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from hovi.robot.space.joint_kinds import kind_of
 def configuration_rate(model: pin.Model, q: ca.SX, v: ca.SX) -> ca.SX:
     """q' as an expression of q (nq,) and v (nv,), shape (nq,).
 
-    Raises SceneError for a joint of a kind that has no formula here.
+    Raises SceneError for a joint of an unsupported kind.
     """
     rates = []
     for name, joint in list(zip(model.names, model.joints, strict=True))[1:]:
@@ -34,35 +34,35 @@ def _rate(name: str, joint: pin.JointModel, q: ca.SX, v: ca.SX) -> ca.SX:
     kind = kind_of(joint)
     if kind.group is None:
         raise SceneError(
-            f"joint {name!r} is of a kind ({kind.word}) whose frames no effect can follow."
+            f"joint {name!r} is of a kind ({kind.word}) that effects on frames do not support."
         )
     return _RATES[kind.group.name](q, v)
 
 
 def _angle_rate(q: ca.SX, v: ca.SX) -> ca.SX:
-    """Of (cos, sin)."""
+    """The rate of (cos, sin)."""
     return ca.vertcat(-q[1], q[0]) * v
 
 
 def _plane_rate(q: ca.SX, v: ca.SX) -> ca.SX:
-    """Of (x, y, cos, sin)."""
+    """The rate of (x, y, cos, sin)."""
     moved = ca.vertcat(q[2] * v[0] - q[3] * v[1], q[3] * v[0] + q[2] * v[1])
     return ca.vertcat(moved, -q[3] * v[2], q[2] * v[2])
 
 
 def _pose_rate(q: ca.SX, v: ca.SX) -> ca.SX:
-    """Of (position, quaternion)."""
+    """The rate of (position, quaternion)."""
     return ca.vertcat(_rotated(q[3:], v[:3]), _quaternion_rate(q[3:], v[3:]))
 
 
 def _quaternion_rate(q: ca.SX, spin: ca.SX) -> ca.SX:
-    """1/2 q * (spin, 0) for q = (x, y, z, w) and a spin in the body's axes."""
+    """1/2 q * (spin, 0) for q = (x, y, z, w) and an angular velocity in the body frame."""
     vector = q[3] * spin + ca.cross(q[:3], spin)
     return ca.vertcat(vector, -ca.dot(q[:3], spin)) / 2
 
 
 def _rotated(q: ca.SX, x: ca.SX) -> ca.SX:
-    """x from the body's axes into its parent's, by the unit quaternion (x, y, z, w)."""
+    """x rotated from the body frame to its parent frame by the unit quaternion (x, y, z, w)."""
     twice = 2 * ca.cross(q[:3], x)
     return x + q[3] * twice + ca.cross(q[:3], twice)
 

@@ -1,4 +1,4 @@
-"""The configuration space of a robot: a product of vector spaces and groups of its joints."""
+"""The configuration space of a robot: a product of vector spaces and Lie groups."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Index = npt.NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Factor:
-    """One group in the product. q, v: its places in q and v."""
+    """One group in the product. q, v: its indices in q and v."""
 
     group: Group
     q: slice
@@ -29,10 +29,10 @@ class Factor:
 
 @dataclass(frozen=True)
 class ConfigurationSpace:
-    """Q as a product; each part is a number of plain coordinates or the name of a group.
+    """Q as a product; each part is a number of vector coordinates or the name of a group.
 
     parts: such as (3, "SO(2)", 1, "SE(3)"), in Pinocchio's order of q and v.
-    Raises InputError for what is neither.
+    Raises InputError for any other part.
     """
 
     parts: tuple[int | str, ...]
@@ -48,7 +48,7 @@ class ConfigurationSpace:
 
     @cached_property
     def nq(self) -> int:
-        """Numbers in a configuration."""
+        """Length of a configuration."""
         return sum(p if isinstance(p, int) else GROUPS[p].nq for p in self.parts)
 
     @cached_property
@@ -68,7 +68,7 @@ class ConfigurationSpace:
 
     @cached_property
     def layout(self) -> Layout:
-        """The parts as the compiled charts read them, (kind, place in q, place in v, size)."""
+        """The parts for the compiled charts: rows (kind, index in q, index in v, size in v)."""
         rows, iq, iv = [], 0, 0
         for part in self.parts:
             kind = 0 if isinstance(part, int) else GROUPS[part].kind
@@ -88,9 +88,9 @@ class ConfigurationSpace:
         return tuple(factor for factor in self.factors if factor.group is SO2)
 
     def names(self, coordinates: Sequence[str]) -> tuple[str, ...]:
-        """Names of the numbers of a configuration, (nq,), from those of its coordinates, (nv,).
+        """Names of the entries of a configuration, (nq,), from those of its velocities, (nv,).
 
-        A group's numbers add a part to the name of its joint: wrist[cos], base[x].
+        Entries of a group append their own name to that of the joint: wrist[cos], base[x].
         """
         named = [""] * self.nq
         for iq, iv in zip(*self.plain, strict=True):
@@ -102,17 +102,17 @@ class ConfigurationSpace:
 
     @property
     def vector(self) -> bool:
-        """Whether configurations add like vectors."""
+        """Whether the configuration space is a vector space."""
         return not self.factors
 
     @property
     def flat(self) -> bool:
-        """Whether tangent vectors add: only plain coordinates and continuous joints."""
+        """Whether the space is commutative: only vector coordinates and continuous joints."""
         return not self.curved
 
     @cached_property
     def plain(self) -> tuple[Index, Index]:
-        """Places in q and in v of the plain coordinates."""
+        """Indices in q and in v of the vector coordinates."""
         q, v = np.ones(self.nq, dtype=bool), np.ones(self.nv, dtype=bool)
         for factor in self.factors:
             q[factor.q], v[factor.v] = False, False
@@ -133,9 +133,9 @@ class ConfigurationSpace:
         return differenced(self.layout, q0, q1)
 
     def difference_near(self, q0: Array, q1: Array, expected: Array) -> Array:
-        """As `difference`, with the full turns that come nearest to an expected answer, (..., nv).
+        """As `difference`, plus the full turns that bring it closest to `expected`, (..., nv).
 
-        Orientations are followed so beyond half a turn, where `difference` would jump.
+        So rotations are continuous beyond half a turn, where `difference` jumps.
         """
         if self.vector:
             return q1 - q0
@@ -149,7 +149,7 @@ class ConfigurationSpace:
         return result
 
     def nearest(self, q: Array, other: Array) -> Array:
-        """Configurations (..., nq) with those signs of quaternions that are nearest to another."""
+        """Configurations (..., nq) with the quaternion signs that are closest to another one."""
         result = np.array(q, dtype=np.float64)
         for factor in self.curved:
             if factor.group is not SE2:
@@ -159,7 +159,7 @@ class ConfigurationSpace:
         return result
 
     def coordinates(self, q: Array) -> Array:
-        """The plain coordinates at their places in v, 0 elsewhere: (..., nq) -> (..., nv)."""
+        """The vector coordinates at their indices in v, 0 elsewhere: (..., nq) -> (..., nv)."""
         if self.vector:
             return q
         result = np.zeros((*q.shape[:-1], self.nv))
@@ -169,7 +169,7 @@ class ConfigurationSpace:
 
     @cached_property
     def _grouped(self) -> list[tuple[Group, Index, Index]]:
-        """Each group with the places of all its factors in q (F, nq) and in v (F, nv)."""
+        """Each group with the indices of all its factors in q (F, nq) and in v (F, nv)."""
         found = []
         for group in GROUPS.values():
             chosen = [factor for factor in self.factors if factor.group is group]
@@ -181,9 +181,9 @@ class ConfigurationSpace:
 
 
 def configuration_space(model: pin.Model) -> tuple[ConfigurationSpace, tuple[str, ...]]:
-    """The space of a model's joints, and the names of joints that are none of its parts.
+    """The space of a model's joints, and the names of joints of an unsupported kind.
 
-    Such joints count as plain coordinates in the space, which then fits only where there are none.
+    The space treats such joints as vector coordinates, so it is valid only if there are none.
     """
     parts: list[int | str] = []
     unknown = []
@@ -196,7 +196,7 @@ def configuration_space(model: pin.Model) -> tuple[ConfigurationSpace, tuple[str
 
 
 def _parts_of(joint: pin.JointModel) -> list[int | str] | None:
-    """The parts of a joint, those of a composite's members; None for one that has none."""
+    """The parts of a joint, or of the members of a composite; None if unsupported."""
     kind = kind_of(joint)
     if kind is COMPOSITE:
         members = [_parts_of(member) for member in joint.extract().joints]
@@ -210,7 +210,7 @@ def _parts_of(joint: pin.JointModel) -> list[int | str] | None:
 
 
 def _merged(parts: Sequence[int | str]) -> list[int | str]:
-    """Neighbouring plain coordinates as one part."""
+    """The parts with consecutive vector coordinates merged into one."""
     merged: list[int | str] = []
     for part in parts:
         last = merged[-1] if merged else None
@@ -226,10 +226,10 @@ def _sizes(group: Group) -> tuple[int, int]:
 
 
 def bracket(space: ConfigurationSpace, x: Array, y: Array) -> Array:
-    """[x, y] of tangent vectors in the bodies' axes, (M, nv) each: zero where they add."""
+    """The Lie bracket [x, y] of left-invariant tangent vectors, (M, nv) each."""
     result = np.zeros_like(x)
     for factor in space.curved:
-        i, places = factor.v, list(factor.group.places)
+        i, places = factor.v, list(factor.group.se3_indices)
         a, b, c = np.zeros((3, len(x), 6))
         a[:, places], b[:, places] = x[:, i], y[:, i]
         c[:, :3] = np.cross(a[:, 3:], b[:, :3]) + np.cross(a[:, :3], b[:, 3:])

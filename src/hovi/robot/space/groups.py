@@ -1,7 +1,7 @@
-"""The groups that joints move on, SO(2), SE(2), SO(3) and SE(3): exp and log over batches.
+"""The Lie groups of joints, SO(2), SE(2), SO(3) and SE(3): exp and log over batches.
 
 Elements and tangent vectors are those of Pinocchio: (cos, sin); (x, y, cos, sin) with (v, w); a
-unit quaternion (x, y, z, w) with w in the body's axes; (p, quaternion) with (v, w). Tangent
+unit quaternion (x, y, z, w) with w in the body frame; (p, quaternion) with (v, w). Tangent
 vectors are left-invariant: g (+) d = g exp(d).
 """
 
@@ -17,19 +17,19 @@ from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
 Layout = npt.NDArray[np.int64]
-"""Rows (kind, place in q, place in v, size in v) for the parts of a configuration."""
+"""Rows (kind, index in q, index in v, size in v) for the parts of a configuration."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """One of the groups.
+    """A Lie group.
 
-    name: as files name it. kind: as layouts name it. nq: numbers of an element. nv: of a tangent
-        vector.
-    angular: places of the rotation in a tangent vector.
-    places: of a tangent vector in those of SE(3), (linear, angular), a plane at right angles to z.
-    unit: places in an element of what has unit norm.
-    parts: names of an element's numbers.
+    name: in files. kind: in layouts. nq: length of an element. nv: length of a tangent vector.
+    angular: indices of the rotation in a tangent vector.
+    se3_indices: indices of a tangent vector's entries in those of SE(3), (linear, angular); planes
+        are normal to z.
+    unit: indices of the entries of an element that have unit norm.
+    parts: names of the entries of an element.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Group:
     nq: int
     nv: int
     angular: tuple[int, ...]
-    places: tuple[int, ...]
+    se3_indices: tuple[int, ...]
     unit: tuple[int, ...]
     parts: tuple[str, ...]
 
@@ -46,24 +46,24 @@ class Group:
         return integrated(self._layout, g, d)
 
     def difference(self, g0: Array, g1: Array) -> Array:
-        """log(g0^-1 g1): elements (..., nq) -> (..., nv), of the least angle."""
+        """log(g0^-1 g1), with the smallest angle: elements (..., nq) -> (..., nv)."""
         return differenced(self._layout, g0, g1)
 
     def difference_near(self, g0: Array, g1: Array, expected: Array) -> Array:
-        """As `difference`, with the full turns that come nearest to an expected answer."""
+        """As `difference`, plus the full turns that bring it closest to `expected`."""
         return differenced(self._layout, g0, g1, expected)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Names of the numbers of a position and a rotation vector, (nv,), as reports use them."""
-        return tuple(_COORDINATES[place] for place in self.places)
+        """Names of the entries of a position and a rotation vector, (nv,), for reports."""
+        return tuple(_COORDINATES[place] for place in self.se3_indices)
 
     @property
     def _layout(self) -> Layout:
         return np.array([[self.kind, 0, 0, self.nv]])
 
     def normalized(self, g: Array) -> Array:
-        """Elements (..., nq) with their unit part of unit norm."""
+        """Elements (..., nq) with their unit entries normalized."""
         result = np.array(g, dtype=np.float64)
         part = result[..., list(self.unit)]
         size = np.sqrt(np.sum(part * part, axis=-1, keepdims=True))
@@ -74,11 +74,11 @@ class Group:
 def integrated(layout: Layout, q: Array, dq: Array) -> Array:
     """q (+) dq for configurations (..., nq) and tangent vectors (..., nv) -> (..., nq).
 
-    Raises InputError for a number of numbers that is not the layout's.
+    Raises InputError for vectors of the wrong length.
     """
     nq, nv = _totals(layout)
-    _check_numbers("configuration", nq, q)
-    _check_numbers("tangent vector", nv, dq)
+    _check_length("configuration", nq, q)
+    _check_length("tangent vector", nv, dq)
     lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
     result = np.empty((*lead, nq))
     native.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
@@ -88,12 +88,12 @@ def integrated(layout: Layout, q: Array, dq: Array) -> Array:
 def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = None) -> Array:
     """q1 (-) q0 for configurations (..., nq) -> tangent vectors (..., nv): see Group.
 
-    Raises InputError for a number of numbers that is not the layout's.
+    Raises InputError for vectors of the wrong length.
     """
     nq, nv = _totals(layout)
-    _check_numbers("configuration", nq, q0, q1)
+    _check_length("configuration", nq, q0, q1)
     if expected is not None:
-        _check_numbers("tangent vector", nv, expected)
+        _check_length("tangent vector", nv, expected)
     lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
     result = np.empty((*lead, nv))
     near = None if expected is None else _rows(expected, lead)
@@ -102,13 +102,13 @@ def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = N
 
 
 def _totals(layout: Layout) -> tuple[int, int]:
-    """(nq, nv) of a layout, whose last part ends them."""
+    """(nq, nv) of a layout."""
     kind, q, v, size = layout[-1].tolist()
     return q + next((g.nq for g in GROUPS.values() if g.kind == kind), size), v + size
 
 
-def _check_numbers(what: str, count: int, *arrays: Array) -> None:
-    """Compiled code reads and writes as many numbers as the layout says, whatever came."""
+def _check_length(what: str, count: int, *arrays: Array) -> None:
+    """Raise InputError for arrays of the wrong length, which compiled code does not check."""
     for array in arrays:
         came = array.shape[-1] if array.ndim else 0
         if came != count:
@@ -119,7 +119,7 @@ def _check_numbers(what: str, count: int, *arrays: Array) -> None:
 
 
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:
-    """(..., n) as rows (P, n) in one piece."""
+    """(..., n) as contiguous rows (P, n)."""
     full = x if x.shape[:-1] == lead else np.broadcast_to(x, (*lead, x.shape[-1]))
     return np.ascontiguousarray(full, dtype=np.float64).reshape(-1, x.shape[-1])
 

@@ -1,6 +1,6 @@
-"""What hovi knows of Pinocchio's kinds of joints, in one table.
+"""The table of Pinocchio's joint types and their properties.
 
-Nothing else compares their names: whoever asks what a joint is asks `kind_of`.
+No other code compares joint names: `kind_of` returns the kind of a joint.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ LENGTH = Units("m", "m/s", "m/s^2", "N")
 class JointKind:
     """One kind of joint.
 
-    word: for reports, a URDF's where it has one.
-    names: Pinocchio's short names, "JointModel" left out.
-    units: of its coordinates, one each; None where joints of this kind differ in them.
-    group: on which it moves; None where its configurations add like vectors, with q' = v.
-    kernel: where the analytic kernel serves it. "anywhere" asks for axes that do not change along
-        the joint's own motion, which the closed forms assume; a joint "as base", which carries all
-        others, enters through gravity alone.
+    word: its name in reports, that of URDF if there is one.
+    names: Pinocchio's short names without "JointModel".
+    units: of its coordinates, one each; None if they vary within the kind.
+    group: its Lie group; None if its configurations form a vector space with q' = v.
+    kernel: where in the tree the analytic kernel supports it. The closed forms require axes that do
+        not change along the joint's own motion ("anywhere"); other joints are supported "as base",
+        the root of all others, where they enter through gravity alone.
     """
 
     word: str
@@ -49,19 +49,19 @@ class JointKind:
 
 
 def _family(letter: str, *others: str) -> tuple[str, ...]:
-    """The names of joints along each axis, and others."""
+    """The names of joints along x, y and z, and others."""
     return (*(letter + axis for axis in "XYZ"), *others)
 
 
 def _on(group: Group, word: str, names: tuple[str, ...], kernel: Service) -> JointKind:
-    """A kind whose coordinates are those of a group's tangent vectors."""
+    """A kind whose velocities are the tangent vectors of a group."""
     units = (ANGLE if place in group.angular else LENGTH for place in range(group.nv))
     return JointKind(word, names, tuple(units), group, kernel)
 
 
 FLOATING = _on(SE3, "floating", ("FreeFlyer",), "as base")
 COMPOSITE = JointKind("composite", ("Composite",), None)
-"""Its members say what it is."""
+"""Its properties are those of its members."""
 
 JOINT_KINDS = (
     JointKind("revolute", _family("R", "RevoluteUnaligned"), (ANGLE,), kernel="anywhere"),
@@ -83,16 +83,16 @@ _BY_NAME = {f"JointModel{name}": kind for kind in JOINT_KINDS for name in kind.n
 
 
 def kind_of(joint: pin.JointModel) -> JointKind:
-    """The kind of a joint; one that bears Pinocchio's name for it where the table has none.
+    """The kind of a joint; for a type that is not in the table, a kind with Pinocchio's name.
 
-    Nothing can be planned on a joint that is not in the table.
+    Joints that are not in the table do not support planning.
     """
     name = str(joint.shortname())
     return _BY_NAME.get(name) or JointKind(name, (), None)
 
 
 def coordinate_units(model: pin.Model) -> tuple[Units, ...]:
-    """Units at each coordinate of a model, (nv,); angles where the kind does not tell."""
+    """Units at each coordinate of a model, (nv,); those of angles where unknown."""
     units: list[Units] = []
     for joint in list(model.joints)[1:]:
         units += kind_of(joint).units or joint.nv * (ANGLE,)

@@ -1,4 +1,4 @@
-"""Configurations of any Pinocchio model: group operations over batches, and checks at the door."""
+"""Configurations of any Pinocchio model: group operations over batches, and input checks."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
-LARGEST = 1e9
-"""Of a coordinate, in [rad] or [m]: squares of torques stay far from overflow."""
+MAX_COORDINATE = 1e9
+"""Largest coordinate, in [rad] or [m], so that squared torques do not overflow."""
 
 UNIT_TOLERANCE = 1e-6
-"""How far a quaternion or a (cos, sin) pair may be from unit norm before it is refused."""
+"""Largest deviation of a quaternion or (cos, sin) pair from unit norm."""
 
 
 def integrate(model: pin.Model, q: Array, dq: Array) -> Array:
@@ -51,8 +51,8 @@ def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
 def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: str = "") -> Array:
     """`value` as a finite float array with one number per name in `entries`.
 
-    name: what the argument is called, for the message. hint: the end of the sentence about a
-    wrong length. Raises InputError.
+    name: of the argument, for the message. hint: end of the message about a wrong length.
+    Raises InputError.
     """
     try:
         vector = np.array(value, dtype=float)
@@ -66,13 +66,15 @@ def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: 
     for number, entry in zip(vector, entries, strict=True):
         if not np.isfinite(number):
             raise InputError(f"{name} is {number} at joint {entry!r}: give a finite number.")
-        if abs(number) > LARGEST:
-            raise InputError(f"{name} is {number} at joint {entry!r}: at most {LARGEST:g} in size.")
+        if abs(number) > MAX_COORDINATE:
+            raise InputError(
+                f"{name} is {number} at joint {entry!r}: at most {MAX_COORDINATE:g} in magnitude."
+            )
     return vector
 
 
 def check_unit_norms(model: pin.Model, q: Array, name: str) -> None:
-    """Raise InputError naming the first joint whose quaternion or (cos, sin) has no unit norm."""
+    """Raise InputError for the first joint whose quaternion or (cos, sin) is not of unit norm."""
     for joint, joint_name in zip(model.joints[1:], model.names[1:], strict=True):
         part = slice(joint.idx_q, joint.idx_q + joint.nq)
         alone = pin.neutral(model)
@@ -85,7 +87,7 @@ def check_unit_norms(model: pin.Model, q: Array, name: str) -> None:
             )
 
 
-_HELD = {
+_CONTENTS = {
     (2, 1): "(cos, sin) of its angle",
     (4, 3): "a unit quaternion (x, y, z, w), or x, y, cos, sin on a plane",
     (7, 6): "a position and a unit quaternion (x, y, z, w)",
@@ -93,20 +95,20 @@ _HELD = {
 
 
 def manifold_hint(model: pin.Model) -> str:
-    """What joints with more numbers in q than in v hold, as the end of a sentence; "" without."""
+    """The coordinates of joints with nq != nv, as the end of a message; "" if there are none."""
     kinds: dict[tuple[int, int], list[str]] = {}
     for joint, name in zip(model.joints[1:], model.names[1:], strict=True):
         if joint.nq != joint.nv:
             kinds.setdefault((joint.nq, joint.nv), []).append(str(name))
     parts = []
     for (nq, nv), names in kinds.items():
-        held = _HELD.get((nq, nv), f"{nq} numbers for {nv} degrees of freedom")
+        held = _CONTENTS.get((nq, nv), f"{nq} numbers for {nv} degrees of freedom")
         parts.append(f"{', '.join(names)} {'takes' if len(names) == 1 else 'take'} {nq}: {held}")
     return f"; {'; '.join(parts)}" if parts else ""
 
 
 def entry_names(model: pin.Model, size: str) -> tuple[str, ...]:
-    """One name per entry of q (size "nq") or of v (size "nv"): joint, or joint[i] for several."""
+    """One name per entry of q (size "nq") or v (size "nv"): joint, or joint[i] if several."""
     names = []
     for joint, name in zip(model.joints[1:], model.names[1:], strict=True):
         count = getattr(joint, size)

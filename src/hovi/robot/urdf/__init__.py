@@ -1,1 +1,1 @@
-"""What a URDF has to be before Pinocchio reads it."""
+"""Checks and normalizes URDFs before Pinocchio reads them."""

@@ -1,10 +1,10 @@
-"""What a URDF must be before Pinocchio reads it.
+"""Checks a URDF before Pinocchio reads it.
 
-Pinocchio takes "1,5" for a mass of 0, loads negative masses, explains a broken tree on stderr
-only and needs memory that grows with the cube of the degrees of freedom. So the text is counted
-first, then parsed without entities, then held against a table of rules (rules.py). The first
-rule that is broken raises one sentence that names the link or joint. What passes reaches Pinocchio
-as normalize.py writes it again, never as it came.
+Pinocchio reads the mass "1,5" as 0, accepts negative masses, reports a broken tree on stderr only,
+and needs memory that grows with the cube of the degrees of freedom. So sizes are limited while the
+text is parsed, without entities, and the result is checked against a table of rules (rules.py). The
+first violation raises a message that names the link or joint. Pinocchio never reads the original
+text, only what normalize.py writes.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ MAXIMUM_LINKS = 1_000
 MAXIMUM_DEPTH = 64
 MAXIMUM_ELEMENTS = 100_000
 MAXIMUM_ATTRIBUTES = 64
-"""Of one element: Pinocchio's parser compares each with every other."""
-MAXIMUM_FREEDOM = 250
+"""Of one element: the time of Pinocchio's parser grows with their square."""
+MAXIMUM_DOF = 250
 """Pinocchio's workspace holds tensors of 48 nv^3 bytes: 0.8 GB at 250 degrees of freedom."""
 
 _FREEDOM = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF file. Raises ModelError: no such file, too large, not UTF-8."""
+    """The text of a URDF file. Raises ModelError if it is missing, too large or not UTF-8."""
     try:
         require_file(path, MAXIMUM_BYTES)
         return path.read_bytes().decode()
@@ -46,16 +46,16 @@ def read_urdf(path: Path) -> str:
 
 
 def check_urdf(text: str, name: str = "robot.urdf") -> None:
-    """Hold the text of a URDF against every rule.
+    """Check the text of a URDF against every rule.
 
-    name: what to call the URDF in the message.
-    Raises ModelError with one sentence: what was expected, what came, what to do.
+    name: of the URDF, for messages.
+    Raises ModelError with one sentence: what was expected, what was found, what to do.
     """
     checked_urdf(text, name)
 
 
 def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
-    """The element <robot> of a URDF's text that passes every rule. Raises ModelError."""
+    """The element <robot> of the text of a URDF, checked. Raises ModelError."""
     if len(text) > MAXIMUM_BYTES:
         raise ModelError(_too_large(name, len(text)))
     robot = _Reader(name).read(text)
@@ -66,7 +66,7 @@ def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
 
 
 class _Reader:
-    """Expat into an element tree, counting what there is as it comes."""
+    """Parses XML into an element tree and enforces the size limits on the way."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -79,7 +79,7 @@ class _Reader:
         parser.EndElementHandler = self.end
         parser.StartDoctypeDeclHandler = self.doctype
         try:
-            parser.Parse(text, True)  # as UTF-8, whatever the declaration says
+            parser.Parse(text, True)  # as UTF-8, regardless of the declaration
         except (expat.ExpatError, UnicodeEncodeError) as error:
             raise ModelError(f"URDF {self.name!r} is not well-formed XML: {error}.") from error
         return self.builder.close()
@@ -92,7 +92,7 @@ class _Reader:
         if self.depth > MAXIMUM_DEPTH:
             self.refuse(f"elements are nested more than {MAXIMUM_DEPTH} deep.")
         if self.elements > MAXIMUM_ELEMENTS:
-            self.refuse(f"it has more than {MAXIMUM_ELEMENTS:,} elements, the most accepted.")
+            self.refuse(f"it has more than {MAXIMUM_ELEMENTS:,} elements, the maximum.")
         if len(attributes) > MAXIMUM_ATTRIBUTES:
             self.refuse(f"<{tag[:40]}> has more than {MAXIMUM_ATTRIBUTES} attributes.")
         if tag.startswith("xacro:"):
@@ -109,14 +109,14 @@ class _Reader:
         self.links += tag == "link"
         if self.links > MAXIMUM_LINKS:
             self.refuse(
-                f"it has more than {MAXIMUM_LINKS} links, the most that is accepted: "
-                "merge links that do not move against each other."
+                f"it has more than {MAXIMUM_LINKS} links, the maximum: "
+                "merge links that do not move relative to each other."
             )
         self.freedom += _FREEDOM.get(joint_type, 0) if tag == "joint" else 0
-        if self.freedom > MAXIMUM_FREEDOM:
+        if self.freedom > MAXIMUM_DOF:
             self.refuse(
-                f"it has more than {MAXIMUM_FREEDOM} degrees of freedom, the most that is "
-                "accepted (memory grows with their cube): make some joints fixed."
+                f"it has more than {MAXIMUM_DOF} degrees of freedom, the maximum "
+                "(memory grows with their cube): make some joints fixed."
             )
 
     def doctype(self, *_: object) -> None:
@@ -129,5 +129,5 @@ class _Reader:
 def _too_large(name: str, size: int) -> str:
     return (
         f"URDF {name!r} has {size / 1e6:.0f} MB, at most {MAXIMUM_BYTES / 1e6:.0f} MB are "
-        "accepted: meshes belong in files of their own."
+        "accepted: store meshes in separate files."
     )

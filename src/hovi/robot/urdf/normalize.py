@@ -1,8 +1,8 @@
-"""A checked URDF written again, plainly, so that Pinocchio reads what the check has read.
+"""Rewrites a checked URDF in a form that Pinocchio reads as the check does.
 
-Its parser takes the mass " 1.5" for 0, knows no tab between two numbers and stops at instructions
-to other programs. What it gets has one space between numbers, each with every digit, and nothing
-that it would not use.
+Pinocchio's parser reads the mass " 1.5" as 0, does not accept tabs between numbers and stops at
+processing instructions. The rewritten text has single spaces between numbers, all their digits, and
+only the elements that Pinocchio uses.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _PARTS = {
 
 
 def plain_urdf(text: str, name: str = "robot.urdf") -> str:
-    """Links with their inertias and joints, without shapes.
+    """The URDF with its links' inertias and its joints, without geometry.
 
-    text: of the URDF. name: what to call it in a message. Raises ModelError as check_urdf does.
+    text: of the URDF. name: for messages. Raises ModelError as check_urdf does.
     """
     robot = checked_urdf(text, name)
     plain = ElementTree.Element("robot", name=robot.get("name", ""))
@@ -34,9 +34,9 @@ def plain_urdf(text: str, name: str = "robot.urdf") -> str:
 
 
 def make_plain(robot: ElementTree.Element) -> None:
-    """Every number of a checked URDF with all its digits and single spaces between, in place.
+    """Rewrite every number of a checked URDF with all digits and single spaces, in place.
 
-    A <dynamics/> that says nothing goes, since Pinocchio's parser stops at it.
+    An empty <dynamics/> is removed, since Pinocchio's parser stops at it.
     """
     for joint in robot.iterfind("joint"):
         for dynamics in joint.findall("dynamics"):

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from hovi.errors import InputError
-from hovi.robot.urdf.check import MAXIMUM_FREEDOM
+from hovi.robot.urdf.check import MAXIMUM_DOF
 from hovi.system.files import whole_file
 
 _COLORS = ("0.16 0.44 0.74 1", "0.95 0.55 0.15 1")
@@ -38,18 +38,18 @@ _LINK = """
 
 
 def chain(n: int, *, length: float = 1.0, mass: float = 1.0) -> str:
-    """The URDF of n uniform rods, one after the other, in the vertical plane x-z.
+    """The URDF of a serial chain of n uniform rods in the vertical plane x-z.
 
-    Joints "joint1" ... turn about -y, so that zero angles lie along +x and positive ones lift
-    against gravity; the frame "tip" is the end of the last rod.
+    Joints "joint1" ... rotate about -y: at zero angles the chain lies along +x, and positive angles
+    lift it against gravity. The frame "tip" is the end of the last rod.
 
     n: number of links, 1 to 250.
     length: of each link, in [m].
     mass: of each link, in [kg].
     Raises InputError for anything else.
     """
-    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAXIMUM_FREEDOM:
-        raise InputError(f"a chain has 1 to {MAXIMUM_FREEDOM} links, not {n!r}.")
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAXIMUM_DOF:
+        raise InputError(f"a chain has 1 to {MAXIMUM_DOF} links, not {n!r}.")
     if not (0.0 < length < float("inf") and 0.0 < mass < float("inf")):
         raise InputError(f"a chain needs a positive length and mass, not {length!r}, {mass!r}.")
     links = "".join(_link(i, float(length), float(mass)) for i in range(1, n + 1))

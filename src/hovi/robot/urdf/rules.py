@@ -1,7 +1,7 @@
-"""The rules of a URDF, one function each: it yields a sentence for every place that breaks it.
+"""The rules of a URDF, one function each, which yields a sentence for every violation.
 
-They ask for what RNEA needs and no more: published robots break the triangle inequality of the
-principal inertias by factors of five, and name mimicked joints that do not exist; both load.
+They require what RNEA needs and no more: published robots violate the triangle inequality of the
+principal inertias by factors of five, and mimic joints that do not exist; both load.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Rule = Callable[[Element], Iterator[str]]
 
 MAXIMUM_MAGNITUDE = 1e12
 MAXIMUM_LIMIT = 1e30
-"""Limits are compared, never computed with; robots write 1e16 for "none"."""
+"""For limits, which are only compared; some URDFs write 1e16 for "no limit"."""
 
 MAXIMUM_NAME = 256
 
 INERTIA_TOLERANCE = 1e-7
-"""Negative principal inertia, in [kg m^2], that still passes as a rounding of the CAD export."""
+"""Largest negative principal inertia, in [kg m^2], accepted as a rounding error of CAD exports."""
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
@@ -55,7 +55,7 @@ NUMBERS: dict[str, dict[str, int]] = {
     "mesh": {"scale": 3},
     "color": {"rgba": 4},
 }
-"""How many numbers each attribute holds, by element."""
+"""Number of values in each attribute, by element."""
 
 _ONCE: dict[str, tuple[str, ...]] = {
     "link": ("inertial",),
@@ -64,7 +64,7 @@ _ONCE: dict[str, tuple[str, ...]] = {
     "collision": ("origin", "geometry"),
     "joint": ("origin", "axis", "parent", "child", "limit", "dynamics", "mimic"),
 }
-"""What an element holds once at most: Pinocchio would read the first and skip the others."""
+"""Children that an element has at most once: Pinocchio would ignore all but the first."""
 
 _REQUIRED: dict[str, tuple[str, ...]] = {
     "mass": ("value",),
@@ -88,19 +88,19 @@ def the_robot_is_named(robot: Element) -> Iterator[str]:
 
 
 def links_are_named(robot: Element) -> Iterator[str]:
-    """There is a link, and every link has a name of its own."""
+    """There is a link, and the names of links are unique."""
     if robot.find("link") is None:
         yield "it has no <link>: a robot needs at least one."
     yield from _named(robot, "link")
 
 
 def joints_are_named(robot: Element) -> Iterator[str]:
-    """Every joint has a name of its own."""
+    """The names of joints are unique."""
     yield from _named(robot, "joint")
 
 
 def joints_have_a_type(robot: Element) -> Iterator[str]:
-    """The type of a joint is one that URDF knows."""
+    """The type of a joint is one that URDF defines."""
     for joint in robot.iterfind("joint"):
         kind = joint.get("type", "")
         if kind not in JOINT_TYPES:
@@ -108,19 +108,19 @@ def joints_have_a_type(robot: Element) -> Iterator[str]:
 
 
 def elements_are_not_repeated(robot: Element) -> Iterator[str]:
-    """What a link or a joint holds once is there once."""
+    """Children of links and joints that may occur once occur once."""
     for owner in (*robot.iterfind("link"), *robot.iterfind("joint")):
         for element in (owner, *owner):
             for tag in _ONCE.get(element.tag, ()):
                 if (count := len(element.findall(tag))) > 1:
                     yield (
-                        f"<{element.tag}> of {_called(owner)} holds {count} elements <{tag}>: "
+                        f"<{element.tag}> of {_called(owner)} has {count} elements <{tag}>: "
                         "keep one."
                     )
 
 
 def attributes_are_there(robot: Element) -> Iterator[str]:
-    """Attributes without a default are written."""
+    """Attributes without a default are present."""
     for owner, element in elements_in_use(robot):
         for attribute in _REQUIRED.get(element.tag, ()):
             if not element.get(attribute):
@@ -128,7 +128,7 @@ def attributes_are_there(robot: Element) -> Iterator[str]:
 
 
 def numbers_are_finite(robot: Element) -> Iterator[str]:
-    """Numbers are what C reads as finite numbers, of a sane size, and as many as expected."""
+    """Numbers are finite decimal numbers of limited magnitude, as many as expected."""
     for owner, element in elements_in_use(robot):
         for attribute, count in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
@@ -153,13 +153,13 @@ def joints_connect_links(robot: Element) -> Iterator[str]:
 
 
 def links_have_one_parent(robot: Element) -> Iterator[str]:
-    """A link is the child of one joint at most."""
+    """A link is the child of at most one joint."""
     parents: dict[str, str] = {}
     for joint in robot.iterfind("joint"):
         child = _end(joint, "child")
         if child in parents:
             yield (
-                f"link {child!r} hangs from two joints, {parents[child]} and {_name(joint)}: "
+                f"link {child!r} is the child of two joints, {parents[child]} and {_name(joint)}: "
                 "a URDF is a tree, so cut the loop at one of them."
             )
         parents[child] = _name(joint)
@@ -196,7 +196,7 @@ def masses_are_not_negative(robot: Element) -> Iterator[str]:
 
 
 def inertias_are_complete(robot: Element) -> Iterator[str]:
-    """An inertial element holds both a mass and an inertia."""
+    """An inertial element has both a mass and an inertia."""
     for link in robot.iterfind("link"):
         for inertial in link.iterfind("inertial"):
             for tag in ("mass", "inertia"):
@@ -218,7 +218,7 @@ def inertias_are_positive(robot: Element) -> Iterator[str]:
 
 
 def shapes_have_a_size(robot: Element) -> Iterator[str]:
-    """Shapes are not inside out."""
+    """Sizes of shapes are not negative."""
     for owner, element in elements_in_use(robot):
         for attribute in ("size", "radius", "length"):
             text = element.get(attribute) if element.tag in NUMBERS else None
@@ -227,17 +227,17 @@ def shapes_have_a_size(robot: Element) -> Iterator[str]:
 
 
 def axes_are_not_zero(robot: Element) -> Iterator[str]:
-    """A joint that moves along or about an axis has one."""
+    """The axis of a joint is not zero."""
     for joint in robot.iterfind("joint"):
         axis = joint.find("axis")
         if axis is None or joint.get("type") in ("fixed", "floating"):
             continue
         if math.hypot(*map(float, axis.get("xyz", "1 0 0").split())) < 1e-9:
-            yield f"joint {_name(joint)} has the axis {axis.get('xyz')!r}: give it a direction."
+            yield f"joint {_name(joint)} has the axis {axis.get('xyz')!r}: give a nonzero vector."
 
 
 def planes_are_level(robot: Element) -> Iterator[str]:
-    """A planar joint moves in x and y of its frame, which is all that Pinocchio knows."""
+    """The normal of a planar joint is z, the only one that Pinocchio supports."""
     for joint in robot.iterfind("joint"):
         axis = joint.find("axis")
         xyz = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
@@ -245,12 +245,12 @@ def planes_are_level(robot: Element) -> Iterator[str]:
         if joint.get("type") == "planar" and math.hypot(x, y) > 1e-9 * abs(z):
             yield (
                 f"joint {_name(joint)} is planar with the normal {_short(xyz)}, and only planes "
-                'normal to z are simulated: write <axis xyz="0 0 1"/> and turn its <origin>.'
+                'normal to z are supported: write <axis xyz="0 0 1"/> and rotate its <origin>.'
             )
 
 
 def limits_are_ordered(robot: Element) -> Iterator[str]:
-    """Limits are there where URDF demands them, ordered and not negative."""
+    """Limits are present where URDF requires them, ordered and not negative."""
     for joint in robot.iterfind("joint"):
         limit = joint.find("limit")
         if limit is None:
@@ -269,7 +269,7 @@ def limits_are_ordered(robot: Element) -> Iterator[str]:
 
 
 def losses_are_not_negative(robot: Element) -> Iterator[str]:
-    """Damping and friction take energy out."""
+    """Damping and friction are not negative."""
     for joint in robot.iterfind("joint"):
         for dynamics in joint.iterfind("dynamics"):
             for attribute in NUMBERS["dynamics"]:
@@ -286,7 +286,7 @@ def joints_mimic_others(robot: Element) -> Iterator[str]:
 
 
 def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
-    """A package:// name does not climb out of its package."""
+    """A package:// path does not leave its package."""
     for owner, element in elements_in_use(robot):
         filename = element.get("filename", "") if element.tag in ("mesh", "texture") else ""
         scheme, separator, rest = filename.partition("://")
@@ -322,7 +322,7 @@ RULES: tuple[Rule, ...] = (
     joints_mimic_others,
     meshes_stay_in_their_package,
 )
-"""In this order: a rule may rely on those before it."""
+"""Checked in this order: a rule may rely on those before it."""
 
 
 def _named(robot: Element, tag: str) -> Iterator[str]:
@@ -333,9 +333,9 @@ def _named(robot: Element, tag: str) -> Iterator[str]:
         elif problem := _name_problem(name):
             yield f"the name {_short(name)} of a {tag} must {problem}."
         elif name == _WORLD:
-            yield f"a {tag} cannot be called {name!r}, which is Pinocchio's word for the world."
+            yield f"a {tag} cannot be named {name!r}, Pinocchio's name for the world frame."
         elif count > 1:
-            yield f"{tag} {name!r} is there {count} times: {tag} names must be unique."
+            yield f"{tag} {name!r} occurs {count} times: {tag} names must be unique."
 
 
 def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
@@ -357,14 +357,14 @@ def _number_problem(text: str, count: int, tag: str) -> str:
     if not all(_NUMBER.fullmatch(word) for word in words):
         return "a plain finite number such as 1.5 (decimal point, no units)"
     if max(abs(float(word)) for word in words) > largest:
-        return f"at most {largest:g} in size"
+        return f"at most {largest:g} in magnitude"
     return ""
 
 
 def _name_problem(name: str) -> str:
     if len(name) > MAXIMUM_NAME:
         return f"have at most {MAXIMUM_NAME} characters"
-    return "" if name.isprintable() else "hold printable characters only"
+    return "" if name.isprintable() else "contain printable characters only"
 
 
 def _end(joint: Element, tag: str) -> str:
