@@ -1,4 +1,4 @@
-"""The formats of `hovi export`: each writes a file with its ending, whole or not at all."""
+"""The formats of `hovi export`: names, file name extensions, and errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def motion(arm_scene: hovi.Scene) -> Trajectory:
     return hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.0, limits="none").trajectory
 
 
-def test_names_and_endings_are_distinct() -> None:
+def test_names_and_suffixes_are_distinct() -> None:
     assert len({each.name for each in FORMATS}) == len({each.suffix for each in FORMATS})
     assert len({each.name for each in FORMATS}) == len(FORMATS)
 
@@ -31,7 +31,7 @@ def test_a_format_is_found_by_its_name(chosen: ExportFormat) -> None:
 
 
 @each_format
-def test_a_motion_becomes_a_file(chosen: ExportFormat, motion: Trajectory, tmp_path: Path) -> None:
+def test_a_motion_is_written(chosen: ExportFormat, motion: Trajectory, tmp_path: Path) -> None:
     path = tmp_path / f"motion{chosen.suffix}"
     chosen.write(motion, path, 100.0)
     assert path.stat().st_size > 0
@@ -39,7 +39,7 @@ def test_a_motion_becomes_a_file(chosen: ExportFormat, motion: Trajectory, tmp_p
 
 @each_format
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
-def test_a_bad_rate_is_refused(
+def test_an_invalid_rate_raises_and_writes_nothing(
     chosen: ExportFormat, rate: float, motion: Trajectory, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match="positive number of samples per second"):
@@ -48,13 +48,13 @@ def test_a_bad_rate_is_refused(
 
 
 @each_format
-def test_a_file_that_cannot_be_written_is_one_sentence(
+def test_an_unwritable_path_raises(
     chosen: ExportFormat, motion: Trajectory, tmp_path: Path
 ) -> None:
     with pytest.raises(DisplayError, match="cannot write"):
         chosen.write(motion, tmp_path / "no" / f"motion{chosen.suffix}", 100.0)
 
 
-def test_an_unknown_format_is_refused_with_the_nearest() -> None:
+def test_an_unknown_format_raises_with_a_suggestion() -> None:
     with pytest.raises(InputError, match="there is no export format 'cvs': did you mean 'csv'"):
         export_format("cvs")

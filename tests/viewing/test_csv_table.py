@@ -34,7 +34,7 @@ def test_columns_are_named_by_coordinate(motion: Trajectory, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("rate", [1000.0, 10.0, 7.3, 0.1])
-def test_numbers_come_back_to_the_last_bit(motion: Trajectory, tmp_path: Path, rate: float) -> None:
+def test_numbers_round_trip_exactly(motion: Trajectory, tmp_path: Path, rate: float) -> None:
     write_csv(motion, tmp_path / "motion.csv", rate)
     _, table = read(tmp_path / "motion.csv")
     t = table[:, 0]
@@ -44,9 +44,7 @@ def test_numbers_come_back_to_the_last_bit(motion: Trajectory, tmp_path: Path, r
     assert len(t) == int(np.ceil(2.0 * rate)) + 1
 
 
-def test_a_duration_that_is_no_multiple_still_ends_at_its_end(
-    two_link: Robot, tmp_path: Path
-) -> None:
+def test_the_last_row_is_at_the_final_time(two_link: Robot, tmp_path: Path) -> None:
     trajectory, _ = cubic_motion(Scene(two_link), duration=0.3, schemes=["galerkin-2"] * 3)
     write_csv(trajectory, tmp_path / "motion.csv", rate=100)
     t = read(tmp_path / "motion.csv")[1][:, 0]
@@ -55,20 +53,18 @@ def test_a_duration_that_is_no_multiple_still_ends_at_its_end(
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e12])
-def test_rates_that_mean_nothing_are_refused(
-    motion: Trajectory, tmp_path: Path, rate: float
-) -> None:
+def test_an_invalid_rate_raises(motion: Trajectory, tmp_path: Path, rate: float) -> None:
     with pytest.raises(InputError, match="rate"):
         write_csv(motion, tmp_path / "motion.csv", rate)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_table_is_written_whole_or_not_at_all(
+def test_an_interrupted_export_leaves_the_old_file(
     motion: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "motion.csv"
     path.write_text("before")
-    monkeypatch.setattr("hovi.viewing.csv_table._BATCH", 10)
+    monkeypatch.setattr("hovi.viewing.csv_table._ROWS_PER_BATCH", 10)
     calls = []
 
     def fail_late(trajectory: Trajectory, t: np.ndarray) -> object:
@@ -85,6 +81,6 @@ def test_a_table_is_written_whole_or_not_at_all(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_place_that_cannot_be_written_is_named(motion: Trajectory, tmp_path: Path) -> None:
+def test_an_unwritable_path_raises(motion: Trajectory, tmp_path: Path) -> None:
     with pytest.raises(DisplayError, match="No such file or directory"):
         write_csv(motion, tmp_path / "no" / "motion.csv")

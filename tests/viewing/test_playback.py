@@ -30,7 +30,7 @@ from hovi.robot.robot import Robot
 from hovi.robot.urdf.planar_chain import chain
 from hovi.scene.scene import Scene
 from hovi.viewing import playback
-from hovi.viewing.highlights import _bridged
+from hovi.viewing.highlights import _without_short_gaps
 from hovi.viewing.playback import Replay, replay
 from hovi.viewing.skeleton import skeleton
 from oracles.headless_browser import CHROMIUM, Tab, headless_browser
@@ -53,7 +53,7 @@ def _speed_limit(motion: Trajectory, bound: float) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def limited_motion(motion: Trajectory) -> Trajectory:
-    """The same motion, under a limit of the elbow's velocity that it reaches after 1.3 s."""
+    """The same motion with a velocity limit of the elbow that it reaches after 1.3 s."""
     return dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 5.0)})
 
 
@@ -70,18 +70,18 @@ def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
 
 
 def quiet(text: str) -> None:
-    """Nothing is printed."""
+    """Discard the address."""
 
 
 def messages(page: Path) -> list[dict[str, Any]]:
-    """What a written page draws."""
+    """The messages stored in a written page."""
     found = re.search(r"for \(const message of (\[.*\])\)", page.read_text())
     assert found is not None
     return [umsgpack.unpackb(base64.b64decode(m)) for m in json.loads(found[1])]
 
 
 def seek(tab: Tab, t: float) -> Array:
-    """The page at a time of its animation."""
+    """A screenshot of the page at time t of its animation, in [s]."""
     tab.value(
         "viewer.animator.pause();"
         "for (const a of viewer.animator.actions) { a.play(); a.paused = false; }"
@@ -106,21 +106,21 @@ def yellow(picture: Array) -> npt.NDArray[np.bool_]:
 # The page in a file
 
 
-def test_the_same_motion_gives_the_same_page(motion: Trajectory, tmp_path: Path) -> None:
+def test_pages_are_reproducible_bit_by_bit(motion: Trajectory, tmp_path: Path) -> None:
     for name in ("1.html", "2.html"):
         replay(motion, html=tmp_path / name)
     assert (tmp_path / "1.html").read_bytes() == (tmp_path / "2.html").read_bytes()
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_a_page_refers_to_nothing_outside_itself(motion: Trajectory, tmp_path: Path) -> None:
+def test_a_page_loads_no_external_resource(motion: Trajectory, tmp_path: Path) -> None:
     replay(motion, html=tmp_path / "motion.html")
     text = (tmp_path / "motion.html").read_text()
     assert not re.search(r"<(script|img|link|iframe)[^>]+(src|href)=\"(?!data:)", text)
     assert "default-src 'none'" in text
 
 
-def test_the_animation_is_the_motion(motion: Trajectory, tmp_path: Path) -> None:
+def test_animation_keyframes_match_forward_kinematics(motion: Trajectory, tmp_path: Path) -> None:
     shown = replay(motion, html=tmp_path / "motion.html")
     (animation,) = (m for m in messages(tmp_path / "motion.html") if m["type"] == "set_animation")
     assert animation["options"] == {"play": True, "repetitions": 1}
@@ -139,13 +139,13 @@ def test_the_animation_is_the_motion(motion: Trajectory, tmp_path: Path) -> None
         for i in (0, len(times) // 2, -1):
             q = motion.configurations(times[i])[0]
             pin.updateGeometryPlacements(model, data, visual, shapes, q)
-            place = shapes.oMg[visual.getGeometryId(item.name)]
-            turn = pin.Quaternion(*np.roll(keys[".quaternion"][i]["value"], 1)).matrix()
-            np.testing.assert_allclose(keys[".position"][i]["value"], place.translation, atol=1e-12)
-            np.testing.assert_allclose(turn, place.rotation, atol=1e-12)
+            pose = shapes.oMg[visual.getGeometryId(item.name)]
+            rotation = pin.Quaternion(*np.roll(keys[".quaternion"][i]["value"], 1)).matrix()
+            np.testing.assert_allclose(keys[".position"][i]["value"], pose.translation, atol=1e-12)
+            np.testing.assert_allclose(rotation, pose.rotation, atol=1e-12)
 
 
-def test_loop_repeats_for_ever(motion: Trajectory, tmp_path: Path) -> None:
+def test_loop_repeats_without_end(motion: Trajectory, tmp_path: Path) -> None:
     replay(motion, html=tmp_path / "motion.html", loop=True, speed=0.5)
     (animation,) = (m for m in messages(tmp_path / "motion.html") if m["type"] == "set_animation")
     assert math.isinf(animation["options"]["repetitions"])
@@ -153,7 +153,7 @@ def test_loop_repeats_for_ever(motion: Trajectory, tmp_path: Path) -> None:
 
 
 def visibility(page: Path) -> dict[str, list[dict[str, Any]]]:
-    """Keys of the tracks that show and hide, by the node's path."""
+    """Keyframes of the visibility tracks, by node path."""
     (animation,) = (m for m in messages(page) if m["type"] == "set_animation")
     return {
         a["path"]: track["keys"]
@@ -163,7 +163,7 @@ def visibility(page: Path) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def test_links_stand_out_while_their_joint_is_at_a_limit(
+def test_links_are_highlighted_while_their_joint_is_at_a_limit(
     limited_motion: Trajectory, tmp_path: Path
 ) -> None:
     shown = replay(limited_motion, html=tmp_path / "motion.html")
@@ -174,35 +174,33 @@ def test_links_stand_out_while_their_joint_is_at_a_limit(
     elbow = robot.model.getJointId("elbow")
     assert set(np.flatnonzero(highlights.flags.any(axis=0))) == {elbow}
     tracks = visibility(tmp_path / "motion.html")
-    carried = [item for item in robot.visual.geometryObjects if item.parentJoint == elbow]  # type: ignore[union-attr]
-    assert len(tracks) == 2 * len(carried)
+    links = [item for item in robot.visual.geometryObjects if item.parentJoint == elbow]  # type: ignore[union-attr]
+    assert len(tracks) == 2 * len(links)
     motion = limited_motion.sample(highlights.times)
     at_bound = np.abs(motion.v[:, 1]) >= 5.0 - 1e-3 * 10.0
     at_bound[-1] = False
     np.testing.assert_array_equal(highlights.flags[:, elbow], at_bound)
     for path, keys in tracks.items():
-        bright = path.endswith("at its limit")
-        assert [key["value"] for key in keys] == [not bright, bright, not bright]
+        highlighted = path.endswith("at its limit")
+        assert [key["value"] for key in keys] == [not highlighted, highlighted, not highlighted]
 
 
-def test_links_look_as_before_at_the_end(limited_motion: Trajectory, tmp_path: Path) -> None:
+def test_no_link_is_highlighted_at_the_end(limited_motion: Trajectory, tmp_path: Path) -> None:
     shown = replay(limited_motion, html=tmp_path / "motion.html")
     assert shown.highlights is not None
     assert not shown.highlights.at(limited_motion.duration).any()
 
 
-def test_short_gaps_do_not_flicker() -> None:
+def test_short_gaps_between_highlights_are_closed() -> None:
     flags = np.zeros((60, 1), dtype=bool)
     flags[[10, 14, 15, 19, 40]] = True
-    bridged = _bridged(flags)[:, 0]
+    bridged = _without_short_gaps(flags)[:, 0]
     np.testing.assert_array_equal(np.flatnonzero(bridged), [*range(10, 20), 40])
     edges = np.ones((5, 1), dtype=bool)
-    np.testing.assert_array_equal(_bridged(edges), edges)
+    np.testing.assert_array_equal(_without_short_gaps(edges), edges)
 
 
-def test_a_motion_that_is_never_at_a_limit_is_drawn_once(
-    motion: Trajectory, tmp_path: Path
-) -> None:
+def test_a_motion_never_at_a_limit_has_no_highlights(motion: Trajectory, tmp_path: Path) -> None:
     far = dataclasses.replace(motion, metadata={"limits": _speed_limit(motion, 1e3)})
     for name, trajectory in (("1.html", motion), ("2.html", far)):
         assert replay(trajectory, html=tmp_path / name).highlights is None
@@ -221,7 +219,7 @@ def test_the_trace_is_the_path_of_the_tip(motion: Trajectory, tmp_path: Path) ->
     assert not [m for m in messages(tmp_path / "without.html") if "trace" in m["path"]]
 
 
-def test_a_page_is_written_whole_or_not_at_all(
+def test_a_failed_write_leaves_the_old_page(
     motion: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     page = tmp_path / "motion.html"
@@ -260,7 +258,7 @@ def test_the_skeleton_of_a_chain_reaches_its_tip(links: int, tmp_path: Path) -> 
     assert min(np.linalg.norm(end - tip) for end in ends) < 1e-12
 
 
-def test_the_page_says_which_meshes_are_missing(tmp_path: Path) -> None:
+def test_the_page_names_missing_meshes(tmp_path: Path) -> None:
     mesh = '<visual><geometry><mesh filename="gone.stl"/></geometry></visual>'
     (tmp_path / "arm.urdf").write_text(chain(1).replace("<inertial>", f"{mesh}<inertial>", 1))
     trajectory, _ = cubic_motion(Scene(load_robot(tmp_path / "arm.urdf")))
@@ -277,7 +275,7 @@ def test_a_motion_without_its_robot_cannot_be_shown(
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
-def test_speeds_that_mean_nothing_are_refused(motion: Trajectory, speed: float) -> None:
+def test_an_invalid_speed_raises(motion: Trajectory, speed: float) -> None:
     with pytest.raises(DisplayError, match="speed"):
         replay(motion, speed=speed)
 
@@ -286,7 +284,7 @@ def test_speeds_that_mean_nothing_are_refused(motion: Trajectory, speed: float) 
 
 
 class Clock:
-    """Time that passes only while somebody sleeps, and a little with every look."""
+    """A fake clock that advances in `sleep`, and by 0.1 ms per reading."""
 
     def __init__(self) -> None:
         self.now = 100.0
@@ -300,7 +298,7 @@ class Clock:
 
 
 @pytest.mark.parametrize("speed", [0.25, 1.0, 4.0])
-def test_playing_keeps_pace_and_ends_at_the_goal(
+def test_playback_runs_in_real_time_and_ends_at_the_goal(
     motion: Trajectory, monkeypatch: pytest.MonkeyPatch, speed: float
 ) -> None:
     clock, shown = Clock(), []
@@ -320,7 +318,7 @@ def test_playing_keeps_pace_and_ends_at_the_goal(
     assert shown[-1][0] == pytest.approx(motion.duration / speed, abs=0.02)
 
 
-def test_playing_shows_and_hides_links(limited_motion: Trajectory, tmp_path: Path) -> None:
+def test_playback_shows_and_hides_highlights(limited_motion: Trajectory, tmp_path: Path) -> None:
     shown = replay(limited_motion, html=tmp_path / "motion.html")
     assert shown.highlights is not None
     during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
@@ -331,8 +329,8 @@ def test_playing_shows_and_hides_links(limited_motion: Trajectory, tmp_path: Pat
             m["value"] for m in drawn if m.get("property") == "visible" and "/visuals/" in m["path"]
         ]
         assert len(flags) == 2 * flags.count(False)
-        bright = [m["value"] for m in drawn if m["path"].endswith("at its limit") and "value" in m]
-        return bright.count(False)
+        copies = [m["value"] for m in drawn if m["path"].endswith("at its limit") and "value" in m]
+        return copies.count(False)
 
     shown.highlights.show(shown.visualizer, during)
     assert hidden() == 0
@@ -354,10 +352,10 @@ def test_loop_plays_until_interrupted(motion: Trajectory, monkeypatch: pytest.Mo
     assert len(starts) == 3
 
 
-def test_a_live_page_is_served_to_this_machine_alone(motion: Trajectory) -> None:
-    said: list[str] = []
-    with replay(motion, speed=100, announce=said.append) as shown:
-        assert said == [shown.url]
+def test_a_live_page_is_served_on_the_loopback_interface_only(motion: Trajectory) -> None:
+    addresses: list[str] = []
+    with replay(motion, speed=100, announce=addresses.append) as shown:
+        assert addresses == [shown.url]
         found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/view/", shown.url)
         assert found is not None
         with socket.socket() as other:  # free unless the server listens everywhere
@@ -366,7 +364,7 @@ def test_a_live_page_is_served_to_this_machine_alone(motion: Trajectory) -> None
     shown.close()
 
 
-def test_pages_of_other_sites_are_not_served(motion: Trajectory) -> None:
+def test_connections_from_pages_of_other_sites_are_refused(motion: Trajectory) -> None:
     def status(address: str, origin: str) -> int:
         headers = {"Upgrade": "websocket", "Connection": "Upgrade", "Origin": origin}
         headers |= {"Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==", "Sec-WebSocket-Version": "13"}
@@ -381,7 +379,7 @@ def test_pages_of_other_sites_are_not_served(motion: Trajectory) -> None:
         assert status(address, "http://example.org") == 403
 
 
-def test_a_busy_port_is_named(motion: Trajectory) -> None:
+def test_an_unavailable_or_invalid_port_raises(motion: Trajectory) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         with pytest.raises(DisplayError, match=f"port {port}"):
@@ -390,14 +388,14 @@ def test_a_busy_port_is_named(motion: Trajectory) -> None:
         replay(motion, port=99999)
 
 
-def test_no_browser_is_an_error_that_leaves_no_server(
+def test_a_missing_browser_raises_and_stops_the_server(
     motion: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(webbrowser, "open", lambda url, new: False)
     with pytest.raises(DisplayError, match="no browser could be started; open http"):
         replay(motion, open_browser=True, announce=quiet)
     monkeypatch.setattr(webbrowser, "open", lambda url, new: True)
-    monkeypatch.setattr(playback, "_BROWSER_SECONDS", 0.1)
+    monkeypatch.setattr(playback, "_BROWSER_TIMEOUT", 0.1)
     with pytest.raises(DisplayError, match="no browser showed the page"):
         replay(motion, open_browser=True, announce=quiet)
     assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]
@@ -442,7 +440,7 @@ def test_a_link_at_its_limit_is_yellow_on_the_page(
 
 
 @needs_chromium
-def test_a_page_starts_by_itself_and_stops_at_the_goal(
+def test_a_page_autoplays_and_stops_at_the_goal(
     motion: Trajectory, tmp_path: Path, tab: Tab
 ) -> None:
     replay(motion, html=tmp_path / "motion.html", speed=4.0)
@@ -454,7 +452,7 @@ def test_a_page_starts_by_itself_and_stops_at_the_goal(
 
 
 @needs_chromium
-def test_a_skeleton_is_seen(bare_motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
+def test_a_skeleton_is_visible(bare_motion: Trajectory, tmp_path: Path, tab: Tab) -> None:
     replay(bare_motion, html=tmp_path / "motion.html", trace=False)
     tab.open((tmp_path / "motion.html").as_uri())
     assert colored(seek(tab, 1.0)).mean() > 0.002
@@ -463,7 +461,7 @@ def test_a_skeleton_is_seen(bare_motion: Trajectory, tmp_path: Path, tab: Tab) -
 
 @needs_chromium
 def test_meshes_with_several_materials_are_drawn(tmp_path: Path, tab: Tab) -> None:
-    """UR5's shoulder has two parts, one of two materials: meshcat alone hides that part."""
+    """The UR5's shoulder has two parts, one with two materials, which plain meshcat hides."""
     robot = load_robot("ur5")
     replay(cubic_motion(Scene(robot))[0], html=tmp_path / "ur5.html")
     tab.open((tmp_path / "ur5.html").as_uri())
@@ -500,7 +498,7 @@ def test_a_live_replay_moves_in_the_browser(motion: Trajectory, tab: Tab) -> Non
             assert colored(before).mean() > 0.002
             assert (colored(before) != colored(after)).mean() > 0.001
         assert tab.value("viewer.animator.actions.length") == 0
-        tab.open(page[0])  # who comes later gets the motion with its controls
+        tab.open(page[0])  # browsers opened later get the motion with its controls
         tab.until("viewer.animator.actions.length > 0")
     assert not tab.errors
 

@@ -37,8 +37,8 @@ def motion(two_link: Robot) -> Trajectory:
     return dataclasses.replace(trajectory, path=DiscretePath(path.q, path.v, path.z, inner))
 
 
-def within(motion: Trajectory, **limits: object) -> Trajectory:
-    """The motion as if it had been planned under these limits."""
+def with_limits(motion: Trajectory, **limits: object) -> Trajectory:
+    """The motion with these limits in its metadata."""
     assert motion.robot is not None
     imposed = as_limits(motion.robot, {"base": "none", **limits})
     return dataclasses.replace(motion, metadata={"limits": imposed.to_dict()})
@@ -50,7 +50,7 @@ def lines(figure: Figure, panel: int, gid: str) -> list[Line2D]:
 
 @pytest.mark.parametrize("picture", PICTURES)
 @pytest.mark.parametrize("suffix", MAGIC)
-def test_the_suffix_says_what_picture_is_written(
+def test_the_suffix_selects_the_file_format(
     motion: Trajectory, tmp_path: Path, picture: Picture, suffix: str
 ) -> None:
     path = tmp_path / f"motion{suffix}"
@@ -60,7 +60,7 @@ def test_the_suffix_says_what_picture_is_written(
 
 
 @pytest.mark.parametrize("picture", PICTURES)
-def test_pictures_are_not_blank_and_always_the_same(
+def test_pictures_are_reproducible_and_not_blank(
     motion: Trajectory, tmp_path: Path, picture: Picture
 ) -> None:
     first, second = tmp_path / "1.png", tmp_path / "2.png"
@@ -72,7 +72,7 @@ def test_pictures_are_not_blank_and_always_the_same(
     assert colored.mean() > 1e-3
 
 
-def test_lines_are_the_motion_in_degrees(motion: Trajectory) -> None:
+def test_curves_show_the_motion_in_degrees(motion: Trajectory) -> None:
     axes = plotting.motion_figure(motion).axes
     assert [ax.get_ylabel() for ax in axes] == [
         "angle [deg]",
@@ -86,7 +86,7 @@ def test_lines_are_the_motion_in_degrees(motion: Trajectory) -> None:
     np.testing.assert_array_equal(axes[0].lines[1].get_xdata()[::2], motion.t[:-1])
 
 
-def test_torques_are_drawn_with_their_jumps(motion: Trajectory) -> None:
+def test_torque_jumps_are_gaps(motion: Trajectory) -> None:
     line = plotting.motion_figure(motion).axes[2].lines[0]
     t, tau = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
     breaks = np.flatnonzero(np.isnan(t))
@@ -102,11 +102,11 @@ def test_the_legend_names_the_joints(motion: Trajectory) -> None:
         assert texts == ["shoulder", "elbow"]
 
 
-def test_limits_that_curves_come_near_are_bands(motion: Trajectory) -> None:
+def test_nearby_limits_are_drawn_as_bands(motion: Trajectory) -> None:
     speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
     low, high = float(speed.min()), float(speed.max())
-    figure = plotting.motion_figure(within(motion, v={"elbow": [low - 50.0, 1.01 * high]}))
-    (line,) = lines(figure, 1, "limit")  # the lower bound is far
+    figure = plotting.motion_figure(with_limits(motion, v={"elbow": [low - 50.0, 1.01 * high]}))
+    (line,) = lines(figure, 1, "limit")  # the lower bound is too far away
     np.testing.assert_allclose(line.get_ydata(), np.degrees(1.01 * high))
     assert figure.axes[1].patches
     assert not lines(figure, 0, "limit") + lines(figure, 2, "limit")
@@ -114,9 +114,9 @@ def test_limits_that_curves_come_near_are_bands(motion: Trajectory) -> None:
     assert figure.axes[1].get_title(loc="right") == ""
 
 
-def test_a_curve_is_marked_where_it_leans_on_a_limit(motion: Trajectory) -> None:
+def test_a_curve_is_marked_where_it_is_at_a_limit(motion: Trajectory) -> None:
     speed = motion.sample(np.linspace(0.0, motion.duration, 4001)).v[:, 1]
-    figure = plotting.motion_figure(within(motion, v={"elbow": [-100.0, float(speed.max())]}))
+    figure = plotting.motion_figure(with_limits(motion, v={"elbow": [-100.0, float(speed.max())]}))
     (mark,) = lines(figure, 1, "at a limit")
     marked = np.asarray(mark.get_ydata())
     marked = marked[np.isfinite(marked)]
@@ -125,9 +125,9 @@ def test_a_curve_is_marked_where_it_leans_on_a_limit(motion: Trajectory) -> None
     assert "at a limit" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_far_limits_do_not_squash_the_curves(motion: Trajectory) -> None:
+def test_distant_limits_do_not_change_the_axis_range(motion: Trajectory) -> None:
     free = plotting.motion_figure(motion)
-    figure = plotting.motion_figure(within(motion, q=1000.0, v=1000.0, tau={"elbow": 1e5}))
+    figure = plotting.motion_figure(with_limits(motion, q=1000.0, v=1000.0, tau={"elbow": 1e5}))
     for k, sentence in enumerate(
         ["far from all limits", "far from all limits", "far from the limits of elbow"]
     ):
@@ -136,22 +136,22 @@ def test_far_limits_do_not_squash_the_curves(motion: Trajectory) -> None:
         assert figure.axes[k].get_title(loc="right") == sentence
 
 
-def test_joints_that_share_a_limit_share_its_line(motion: Trajectory) -> None:
+def test_joints_with_the_same_limit_share_a_dashed_line(motion: Trajectory) -> None:
     speed = np.abs(motion.sample(np.linspace(0.0, motion.duration, 4001)).v)
     bound = 1.001 * float(speed.max(axis=0).min())
-    figure = plotting.motion_figure(within(motion, v=bound))
+    figure = plotting.motion_figure(with_limits(motion, v=bound))
     drawn = {(line.get_ydata()[0], line.get_color()) for line in lines(figure, 1, "limit")}
     assert len({color for _, color in drawn}) == 2
     np.testing.assert_allclose({abs(y) for y, _ in drawn}.pop(), np.degrees(bound))
 
 
 @pytest.mark.parametrize("limits", [3, {}, {"lower": [[0]], "upper": [[1]], "tolerance": 1e-6}])
-def test_metadata_that_is_no_limits_is_left_aside(motion: Trajectory, limits: object) -> None:
-    strange = dataclasses.replace(motion, metadata={"limits": limits})
-    assert len(plotting.motion_figure(strange).legends[0].get_texts()) == 2
+def test_invalid_limits_in_metadata_are_ignored(motion: Trajectory, limits: object) -> None:
+    invalid = dataclasses.replace(motion, metadata={"limits": limits})
+    assert len(plotting.motion_figure(invalid).legends[0].get_texts()) == 2
 
 
-def test_sliding_joints_get_an_axis_in_meters() -> None:
+def test_prismatic_joints_get_an_axis_in_meters() -> None:
     robot = load_robot("panda")
     figure = plotting.motion_figure(cubic_motion(Scene(robot))[0])
     labels = {ax.get_ylabel() for ax in figure.axes}
@@ -181,7 +181,7 @@ def test_zeros_of_two_axes_are_aligned(one: tuple[int, int], other: tuple[int, i
         assert ax.get_ylim()[1] >= high
 
 
-def test_a_range_far_from_zero_is_not_squashed() -> None:
+def test_a_range_far_from_zero_is_unchanged() -> None:
     left = Figure().subplots()
     right = left.twinx()
     left.set_ylim(-1, 2)
@@ -207,7 +207,7 @@ def test_the_surface_is_drawn_over_the_plane_of_the_motion(motion: Trajectory) -
 
 
 @pytest.mark.parametrize("window", [(1.0, 1.0), (-1.0, 1.0), (0.0, 2.1), (float("nan"), 1.0)])
-def test_windows_outside_the_motion_are_refused(
+def test_a_window_outside_the_motion_raises(
     motion: Trajectory, window: tuple[float, float]
 ) -> None:
     with pytest.raises(DisplayError, match="window"):
@@ -233,9 +233,7 @@ def test_a_motion_without_its_robot_is_drawn_in_si_units(two_link: Robot, tmp_pa
         plotting.surface_figure(loaded)
 
 
-def test_what_cannot_be_written_is_refused_in_a_sentence(
-    motion: Trajectory, tmp_path: Path
-) -> None:
+def test_an_unknown_format_or_an_unwritable_path_raises(motion: Trajectory, tmp_path: Path) -> None:
     with pytest.raises(DisplayError, match=r"\.png, \.pdf, \.svg"):
         plotting.plot(motion, tmp_path / "motion.bmp")
     with pytest.raises(DisplayError, match="No such file or directory"):

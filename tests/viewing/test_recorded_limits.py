@@ -1,4 +1,4 @@
-"""What a motion kept away from comes back with it, is drawn and is measured."""
+"""The obstacles recorded in a motion are saved, drawn, and used for distances."""
 
 from __future__ import annotations
 
@@ -28,33 +28,33 @@ OBSTACLES = [
 
 @pytest.fixture(scope="module")
 def motion(arm_scene: hovi.Scene) -> Trajectory:
-    """A free reach that says of itself that it kept away from three obstacles."""
+    """A reach planned without obstacles, with three obstacles added to its metadata."""
     solution = hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.5, limits="none")
     clearance = Clearance(OBSTACLES, 0.05)
     metadata = {**solution.trajectory.metadata, "clearance": clearance.to_dict()}
     return dataclasses.replace(solution.trajectory, metadata=metadata)
 
 
-def test_the_clearance_comes_back_from_a_file(motion: Trajectory, tmp_path: Path) -> None:
+def test_the_clearance_is_saved_with_the_motion(motion: Trajectory, tmp_path: Path) -> None:
     motion.save(tmp_path / "motion.npz")
-    again = imposed_clearance(Trajectory.load(tmp_path / "motion.npz"))
-    assert again is not None
-    assert again.to_dict() == motion.metadata["clearance"]
+    loaded = imposed_clearance(Trajectory.load(tmp_path / "motion.npz"))
+    assert loaded is not None
+    assert loaded.to_dict() == motion.metadata["clearance"]
 
 
 @pytest.mark.parametrize("data", [None, 3, {}, {"obstacles": [1]}, {"obstacles": [{"kind": 2}]}])
-def test_metadata_that_describes_no_clearance_counts_as_none(motion: Trajectory, data: Any) -> None:
+def test_an_invalid_clearance_in_metadata_counts_as_none(motion: Trajectory, data: Any) -> None:
     metadata = {**motion.metadata, "clearance": data}
     assert imposed_clearance(dataclasses.replace(motion, metadata=metadata)) is None
 
 
-def test_obstacles_are_drawn_where_they_stand(motion: Trajectory) -> None:
+def test_obstacles_are_drawn_at_their_positions(motion: Trajectory) -> None:
     drawn = list(with_obstacles(pin.GeometryModel(), motion).geometryObjects)
     assert len(drawn) == 3
     np.testing.assert_allclose(drawn[0].placement.translation, BALL.position)
 
 
-def test_the_least_distance_is_the_one_of_the_tip_and_the_ball(
+def test_the_least_distance_is_between_the_tip_and_the_ball(
     motion: Trajectory, arm_scene: hovi.Scene
 ) -> None:
     q = motion.configurations(np.linspace(0.0, 1.5, 50_001))

@@ -1,1 +1,1 @@
-"""Motions as files of other programs."""
+"""Export of motions to file formats of other programs."""

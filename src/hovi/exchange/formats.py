@@ -1,4 +1,4 @@
-"""The one list of formats that a motion is exported to: `hovi export --format NAME`."""
+"""The formats of `hovi export --format NAME`, as one list."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from hovi.viewing.csv_table import write_csv
 
 @dataclass(frozen=True)
 class ExportFormat:
-    """A kind of file that other programs read.
+    """A file format that other programs read.
 
-    name: as the command line has it. suffix: of its files, such as ".csv".
-    write: takes the motion, the file and a rate in samples per second; writes the file whole or
-        not at all. Raises InputError for a bad rate, DisplayError when it cannot be written.
+    name: on the command line. suffix: file name extension, such as ".csv".
+    write: takes the motion, the path and a rate in samples per second; writes the file completely
+        or not at all. Raises InputError for an invalid rate, DisplayError when the file cannot be
+        written.
     """
 
     name: str
@@ -29,7 +30,7 @@ FORMATS = (ExportFormat("csv", ".csv", write_csv),)
 
 
 def export_format(name: str) -> ExportFormat:
-    """The format of a name. Raises InputError for an unknown one."""
+    """The format with this name. Raises InputError for an unknown name."""
     by_name = {each.name: each for each in FORMATS}
     if name not in by_name:
         raise InputError(f"there is no export format {name!r}: {nearest(name, by_name)}")

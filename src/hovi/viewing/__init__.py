@@ -1,1 +1,1 @@
-"""Pictures, replay pages and tables of a motion."""
+"""Plots, replay pages and tables of a motion."""

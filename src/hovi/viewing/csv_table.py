@@ -1,4 +1,4 @@
-"""A motion as a table of numbers for other programs."""
+"""A motion as a CSV table for other programs."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hovi.system.files import reason, whole_file
 
 Array = npt.NDArray[np.float64]
 
-MOST_ROWS = 50_000_000
-_BATCH = 10_000
+MAX_ROWS = 50_000_000
+_ROWS_PER_BATCH = 10_000
 
 
 def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
@@ -27,9 +27,9 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     1/rate apart; the last is at exactly T, where the limits from the left are taken (from the
     right elsewhere).
 
-    path: the file, written whole or not at all.
+    path: the file; it is written completely or not at all.
     rate: samples per second, positive.
-    Raises InputError for a bad rate, DisplayError when the file cannot be written.
+    Raises InputError for an invalid rate, DisplayError when the file cannot be written.
     """
     expect(trajectory, Trajectory, "the trajectory of a solution")
     times = _times(trajectory.duration, rate)
@@ -48,22 +48,25 @@ def _times(duration: float, rate: float) -> Array:
     """Multiples of 1/rate below T, and T."""
     if not (math.isfinite(rate) and rate > 0):
         raise InputError(f"the rate must be a positive number of samples per second, got {rate}.")
-    if duration * rate > MOST_ROWS:
-        raise InputError(f"{duration * rate:.3g} rows are too many; lower the rate.")
+    if duration * rate > MAX_ROWS:
+        raise InputError(
+            f"a rate of {rate:g} gives {duration * rate:.3g} rows, more than {MAX_ROWS:,}; choose "
+            "a lower rate."
+        )
     times = np.arange(math.ceil(duration * rate)) / rate
-    # A multiple that misses T by rounding alone is T.
-    before = times[times < duration * (1 - 1e-12)]
-    return np.append(before, duration)
+    # A multiple that differs from T by rounding only counts as T.
+    earlier = times[times < duration * (1 - 1e-12)]
+    return np.append(earlier, duration)
 
 
 def _columns(trajectory: Trajectory) -> list[str]:
     names = [name.replace(",", "_").replace('"', "_") for name in trajectory.coordinate_names]
-    places = names if trajectory.space is None else trajectory.space.names(names)
-    columns = ["t", *(f"q_{name}" for name in places)]
+    q_names = names if trajectory.space is None else trajectory.space.names(names)
+    columns = ["t", *(f"q_{name}" for name in q_names)]
     return columns + [f"{letter}_{name}" for letter in ("v", "a", "tau") for name in names]
 
 
 def _batches(trajectory: Trajectory, times: Array) -> Iterator[tuple[Array, Sample]]:
-    for start in range(0, len(times), _BATCH):
-        t = times[start : start + _BATCH]
+    for start in range(0, len(times), _ROWS_PER_BATCH):
+        t = times[start : start + _ROWS_PER_BATCH]
         yield t, trajectory.sample(t)

@@ -1,4 +1,4 @@
-"""The distance to what a motion keeps away from, drawn over time."""
+"""The panel of a plot that shows the distances to obstacles over time."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 _SAMPLES = 600
-_NEAREST = 3
+_SHOWN_PAIRS = 3
 _COLORS = ("#333333", "#D55E00", "#0072B2")
 
 
 def draw_distances(
     ax: Axes, trajectory: Trajectory, clearance: Clearance, distances: Distances
 ) -> None:
-    """The distances of the pairs that come nearest over time, and the margin as a dashed line."""
+    """Draw the distances of the closest pairs over time, and the margin as a dashed line."""
     t = np.linspace(0.0, trajectory.duration, _SAMPLES)
     d = distances_over_time(trajectory, distances, t)
-    nearest = np.argsort(d.min(axis=0), kind="stable")[:_NEAREST]
-    for color, k in zip(_COLORS, nearest, strict=False):
+    closest = np.argsort(d.min(axis=0), kind="stable")[:_SHOWN_PAIRS]
+    for color, k in zip(_COLORS, closest, strict=False):
         pair = distances.pairs[k]
         label = f"{pair.link} to {pair.other}"
         ax.plot(t, d[:, k], color=color, linewidth=1.4, label=label)

@@ -1,4 +1,4 @@
-"""Figures: their files, whole or not at all and with the same bytes each time, and their axes."""
+"""Writing figures reproducibly and atomically, and aligning the zeros of two axes."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     suffix = Path(path).suffix.lower()
     if suffix not in _METADATA:
         raise DisplayError(
-            f"cannot tell what picture {Path(path).name!r} is to be; "
-            f"let its name end in {', '.join(_METADATA)}."
+            f"the picture {Path(path).name!r} has no known format; "
+            f"use a name that ends in {', '.join(_METADATA)}."
         )
     try:
         with whole_file(path) as stream:
@@ -39,10 +39,11 @@ def write_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
 
 
 def align_zeros(one: Axes, other: Axes) -> None:
-    """Extend the limits of both until zero has the same height in both.
+    """Extend the limits of two axes until their zeros are at the same height.
 
-    With limits -d <= 0 <= u of each, in shares of their extent d + u, both get the larger d and the
-    larger u. Left alone where a range is farther from zero than it is wide: zero would squash it.
+    With limits -d <= 0 <= u relative to the extent d + u, both axes get the larger d and the larger
+    u. Axes whose range is farther from zero than it is wide are left as they are: including zero
+    would compress their curves.
     """
     limits = [ax.get_ylim() for ax in (one, other)]
     if any(max(low, -high) > high - low for low, high in limits):

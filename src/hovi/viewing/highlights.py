@@ -1,4 +1,4 @@
-"""Links that stand out in a replay while their joints are at a limit."""
+"""Links highlighted in a replay while their joints are at a limit."""
 
 from __future__ import annotations
 
@@ -23,20 +23,21 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 AT_LIMIT_NOTE = "a yellow link: its joint is at a limit"
-_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light beside blue, orange and grey
-_NAME = " at its limit"
+_HIGHLIGHT_COLOR = np.array([1.0, 0.85, 0.0, 1.0])  # yellow: light beside blue, orange and grey
+_COPY_SUFFIX = " at its limit"
 _BRIDGED_FRAMES = 4
+"""Gaps of at most twice this number of frames are closed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Highlights:
-    """Which links stand out when: those of joints at a limit of position, velocity or torque.
+    """Which links are highlighted when: those of joints at a position, velocity or torque limit.
 
-    A link that ever stands out is drawn twice, and one of the two is hidden at any time: its own
-    look comes back whatever it is.
+    A link that is ever highlighted is drawn twice, plain and yellow, and one of the two is hidden
+    at any time; so its own material need not be known to restore it.
 
     times: (M,), in [s].
-    flags: (M, joints), by number of the joint in the model; none at the end of the motion.
+    flags: (M, joints), by joint index in the model; all False at the end of the motion.
     """
 
     times: Array
@@ -50,62 +51,64 @@ class Highlights:
             return None
         try:
             motion = trajectory.sample(times)
-        except InputError:  # joints for which there are no velocities between the nodes
+        except InputError:  # the joints have no velocities between the nodes
             return None
         by_kind = at_limit(limits, motion, robot)[:, [KINDS.index(k) for k in ("q", "v", "tau")]]
-        by_coordinate = _bridged(np.asarray(np.any(by_kind, axis=1)))  # (M, nv)
+        by_coordinate = _without_short_gaps(np.asarray(np.any(by_kind, axis=1)))  # (M, nv)
         by_coordinate[-1] = False
         flags = np.zeros((len(times), robot.model.njoints), dtype=bool)
         for joint in list(robot.model.joints)[1:]:
-            own = slice(joint.idx_v, joint.idx_v + joint.nvExtended)  # its leader's if it mimics
+            # A mimic joint has its leader's columns.
+            own = slice(joint.idx_v, joint.idx_v + joint.nvExtended)
             flags[:, joint.id] = by_coordinate[:, own].any(axis=1)
         return cls(times, flags) if flags.any() else None
 
     def at(self, t: float) -> Mask:
-        """Flags by joint at a time, shape (joints,)."""
+        """Flags by joint at time t, shape (joints,)."""
         index = int(np.searchsorted(self.times, t, side="right")) - 1
         return np.asarray(self.flags[max(index, 0)])
 
-    def with_bright_copies(self, visual: pin.GeometryModel) -> pin.GeometryModel:
-        """The drawn objects, and a yellow copy of those that ever stand out."""
+    def with_highlighted_copies(self, visual: pin.GeometryModel) -> pin.GeometryModel:
+        """The drawn objects, with a yellow copy of each that is ever highlighted."""
         both = visual.copy()
         for item in list(visual.geometryObjects):
             if self.flags[:, item.parentJoint].any():
-                bright = item.copy()
-                bright.name = item.name + _NAME
-                bright.meshColor, bright.overrideMaterial = _COLOR, True
-                bright.meshPath = ""  # its triangles alone take less room than its file
-                both.addGeometryObject(bright)
+                yellow = item.copy()
+                yellow.name = item.name + _COPY_SUFFIX
+                yellow.meshColor, yellow.overrideMaterial = _HIGHLIGHT_COLOR, True
+                yellow.meshPath = ""  # the triangles alone are smaller than the mesh file
+                both.addGeometryObject(yellow)
         return both
 
     def show(self, visualizer: MeshcatVisualizer, t: float) -> None:
-        """Make the page show the links as they are at a time."""
+        """Show or hide the copies on the page as at time t."""
         flags = self.at(t)
-        for plain, bright, joint in _pairs(visualizer):
-            for node, visible in ((plain, not flags[joint]), (bright, bool(flags[joint]))):
+        for plain, yellow, joint in _pairs(visualizer):
+            for node, visible in ((plain, not flags[joint]), (yellow, bool(flags[joint]))):
                 visualizer.viewer[node].set_property("visible", visible)
 
     def changes(self, visualizer: MeshcatVisualizer) -> dict[str, tuple[Array, Mask]]:
-        """When each object that is drawn twice appears and vanishes, by its node's name.
+        """Visibility changes of each object that is drawn twice, by node name.
 
-        Times, the first of all included, and whether it is visible from then on, (K,) each.
+        Per object: the times, the first frame included, and whether it is visible from then on,
+        shape (K,) each.
         """
         changes = {}
-        for plain, bright, joint in _pairs(visualizer):
+        for plain, yellow, joint in _pairs(visualizer):
             flag = self.flags[:, joint]
             keys = np.flatnonzero(np.concatenate([[True], flag[1:] != flag[:-1]]))
             changes[plain] = self.times[keys], ~flag[keys]
-            changes[bright] = self.times[keys], flag[keys]
+            changes[yellow] = self.times[keys], flag[keys]
         return changes
 
 
 def node_name(visualizer: MeshcatVisualizer, item: pin.GeometryObject) -> str:
-    """What meshcat calls a drawn object."""
+    """The meshcat node name of a drawn object."""
     return str(visualizer.getViewerNodeName(item, pin.GeometryType.VISUAL))
 
 
-def _bridged(flags: Mask) -> Mask:
-    """Flags (M, n) without gaps that are too short to be seen as more than a flicker."""
+def _without_short_gaps(flags: Mask) -> Mask:
+    """Flags (M, n) with short gaps closed, which would appear as flicker."""
     k, ends = _BRIDGED_FRAMES, ((_BRIDGED_FRAMES,) * 2, (0, 0))
     windows = np.lib.stride_tricks.sliding_window_view
     wide = windows(np.pad(flags, ends), 2 * k + 1, axis=0).any(axis=-1)
@@ -114,11 +117,11 @@ def _bridged(flags: Mask) -> Mask:
 
 
 def _pairs(visualizer: MeshcatVisualizer) -> list[tuple[str, str, int]]:
-    """Nodes of an object and of its bright copy, and the joint that carries them."""
+    """Nodes of each object and of its yellow copy, and their parent joint."""
     items = list(visualizer.visual_model.geometryObjects)
     node = {item.name: node_name(visualizer, item) for item in items}
     return [
-        (node[item.name], node[item.name + _NAME], item.parentJoint)
+        (node[item.name], node[item.name + _COPY_SUFFIX], item.parentJoint)
         for item in items
-        if item.name + _NAME in node
+        if item.name + _COPY_SUFFIX in node
     ]

@@ -1,8 +1,8 @@
-"""What a meshcat page shows, kept as messages, and the page as one file that needs no network.
+"""A meshcat page stored as messages, and written as one HTML file that works offline.
 
-`meshcat.Visualizer` talks to a window. Its own window starts a server process that listens on
-every interface of the machine; this one only keeps the messages, so that a page can be written
-without any server, or be served by `meshcat_server` on the loopback interface alone.
+`meshcat.Visualizer` sends its messages to a window. meshcat's own window starts a server process
+that listens on every network interface; `Page` stores the messages instead, so that a page can be
+written without a server, or served by `meshcat_server` on the loopback interface only.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ VIEWER_FOLDER = Path(_MESHCAT.origin).parent / "viewer" / "dist"
 
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-1[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}")
 
-# meshcat's script merges the parts of a Collada file, and a part with several materials gets a
-# list of them where one is expected, which hides it: the UR5's shoulder, for instance.
+# meshcat's script merges the parts of a Collada file; a part with several materials gets a list
+# where one material is expected, and is hidden (the UR5's shoulder, for instance).
 _PAGE = """<!DOCTYPE html>
 <html>
 <head>
@@ -59,7 +59,7 @@ viewer.gui.__folders["Scene"].close();
 </html>
 """
 
-# The policy makes "no network" a rule that the browser enforces, not a hope.
+# With this policy the browser itself blocks every network access.
 _POLICY = """
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; \
 script-src 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
@@ -73,16 +73,16 @@ viewer.gui.open();"""
 
 
 class Command(Protocol):
-    """What meshcat sends to a window."""
+    """A command that meshcat sends to a window."""
 
     def lower(self) -> dict[str, Any]:
-        """The message as MessagePack can hold it."""
+        """The message as a dictionary for MessagePack."""
 
 
 class Page:
-    """A window for `meshcat.Visualizer` that keeps what is drawn.
+    """A window for `meshcat.Visualizer` that stores what is drawn.
 
-    Messages that a later one overrides are dropped, so the page stays as small as its content.
+    A message that a later one overrides is dropped, so that the page does not grow.
 
     title: of the browser's window, and a line in the page's corner.
     note: a second line there, such as a sentence about meshes that were not found.
@@ -96,14 +96,14 @@ class Page:
         self._uuids: dict[bytes, bytes] = {}
 
     def send(self, command: Command) -> None:
-        """Keep a message; the name is meshcat's."""
+        """Store a message. The method's name is meshcat's."""
         self.keep(command.lower())
 
     def keep(self, message: Mapping[str, Any]) -> bytes:
-        """Add a message to what is drawn and return its bytes."""
+        """Store a message and return its bytes."""
         kind, path = message["type"], message.get("path", "")
         if kind == "delete":
-            self._forget(path)
+            self._drop(path)
         packed = _UUID.sub(self._stable_uuid, umsgpack.packb(message))
         if kind != "delete":
             self._messages[path, kind, str(message.get("property", ""))] = packed
@@ -111,12 +111,12 @@ class Page:
 
     @property
     def messages(self) -> list[bytes]:
-        """What a browser must be told to show the page."""
-        # A browser in the middle of a motion may ask: the copy is one atomic step.
+        """The messages that make a browser show the page."""
+        # A browser may connect while a motion plays; copying is atomic.
         return list(self._messages.values())
 
     def offline_html(self, speed: float = 1.0) -> str:
-        """The page as one file with nothing left to fetch.
+        """The page as one HTML file that loads nothing else.
 
         speed: time scale of the animation.
         """
@@ -126,19 +126,19 @@ class Page:
         return self._fill(_POLICY, f"<script>{script}</script>", start)
 
     def live_html(self) -> str:
-        """The page that asks its server for what is drawn."""
+        """The page that receives its messages from the server."""
         return self._fill("", '<script src="main.min.js"></script>', "viewer.connect();")
 
     def _fill(self, policy: str, meshcat: str, start: str) -> str:
         title, note = html.escape(self.title), html.escape(self.note)
         return _PAGE.format(policy=policy, title=title, note=note, meshcat=meshcat, start=start)
 
-    def _forget(self, path: str) -> None:
+    def _drop(self, path: str) -> None:
         inside = path.rstrip("/") + "/"
         for key in [k for k in self._messages if k[0] == path or k[0].startswith(inside)]:
             del self._messages[key]
 
     def _stable_uuid(self, match: re.Match[bytes]) -> bytes:
-        """meshcat's identifiers hold the time and the machine's address; these only count."""
+        """Replace meshcat's identifiers, which contain time and MAC address, by a counter."""
         number = len(self._uuids)
         return self._uuids.setdefault(match[0], b"%08x-0000-4000-8000-000000000000" % number)

@@ -1,4 +1,4 @@
-"""A meshcat page served to browsers on this machine only, from a thread of this process."""
+"""A meshcat page served to browsers on this machine only, by a thread of this process."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _HOST = "127.0.0.1"
 
 
 class ServedPage(Page):
-    """A page that browsers see change while it changes.
+    """A page whose changes are sent to connected browsers at once.
 
     title, note: as in Page.
     port: port on the loopback interface; 0 for any free one.
-    Raises DisplayError when the port cannot be had.
+    Raises DisplayError when the port is not available.
     """
 
     def __init__(self, title: str, note: str = "", port: int = 0) -> None:
-        """An empty page that is served from now on."""
+        """Start serving an empty page."""
         super().__init__(title, note)
         if not 0 <= port < 2**16:
             raise DisplayError(f"a port is a number from 0 to 65535, not {port}.")
@@ -34,7 +34,7 @@ class ServedPage(Page):
         except OSError as error:
             raise DisplayError(
                 f"cannot serve a page on port {port} of {_HOST}: {error}; "
-                "another program may hold it: choose another port, or 0 for any free one."
+                "another program may use it: choose another port, or 0 for any free one."
             ) from error
         listener.setblocking(False)
         self.web_url = f"http://{_HOST}:{listener.getsockname()[1]}/view/"
@@ -46,17 +46,17 @@ class ServedPage(Page):
         self._thread.start()
 
     def send(self, command: Command) -> None:
-        """Keep a message and show it in every browser."""
+        """Store a message and send it to every browser."""
         packed = self.keep(command.lower())
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._broadcast, packed)
 
     def wait(self, seconds: float) -> bool:
-        """Wait until a browser shows the page; False when none came in that time."""
+        """Wait until a browser shows the page; False when none connects within that time [s]."""
         return self._connected.wait(seconds)
 
     def close(self) -> None:
-        """Stop serving. Browsers keep what they show."""
+        """Stop serving. Open pages stay as they are."""
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join()
@@ -89,13 +89,13 @@ class ServedPage(Page):
         for browser in list(self._browsers):
             browser.show(packed)
 
-    def _enter(self, browser: _Browser) -> None:
+    def _connect(self, browser: _Browser) -> None:
         for message in self.messages:
             browser.show(message)
         self._browsers.add(browser)
         self._connected.set()
 
-    def _leave(self, browser: _Browser) -> None:
+    def _disconnect(self, browser: _Browser) -> None:
         self._browsers.discard(browser)
 
 
@@ -110,30 +110,30 @@ class _LivePage(tornado.web.RequestHandler):
 
 
 class _Script(tornado.web.StaticFileHandler):
-    """meshcat's script, never from a browser's cache."""
+    """meshcat's script, sent so that browsers do not cache it."""
 
     def set_extra_headers(self, path: str) -> None:
         self.set_header("Cache-Control", "no-store")
 
 
 class _Browser(tornado.websocket.WebSocketHandler):
-    """One connected page. Tornado refuses connections that another site's page opens."""
+    """The connection to one open page. Tornado refuses connections from pages of other sites."""
 
     def initialize(self, page: ServedPage) -> None:
         self.page = page
 
     def open(self, *args: str, **kwargs: str) -> None:
-        self.page._enter(self)
+        self.page._connect(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """Nothing that a page says is wanted."""
+        """Messages from a page are ignored."""
 
     def on_close(self) -> None:
-        self.page._leave(self)
+        self.page._disconnect(self)
 
     def show(self, packed: bytes) -> None:
         try:
             future = self.write_message(packed, binary=True)
         except tornado.websocket.WebSocketClosedError:
-            return self.page._leave(self)
-        future.add_done_callback(lambda done: done.exception())  # a browser may leave any time
+            return self.page._disconnect(self)
+        future.add_done_callback(lambda done: done.exception())  # a browser may close any time

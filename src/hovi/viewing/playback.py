@@ -1,4 +1,4 @@
-"""Watching a motion: live in a browser at its own pace, or as one page that plays offline."""
+"""Replay of a motion: live in a browser in real time, or as one page that plays offline."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from hovi.viewing.recorded_limits import with_obstacles
 from hovi.viewing.skeleton import skeleton
 
 with warnings.catch_warnings():
-    # meshcat imports a module that ZeroMQ calls obsolete; hovi does not use that part of it.
+    # meshcat imports a deprecated module of ZeroMQ that hovi does not use.
     warnings.simplefilter("ignore", DeprecationWarning)
     import meshcat
     import meshcat.animation
@@ -41,23 +41,23 @@ Array = npt.NDArray[np.float64]
 _FIELD_OF_VIEW = math.radians(75.0)  # meshcat's camera, vertically
 _ELEVATION = 0.25
 _TRACE_COLOR = (0.80, 0.47, 0.65)
-_TRACE_WIDTH = 0.006  # of the picture's size
+_TRACE_WIDTH = 0.006  # relative to the picture's size
 _FRAME_RATE = 60.0
 _MAX_FRAMES = 20_000
 _VIEW_SAMPLES = 60
 _TRACE_SAMPLES = 2_000
-_BROWSER_SECONDS = 20.0
+_BROWSER_TIMEOUT = 20.0  # [s]
 
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """A motion on a page. In Jupyter, the last line of a cell shows it.
+    """A motion on a page. Jupyter shows it as the value of a cell.
 
     trajectory: the motion.
-    visualizer: Pinocchio's, for whoever wants to draw more (`visualizer.viewer` is meshcat's).
+    visualizer: Pinocchio's, for drawing more (`visualizer.viewer` is meshcat's).
     url: the page's address.
-    page: what the page shows; a ServedPage while a server answers at `url`.
-    highlights: links that stand out at limits; None where none ever does.
+    page: the page's content; a ServedPage when it is served at `url`.
+    highlights: links highlighted at limits; None where no joint is ever at a limit.
     """
 
     trajectory: Trajectory
@@ -83,7 +83,7 @@ class Replay:
                 raise
 
     def close(self) -> None:
-        """Stop the server, if there is one. An open page keeps what it shows."""
+        """Stop the server, if there is one. An open page stays as it is."""
         if isinstance(self.page, ServedPage):
             self.page.close()
 
@@ -102,7 +102,7 @@ class Replay:
             self.highlights.show(self.visualizer, duration)
 
     def _repr_html_(self) -> str:
-        """The page in a notebook: by its address while it is served, else the page itself."""
+        """An iframe: of the address when the page is served, of the page itself otherwise."""
         if isinstance(self.page, ServedPage):
             source = f'src="{self.url}"'
         else:
@@ -110,7 +110,7 @@ class Replay:
         return f'<iframe {source} style="width:100%;height:480px;border:none"></iframe>'
 
     def __enter__(self) -> Self:
-        """The replay itself; leaving the block closes it."""
+        """The replay, closed at the end of the block."""
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -131,15 +131,16 @@ def replay(
 ) -> Replay:
     """Show a motion: live on a page of this machine, or as one file that plays offline.
 
-    The live page plays the motion once in real time (or for ever) and the function returns; the
-    page stays served until the Replay is closed or the process ends, and browsers that come
-    later can play the motion themselves.
+    The function returns when the live page has played the motion once in real time (or, with loop,
+    when it is interrupted). The page is served until the Replay is closed or the process ends;
+    browsers opened later can play the motion with the page's controls.
 
     trajectory: the motion. A robot without visual models is drawn as a skeleton.
     speed: motion seconds per second. loop: play again and again until interrupted.
     trace: draw the path of the robot's tip.
     open_browser: open the page in the default browser and wait for it before playing.
-    html: write one self-contained page there instead, whole or not at all, and serve nothing.
+    html: path of one self-contained page to write instead of serving; it is written completely or
+        not at all.
     port: of the live page on 127.0.0.1; 0 for any free one.
     announce: called with the page's address before the motion starts.
     Raises DisplayError when the page cannot be served, opened or written.
@@ -155,9 +156,9 @@ def replay(
         shown = Replay(trajectory, visualizer, page.web_url, page, highlights)
         announce(page.web_url)
         if open_browser:
-            _open(page)
+            _open_browser(page)
         shown.play(speed=speed, loop=loop)
-        # Whoever opens the page from now on gets the motion with its controls.
+        # Browsers opened from now on get the motion with its controls.
         page.keep(_animation(trajectory, visualizer, loop, highlights))
     except BaseException:
         page.close()
@@ -196,18 +197,18 @@ def _robot(trajectory: Trajectory) -> Robot:
     expect(trajectory, Trajectory, "the trajectory of a solution")
     if trajectory.robot is None:
         raise DisplayError(
-            "this motion was saved without its robot, which was a bare Pinocchio model: there is "
-            "nothing to draw; load the robot from a URDF and plan again."
+            "this motion was saved without its robot, which was a bare Pinocchio model, so it "
+            "cannot be drawn; load the robot from a URDF and plan again."
         )
     return trajectory.robot
 
 
-def _open(page: ServedPage) -> None:
+def _open_browser(page: ServedPage) -> None:
     advice = f"open {page.web_url} yourself, or write a page with html=..."
     if not webbrowser.open(page.web_url, new=2):
         raise DisplayError(f"no browser could be started; {advice}")
-    if not page.wait(_BROWSER_SECONDS):
-        raise DisplayError(f"no browser showed the page in {_BROWSER_SECONDS:.0f} s; {advice}")
+    if not page.wait(_BROWSER_TIMEOUT):
+        raise DisplayError(f"no browser showed the page in {_BROWSER_TIMEOUT:.0f} s; {advice}")
 
 
 def _note(robot: Robot, highlights: Highlights | None) -> str:
@@ -218,12 +219,12 @@ def _note(robot: Robot, highlights: Highlights | None) -> str:
 def _draw(
     trajectory: Trajectory, robot: Robot, page: Page, trace: bool, highlights: Highlights | None
 ) -> MeshcatVisualizer:
-    """The robot at the start of the motion, its tip's path, and the camera on both."""
+    """Draw the robot at the start of the motion and the path of its tip; place the camera."""
     visual = robot.visual
     if visual is None or visual.ngeoms == 0:
         visual = skeleton(robot.model)
     if highlights is not None:
-        visual = highlights.with_bright_copies(visual)
+        visual = highlights.with_highlighted_copies(visual)
     visual = with_obstacles(visual, trajectory)
     visualizer = MeshcatVisualizer(robot.model, None, visual)
     visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
@@ -232,27 +233,27 @@ def _draw(
     visualizer.display(trajectory.q[0])
     if highlights is not None:
         highlights.show(visualizer, 0.0)
-    lower, upper = _swept_box(visualizer, _along(trajectory, _VIEW_SAMPLES))
+    lower, upper = _swept_box(visualizer, _configurations(trajectory, _VIEW_SAMPLES))
     if trace:
-        tip = robot.frame_position(robot.tip_frame, _along(trajectory, _TRACE_SAMPLES))
+        tip = robot.frame_position(robot.tip_frame, _configurations(trajectory, _TRACE_SAMPLES))
         _draw_trace(visualizer, tip, _TRACE_WIDTH * float(np.linalg.norm(upper - lower)))
-    _set_the_stage(visualizer, lower, upper)
+    _place_camera(visualizer, lower, upper)
     return visualizer
 
 
-def _along(trajectory: Trajectory, most: int) -> Array:
-    """Configurations at even times, at most so many, shape (M, nq)."""
-    count = int(min(most, 1 + _VIEW_SAMPLES * trajectory.grid.intervals))
+def _configurations(trajectory: Trajectory, max_count: int) -> Array:
+    """Configurations at evenly spaced times, at most max_count, shape (M, nq)."""
+    count = int(min(max_count, 1 + _VIEW_SAMPLES * trajectory.grid.intervals))
     return trajectory.configurations(np.linspace(0.0, trajectory.duration, count))
 
 
 def _swept_box(visualizer: MeshcatVisualizer, q: Array) -> tuple[Array, Array]:
-    """Lower and upper corner of what the drawn robot passes through, each (3,), in [m]."""
+    """Lower and upper corner of the volume that the drawn robot sweeps, each (3,), in [m]."""
     corners = [_corners(item) for item in visualizer.visual_model.geometryObjects]
-    points = [np.zeros((1, 3))]  # the base belongs to the picture
+    points = [np.zeros((1, 3))]  # keep the base in the picture
     for placements in _placements(visualizer, q):
         pairs = zip(corners, placements, strict=True)
-        points += [c @ place.rotation.T + place.translation for c, place in pairs]
+        points += [c @ pose.rotation.T + pose.translation for c, pose in pairs]
     swept = np.concatenate(points)
     return swept.min(axis=0), swept.max(axis=0)
 
@@ -267,17 +268,17 @@ def _corners(item: pin.GeometryObject) -> Array:
 
 
 def _draw_trace(visualizer: MeshcatVisualizer, points: Array, width: float) -> None:
-    """A path as close points: browsers draw lines one pixel wide, whatever is asked."""
+    """Draw a path as dense points, since browsers draw lines of any width one pixel wide."""
     colors = np.tile(_TRACE_COLOR, (len(points), 1))
     geometry = meshcat.geometry.PointsGeometry(*(x.T.astype(np.float32) for x in (points, colors)))
     material = meshcat.geometry.PointsMaterial(size=width)
     visualizer.viewer["trace"].set_object(meshcat.geometry.Points(geometry, material))
 
 
-def _set_the_stage(visualizer: MeshcatVisualizer, lower: Array, upper: Array) -> None:
-    """Look across the larger horizontal extent, from far enough to have everything in view.
+def _place_camera(visualizer: MeshcatVisualizer, lower: Array, upper: Array) -> None:
+    """Point the camera across the larger horizontal extent, far enough to show everything.
 
-    meshcat's camera turns about the world's origin, so the middle of the motion is put there.
+    meshcat's camera turns about the world's origin, so the center of the motion is moved there.
     """
     size, center = upper - lower, 0.5 * (lower + upper)
     aside = np.array([size[1], -size[0], 0.0])
@@ -287,7 +288,7 @@ def _set_the_stage(visualizer: MeshcatVisualizer, lower: Array, upper: Array) ->
     x, y, z = distance * direction / np.linalg.norm(direction)
     viewer = visualizer.viewer
     camera = viewer["/Cameras/default/rotated/<object>"]
-    camera.set_property("position", [x, z, -y])  # this node's y points up
+    camera.set_property("position", [x, z, -y])  # the y axis of this node points up
     camera.set_property("far", max(100.0, 4 * distance))
     viewer["/meshcat"].set_transform(_shift(-center))
     viewer["/Grid"].set_transform(_shift(np.array([-center[0], -center[1], lower[2] - center[2]])))
@@ -307,12 +308,12 @@ def _placements(visualizer: MeshcatVisualizer, q: Array) -> list[list[pin.SE3]]:
     placements = []
     for configuration in q:
         pin.updateGeometryPlacements(model, data, visual, visual_data, configuration)
-        placements.append([place.copy() for place in visual_data.oMg])
+        placements.append([placement.copy() for placement in visual_data.oMg])
     return placements
 
 
 def _frame_times(trajectory: Trajectory) -> Array:
-    """Times of an animation's frames, its two ends included."""
+    """Times of the animation's frames, both ends included, in [s]."""
     frames = int(min(_MAX_FRAMES, math.ceil(trajectory.duration * _FRAME_RATE))) + 1
     return np.linspace(0.0, trajectory.duration, max(frames, 2))
 
@@ -323,17 +324,17 @@ def _animation(
     loop: bool,
     highlights: Highlights | None,
 ) -> dict[str, object]:
-    """The message that makes a page play the motion: tracks by drawn object, in seconds."""
+    """The message that makes a page play the motion: keyframe tracks by drawn object, in [s]."""
     times = _frame_times(trajectory)
     visible = {} if highlights is None else highlights.changes(visualizer)
     placements = _placements(visualizer, trajectory.configurations(times))
     animation = meshcat.animation.Animation()
     for number, item in enumerate(visualizer.visual_model.geometryObjects):
-        places = [frame[number] for frame in placements]
-        turns = [pin.Quaternion(place.rotation).coeffs() for place in places]
+        poses = [frame[number] for frame in placements]
+        rotations = [pin.Quaternion(pose.rotation).coeffs() for pose in poses]
         tracks = {
-            "position": _track("position", "vector3", times, [p.translation for p in places]),
-            "quaternion": _track("quaternion", "quaternion", times, turns),
+            "position": _track("position", "vector3", times, [p.translation for p in poses]),
+            "quaternion": _track("quaternion", "quaternion", times, rotations),
         }
         name = node_name(visualizer, item)
         if name in visible:

@@ -1,6 +1,6 @@
-"""Pictures of a motion, drawn by Matplotlib without its global state.
+"""Plots of a motion, drawn by Matplotlib without its global state.
 
-The torque is drawn interval by interval, so that a jump at a node is a gap and not a steep line.
+Curves are drawn interval by interval, so that a jump at a node is a gap and not a steep line.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")
-"""The colors of Okabe and Ito, which people with any color vision tell apart."""
-_STYLES = ("-", "--", ":", "-.")
-_POINTS = 2_000
-_MOST_MARKS = 150
+"""The color-blind safe palette of Okabe and Ito."""
+_LINE_STYLES = ("-", "--", ":", "-.")
+_CURVE_POINTS = 2_000
+_MAX_MARKED_INTERVALS = 150
 _SURFACE_TIMES = 180
 _SECTIONS = 25
 _STRIPS = 20
@@ -51,17 +51,17 @@ _RIGHT = " (right)"
 
 @dataclass(frozen=True, eq=False)
 class _SampledMotion:
-    """A motion sampled interval by interval, its ends included: m points in each of N."""
+    """A motion sampled at m points in each of N intervals, ends included."""
 
     t: Array  # (N, m)
     motion: Sample  # arrays (N, m, n)
     limits: Limits | None
-    active: Mask  # (N, m, 4, nv), where a limit is active
+    active: Mask  # (N, m, 4, nv), True where a limit is active
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """What one panel shows, and how angular and linear coordinates are scaled and labelled."""
+    """What a panel shows, and the label and scale of angular and linear coordinates."""
 
     kind: int  # in KINDS
     angular: tuple[str, float]
@@ -76,7 +76,8 @@ _EFFORT = _Panel(KINDS.index("tau"), ("torque [N m]", 1.0), ("force [N]", 1.0))
 def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
     """Write `motion_figure` to a file.
 
-    path: a PNG, PDF or SVG by its suffix, written whole or not at all. Raises DisplayError.
+    path: a PNG, PDF or SVG by its suffix; it is written completely or not at all. Raises
+        DisplayError.
     """
     write_figure(motion_figure(trajectory), path)
 
@@ -98,12 +99,12 @@ def plot_swept_surface(
 def motion_figure(trajectory: Trajectory) -> Figure:
     """Positions, velocities and efforts over time, one line per coordinate, nodes as marks.
 
-    Limits that the motion was planned under are bands, where they are near enough to be seen
-    beside the curves; a curve is wider where it leans on one. Where it was planned to keep away
-    from something, a fourth panel has the distances of the pairs that come nearest.
+    Limits of the plan are shown as bands where they are close to the curves; a curve is wider where
+    it is at a limit. For a motion planned with obstacles or self-collision, a fourth panel shows
+    the distances of the closest pairs.
     """
     expect(trajectory, Trajectory, "the trajectory of a solution")
-    curve, kept = _sampled(trajectory), kept_distances(trajectory)
+    curve, kept = _sampled_motion(trajectory), kept_distances(trajectory)
     panels = 3 if kept is None else 4
     figure = Figure(figsize=(8.0, 2.5 * panels), layout="constrained")
     axes = figure.subplots(panels, sharex=True)
@@ -120,7 +121,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
 
 def angles_figure(trajectory: Trajectory) -> Figure:
     """The configuration over time [ColomboFerraroMartin2016, section 5, first result]."""
-    curve = _sampled(trajectory)
+    curve = _sampled_motion(trajectory)
     figure = Figure(figsize=(7.0, 4.0), layout="constrained")
     ax = figure.subplots()
     _draw(ax, trajectory, _POSITION, curve, _coordinates(trajectory, curve.motion.q))
@@ -130,13 +131,13 @@ def angles_figure(trajectory: Trajectory) -> Figure:
 
 
 def surface_figure(trajectory: Trajectory, window: tuple[float, float] | None = None) -> Figure:
-    """The surface that the chain from base to tip sweeps, over time and the plane it moves in.
+    """The surface swept by the chain from base to tip, over time and the plane of the motion.
 
-    A section at a fixed time shows the links as they stand then
+    A section at a fixed time shows the links at that time
     [ColomboFerraroMartin2016, section 5, second result].
 
-    window: times between which it is drawn, in [s]; 0.3 T to 0.6 T when not given.
-    Raises DisplayError when the window lies outside the motion, or the robot is not known.
+    window: start and end time, in [s]; 0.3 T to 0.6 T by default.
+    Raises DisplayError when the window lies outside the motion, or the robot is unknown.
     """
     start, end = window or (0.3 * trajectory.duration, 0.6 * trajectory.duration)
     if not 0 <= start < end <= trajectory.duration:
@@ -145,21 +146,21 @@ def surface_figure(trajectory: Trajectory, window: tuple[float, float] | None = 
         )
     t, dark = _surface_times(start, end)
     points = _chain(_robot(trajectory), trajectory.configurations(t))  # (links + 1, M, 3)
-    plane = np.sort(np.argsort(np.ptp(points, axis=(0, 1)))[1:])  # the axis that varies least goes
+    plane = np.sort(np.argsort(np.ptp(points, axis=(0, 1)))[1:])  # without the axis of least extent
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     ax = figure.add_subplot(projection="3d")
     assert isinstance(ax, Axes3D)
     _sweep(ax, t, points[:, :, plane], dark)
     across, up = ("xyz"[axis] for axis in plane)
-    _dress_surface(ax, across, up, np.ptp(points[:, :, plane], axis=(0, 1)))
+    _format_surface(ax, across, up, np.ptp(points[:, :, plane], axis=(0, 1)))
     return figure
 
 
 def plot_all(trajectory: Trajectory, path: str | os.PathLike[str]) -> tuple[Path, ...]:
-    """`plot`, and for a planar two-link arm the paper's two pictures beside it.
+    """`plot`, and for a planar two-link arm the two figures of the paper as well.
 
-    path: of the first picture; the others add `_angles` and `_surface` to its stem.
-    Returns the files written.
+    path: of the first picture; the others append `_angles` and `_surface` to its stem.
+    Returns the paths of the files.
     """
     first = Path(path)
     plot(trajectory, first)
@@ -174,7 +175,7 @@ def plot_all(trajectory: Trajectory, path: str | os.PathLike[str]) -> tuple[Path
 
 
 def is_planar_two_link(robot: Robot) -> bool:
-    """Whether a robot is two revolute joints, one carrying the other, with parallel axes."""
+    """Whether a robot is a serial chain of two revolute joints with parallel axes."""
     if (robot.nq, robot.nv, robot.model.njoints) != (2, 2, 3) or list(robot.model.parents)[2] != 1:
         return False
     first, second = _axes_in_world(robot).T
@@ -184,8 +185,8 @@ def is_planar_two_link(robot: Robot) -> bool:
 def _robot(trajectory: Trajectory) -> Robot:
     if trajectory.robot is None:
         raise DisplayError(
-            "this motion was saved without its robot, which was a bare Pinocchio model: its links "
-            "cannot be drawn; load the robot from a URDF and plan again."
+            "this motion was saved without its robot, which was a bare Pinocchio model, so its "
+            "links cannot be drawn; load the robot from a URDF and plan again."
         )
     return trajectory.robot
 
@@ -194,9 +195,9 @@ def _axes_in_world(robot: Robot) -> Array:
     """Angular part of each coordinate's motion at the neutral configuration, shape (3, nv)."""
     data = robot.model.createData()
     axes: Array = pin.computeJointJacobians(robot.model, data, robot.neutral())[3:]
-    leading = [joint for joint in list(robot.model.joints)[1:] if joint.nv]  # mimics have columns
-    places = [range(joint.idx_vExtended, joint.idx_vExtended + joint.nv) for joint in leading]
-    return axes[:, [place for each in places for place in each]]
+    leading = [joint for joint in list(robot.model.joints)[1:] if joint.nv]  # not mimic joints
+    columns = [range(joint.idx_vExtended, joint.idx_vExtended + joint.nv) for joint in leading]
+    return axes[:, [column for each in columns for column in each]]
 
 
 def _coordinates(trajectory: Trajectory, q: Array) -> Array:
@@ -207,13 +208,13 @@ def _coordinates(trajectory: Trajectory, q: Array) -> Array:
 
 
 def _names(trajectory: Trajectory) -> tuple[str, ...]:
-    """What the numbers of `_coordinates` are called."""
+    """Names of the columns of `_coordinates`."""
     names = trajectory.coordinate_names
     return names if trajectory.space is None else shown_names(trajectory.space, names)
 
 
 def _chain(robot: Robot, q: Array) -> Array:
-    """Origins of the joints that carry the tip, and the tip, shape (links + 1, M, 3), in [m]."""
+    """Origins of the joints from base to tip, and the tip, shape (links + 1, M, 3), in [m]."""
     model = robot.model
     tip = model.frames[frame_id(model, robot.tip_frame)]
     joints = [joint for joint in model.supports[tip.parentJoint] if joint != 0]
@@ -225,9 +226,9 @@ def _chain(robot: Robot, q: Array) -> Array:
     return points
 
 
-def _sampled(trajectory: Trajectory) -> _SampledMotion:
+def _sampled_motion(trajectory: Trajectory) -> _SampledMotion:
     N = trajectory.grid.intervals
-    s = np.linspace(0.0, 1.0, max(3, -(-_POINTS // N) + 1))
+    s = np.linspace(0.0, 1.0, max(3, -(-_CURVE_POINTS // N) + 1))
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
     t = trajectory.t[:-1, None] + trajectory.grid.steps[:, None] * s
     limits = imposed_limits(trajectory)
@@ -238,19 +239,19 @@ def _sampled(trajectory: Trajectory) -> _SampledMotion:
 
 
 def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion, y: Array) -> None:
-    """One line per coordinate; linear ones on an axis of their own, at the right if need be."""
+    """One line per coordinate; linear coordinates on the right axis if there are angular ones."""
     robot = trajectory.robot
-    if robot is None:  # nobody knows which coordinates are angles: no conversion
+    if robot is None:  # unknown which coordinates are angles: no unit conversion
         label = f"{panel.angular[0].split(' [')[0]} [SI]".replace("angle", "position")
         _lines(ax, trajectory, panel.kind, curve, y, 1.0, np.arange(y.shape[-1]))
-        _dress(ax, label)
+        _format_axes(ax, label)
         return
     angular, side = ~robot.sliding, ax
     for mask, (label, scale) in ((angular, panel.angular), (~angular, panel.linear)):
         if mask.any():
             side = ax.twinx() if side.lines else ax
             _lines(side, trajectory, panel.kind, curve, y, scale, np.flatnonzero(mask))
-            _dress(side, label)
+            _format_axes(side, label)
             if side is not ax:
                 side.grid(False)
     if side is not ax:
@@ -260,7 +261,7 @@ def _draw(ax: Axes, trajectory: Trajectory, panel: _Panel, curve: _SampledMotion
 
 
 def _share_scale(trajectory: Trajectory, one: tuple[Axes, Mask], other: tuple[Axes, Mask]) -> None:
-    """Give an axis of passive joints alone the other's scale: its own would blow up errors."""
+    """Give an axis of passive joints only the other's limits; its own would magnify rounding."""
     passive = np.zeros(len(one[1]), dtype=bool)
     if trajectory.scene is not None:
         passive[trajectory.scene.passive_coordinates] = True
@@ -279,16 +280,19 @@ def _lines(
     members: npt.NDArray[np.intp],
 ) -> None:
     t, y = curve.t, scale * y
-    looks = [(c, style) for style, c in itertools.product(_STYLES, _COLORS)]
+    styles = [(c, style) for style, c in itertools.product(_LINE_STYLES, _COLORS)]
     gap = np.full((len(t), 1), np.nan)
     broken = np.hstack([t, gap]).ravel()
     limited: list[Curve] = []
-    names, side = _names(trajectory), _RIGHT if ax.yaxis.get_ticks_position() == "right" else ""
+    names, side = (
+        _names(trajectory),
+        _RIGHT if ax.yaxis.get_ticks_position() == "right" else "",
+    )
     for i in members:
-        color, style = looks[i % len(looks)]
+        color, style = styles[i % len(styles)]
         line = np.hstack([y[:, :, i], gap]).ravel()
         ax.plot(broken, line, style, color=color, linewidth=1.4, label=names[i] + side)
-        if len(t) <= _MOST_MARKS:
+        if len(t) <= _MAX_MARKED_INTERVALS:
             ends = np.s_[:, [0, -1]]
             ax.plot(t[ends].ravel(), y[:, :, i][ends].ravel(), ".", color=color, markersize=3)
         if curve.limits is not None:
@@ -302,29 +306,29 @@ def _lines(
     ax.set_xlim(0.0, trajectory.duration)
 
 
-def _dress(ax: Axes, label: str) -> None:
+def _format_axes(ax: Axes, label: str) -> None:
     ax.set_ylabel(label)
     ax.grid(color="0.88", linewidth=0.6)
     ax.spines["top"].set_visible(False)
 
 
 def _legend(figure: Figure, ax: Axes, names: Sequence[str]) -> None:
-    """One legend above the figure, for the lines of all axes that share the first panel.
+    """Draw one legend above the figure, for the lines of all axes that share the first panel.
 
-    names: of the coordinates, in the order in which the legend has them.
+    names: of the coordinates, in the order of the legend.
     """
     shared = [a for a in figure.axes if a.bbox.bounds == ax.bbox.bounds]
     pairs = [pair for a in shared for pair in zip(*a.get_legend_handles_labels(), strict=True)]
-    place = {label: i for i, name in enumerate(names) for label in (name, name + _RIGHT)}
-    pairs.sort(key=lambda pair: place[pair[1]])
+    rank = {label: i for i, name in enumerate(names) for label in (name, name + _RIGHT)}
+    pairs.sort(key=lambda pair: rank[pair[1]])
     pairs += legend_entries(figure.axes)
     handles, labels = zip(*pairs, strict=True)
-    columns = -(-len(labels) // -(-len(labels) // 4))  # at most 4, in rows as full as can be
+    columns = -(-len(labels) // -(-len(labels) // 4))  # at most 4, rows of equal length
     figure.legend(handles, labels, loc="outside upper center", ncols=columns, frameon=False)
 
 
 def _surface_times(start: float, end: float) -> tuple[Array, Mask]:
-    """Times (M,) of a surface's mesh, and which of its M - 1 columns are thin, dark sections."""
+    """Times (M,) of the surface mesh, and which of its M - 1 columns are thin dark sections."""
     thin = (end - start) / 500
     sections = np.linspace(start, end - thin, _SECTIONS)
     even = np.linspace(start, end, _SURFACE_TIMES)
@@ -335,7 +339,7 @@ def _surface_times(start: float, end: float) -> tuple[Array, Mask]:
 
 
 def _sweep(ax: Axes3D, t: Array, points: Array, dark: Mask) -> None:
-    """A ruled surface per link, in patches that are sorted by depth together.
+    """Draw a ruled surface per link, with the patches of all links sorted by depth together.
 
     The dark columns of patches show the links at those times.
     """
@@ -357,8 +361,8 @@ def _sweep(ax: Axes3D, t: Array, points: Array, dark: Mask) -> None:
     ax.auto_scale_xyz(t, across, up)
 
 
-def _dress_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
-    """Labels, and lengths of the two space axes in proportion."""
+def _format_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
+    """Label the axes and draw the two space axes to the same scale."""
     ax.set_xlabel("time [s]", labelpad=12)
     ax.set_ylabel(f"{across} [m]", labelpad=6)
     ax.set_zlabel(f"{up} [m]")

@@ -11,13 +11,13 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.limits import Limits
 
-_OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: no robot's, dark on the gray
+_OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from robots and background
 
 
 def imposed_limits(trajectory: Trajectory) -> Limits | None:
-    """The limits that the metadata of a motion remembers; None where there are none.
+    """The limits recorded in a motion's metadata; None where there are none.
 
-    Metadata may come from a file: what does not describe limits of this motion counts as none.
+    Metadata may come from a file: invalid limits, or limits of another robot, count as none.
     """
     data = trajectory.metadata.get("limits")
     if not isinstance(data, dict):
@@ -32,9 +32,9 @@ def imposed_limits(trajectory: Trajectory) -> Limits | None:
 
 
 def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
-    """The clearance that the metadata of a motion remembers; None where there is none.
+    """The clearance recorded in a motion's metadata; None where there is none.
 
-    Metadata may come from a file: what does not describe a clearance counts as none.
+    Metadata may come from a file: an invalid clearance counts as none.
     """
     data = trajectory.metadata.get("clearance")
     if not isinstance(data, dict):
@@ -46,18 +46,18 @@ def imposed_clearance(trajectory: Trajectory) -> Clearance | None:
 
 
 def kept_distances(trajectory: Trajectory) -> tuple[Clearance, Distances] | None:
-    """What a motion was planned to keep away from; None where nothing is, or cannot be measured."""
+    """The recorded clearance and its distances; None where not recorded or not computable."""
     clearance = imposed_clearance(trajectory)
     if clearance is None or not clearance.wanted or trajectory.robot is None:
         return None
     try:
         return clearance, distances_between(trajectory.robot, clearance)
-    except HoviError:  # the shapes are not on this machine
+    except HoviError:  # meshes that are missing on this machine
         return None
 
 
 def with_obstacles(visual: pin.GeometryModel, trajectory: Trajectory) -> pin.GeometryModel:
-    """The drawn objects of a robot, and the obstacles of its motion."""
+    """The drawn objects of a robot and the obstacles of its motion."""
     clearance = imposed_clearance(trajectory)
     if clearance is None or not clearance.obstacles:
         return visual

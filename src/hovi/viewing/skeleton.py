@@ -1,4 +1,4 @@
-"""A body for robots that have no visual model: a ball at each joint, a bar to each next one."""
+"""A stick figure for robots without visual models: balls at joints, bars between them."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _THICKNESS = 0.025
 
 
 def skeleton(model: pin.Model) -> pin.GeometryModel:
-    """Balls and bars that show how a model's joints hang together.
+    """Balls at the joints of a model, and bars that connect them.
 
-    Bars lead from each joint to the joints and the body frames that it carries. Their thickness
-    follows from the longest of them.
+    Bars lead from each joint to its child joints and body frames. Their thickness is proportional
+    to the longest of them.
     """
     bars = [*_to_next_joints(model), *_to_frames(model)]
     longest = max((float(np.linalg.norm(end)) for _, end in bars), default=0.0)
@@ -29,37 +29,37 @@ def skeleton(model: pin.Model) -> pin.GeometryModel:
     for joint, end in bars:
         length = float(np.linalg.norm(end))
         if length > radius:
-            turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
-            _add(geometry, joint, pin.SE3(turn, end / 2), coal.Cylinder(radius, length), _BAR)
+            rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
+            _add(geometry, joint, pin.SE3(rotation, end / 2), coal.Cylinder(radius, length), _BAR)
     return geometry
 
 
 def _to_next_joints(model: pin.Model) -> list[tuple[int, Array]]:
-    """Carrier and place, in the carrier's frame, of every joint but those on the world."""
+    """Parent and position in the parent's frame, of every joint but those on the world."""
     joints = range(1, model.njoints)
     bars = [(model.parents[j], model.jointPlacements[j].translation.copy()) for j in joints]
-    return [(carrier, end) for carrier, end in bars if carrier != 0]
+    return [(parent, end) for parent, end in bars if parent != 0]
 
 
 def _to_frames(model: pin.Model) -> list[tuple[int, Array]]:
-    """The farthest body frame of each joint that carries no other joint: a hand, a tip."""
-    carriers = set(model.parents)
+    """The farthest body frame of each joint without child joints: a hand, a tip."""
+    parents = set(model.parents)
     ends: dict[int, Array] = {}
     for frame in model.frames:
-        joint, place = frame.parentJoint, frame.placement.translation.copy()
-        if joint in carriers or frame.type not in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
+        joint, position = frame.parentJoint, frame.placement.translation.copy()
+        if joint in parents or frame.type not in (pin.FrameType.BODY, pin.FrameType.OP_FRAME):
             continue
-        if np.linalg.norm(place) > np.linalg.norm(ends.get(joint, np.zeros(3))):
-            ends[joint] = place
-    for joint in set(range(1, model.njoints)) - carriers - set(ends):
-        ends[joint] = 2 * model.inertias[joint].lever  # no frame: as far again as the mass
+        if np.linalg.norm(position) > np.linalg.norm(ends.get(joint, np.zeros(3))):
+            ends[joint] = position
+    for joint in set(range(1, model.njoints)) - parents - set(ends):
+        ends[joint] = 2 * model.inertias[joint].lever  # the center of mass taken as the middle
     return sorted(ends.items(), key=lambda item: item[0])
 
 
 def _add(
-    geometry: pin.GeometryModel, joint: int, place: pin.SE3, shape: coal.ShapeBase, color: Array
+    geometry: pin.GeometryModel, joint: int, placement: pin.SE3, shape: coal.ShapeBase, color: Array
 ) -> None:
     name = f"{type(shape).__name__.lower()}_{geometry.ngeoms}"
-    item = pin.GeometryObject(name, joint, place, shape)
+    item = pin.GeometryObject(name, joint, placement, shape)
     item.meshColor = color
     geometry.addGeometryObject(item)

@@ -1,4 +1,4 @@
-"""Configurations along a motion as nv numbers for people: angles that go on past a full turn."""
+"""Configurations along a motion as nv continuous numbers: angles beyond a full turn included."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from hovi.robot.space.groups import SE2, SE3, SO2, SO3
 
 Array = npt.NDArray[np.float64]
 
-_NOTHING = 1e-9
+_ZERO_ROTATION = 1e-9  # [rad], below which a rotation has no axis
 
 
 def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
-    """Configurations (M, nq) along a motion as numbers (M, nv) that do not jump.
+    """Configurations (M, nq) along a motion as continuous numbers (M, nv), in [rad] and [m].
 
-    Plain coordinates as they are; angles of continuous and planar joints without jumps of a turn;
-    positions in the parent's axes; orientations as rotation vectors from the parent's axes, of the
-    branch that is nearest to the one before. In [rad] and [m].
+    Coordinates in R are unchanged; angles of continuous and planar joints are unwrapped; positions
+    are in the parent's axes; orientations are rotation vectors from the parent's axes, on the
+    branch nearest to the previous one.
     """
     numbers = np.zeros((len(q), space.nv))
     iq, iv = space.plain
@@ -39,9 +39,9 @@ def unwrapped(space: ConfigurationSpace, q: Array) -> Array:
 
 
 def shown_names(space: ConfigurationSpace, coordinates: Sequence[str]) -> tuple[str, ...]:
-    """What to call the numbers of `unwrapped`, (nv,), from the names of the coordinates, (nv,).
+    """Names of the numbers of `unwrapped`, (nv,), from the names of the coordinates, (nv,).
 
-    A base's are base[x] to base[z], and base[rx] to base[rz] of its rotation vector.
+    Those of a base are base[x] to base[z], and base[rx] to base[rz] of its rotation vector.
     """
     shown = list(coordinates)
     for factor in space.curved:
@@ -51,19 +51,19 @@ def shown_names(space: ConfigurationSpace, coordinates: Sequence[str]) -> tuple[
 
 
 def _angle(pair: Array) -> Array:
-    """Angles of (cos, sin) pairs (M, 2), without jumps."""
+    """Unwrapped angles of (cos, sin) pairs (M, 2), in [rad]."""
     return np.asarray(np.unwrap(np.arctan2(pair[:, 1], pair[:, 0])))
 
 
 def _rotation_vector(quaternion: Array) -> Array:
-    """Rotation vectors of unit quaternions (M, 4), each with the turns nearest to the last."""
-    still = np.broadcast_to([0.0, 0.0, 0.0, 1.0], quaternion.shape)
-    vectors = SO3.difference(still, quaternion)
+    """Rotation vectors of unit quaternions (M, 4), on the branch nearest to the previous one."""
+    identity = np.broadcast_to([0.0, 0.0, 0.0, 1.0], quaternion.shape)
+    vectors = SO3.difference(identity, quaternion)
     for i in range(1, len(vectors)):
-        size, before = float(np.linalg.norm(vectors[i])), float(np.linalg.norm(vectors[i - 1]))
-        if max(size, before) < _NOTHING:
+        size, previous = float(np.linalg.norm(vectors[i])), float(np.linalg.norm(vectors[i - 1]))
+        if max(size, previous) < _ZERO_ROTATION:
             continue
-        axis = vectors[i] / size if size > _NOTHING else vectors[i - 1] / before
+        axis = vectors[i] / size if size > _ZERO_ROTATION else vectors[i - 1] / previous
         turns = np.round((vectors[i - 1] @ axis - size) / (2 * np.pi))
         vectors[i] += 2 * np.pi * turns * axis
     return vectors
