@@ -1,4 +1,4 @@
-"""Work-precision diagrams: errors in units, orders, fronts, budgets, and the true motion."""
+"""Work-precision diagrams: units of errors, orders, Pareto fronts, budgets, reference motions."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ from hovi.scene.scene import Scene
 from samples import paper_arm
 
 Array = npt.NDArray[np.float64]
-FEW = ("galerkin-0", "galerkin-1", "hermite-simpson")
+SCHEMES = ("galerkin-0", "galerkin-1", "hermite-simpson")
 
 
 @pytest.fixture(scope="module")
 def reach() -> Diagram:
     return work_precision(
-        load_task(example("two_link_reach")), schemes=FEW, repeats=1, clock="processor"
+        load_task(example("two_link_reach")), schemes=SCHEMES, repeats=1, clock="processor"
     )
 
 
 def error_of(cost: float, joints: float, tip: float) -> hovi.MotionError:
-    """One joint that turns, with the same error everywhere."""
+    """The error of a robot with one revolute joint, constant along the motion."""
     q, one = np.full((2, 1), joints), np.full(2, tip)
     unknown, sliding = np.full((1, 1), np.nan), np.zeros(1, dtype=bool)
     return hovi.MotionError(cost, q[:1], unknown, unknown, one[:1], q, one, "tip", sliding)
@@ -66,7 +66,7 @@ def diagram_of(reach: Diagram, *runs: Run) -> Diagram:
     return Diagram("synthetic", "near", reach.resolved, runs)
 
 
-def test_errors_are_in_radians_and_in_metres_at_the_tip(pendulum: Robot) -> None:
+def test_errors_are_in_radians_and_metres(pendulum: Robot) -> None:
     turn, T = 1e-3, 2.0
 
     def still(t: Array) -> Array:
@@ -85,25 +85,25 @@ def test_errors_are_in_radians_and_in_metres_at_the_tip(pendulum: Robot) -> None
 
 
 @pytest.mark.parametrize("cost", [math.inf, math.nan])
-def test_a_motion_whose_cost_is_not_finite_is_infinitely_far(pendulum: Robot, cost: float) -> None:
+def test_a_non_finite_cost_has_infinite_errors(pendulum: Robot, cost: float) -> None:
     reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
     error = reference.error(cost, lambda t: np.full((len(t), 1), np.nan))
     assert error.cost == error.largest_q == error.largest_tip == math.inf
 
 
-def test_there_is_one_motion_error_and_its_old_name_says_so() -> None:
+def test_the_old_name_of_motion_error_warns() -> None:
     with pytest.warns(DeprecationWarning, match=r"hovi\.accuracy\.Thresholds"):
         assert hovi.accuracy.MotionError is hovi.MotionError
 
 
-def test_thresholds_are_met_where_no_error_is_larger() -> None:
+def test_thresholds_are_met_if_no_error_is_larger() -> None:
     small = Thresholds(cost=1e-6, joints=1e-4, tip=1e-3)
     assert small.met_by(error_of(1e-6, 1e-4, 1e-3))
     for error in (error_of(2e-6, 0, 0), error_of(0, 2e-4, 0), error_of(0, 0, 2e-3)):
         assert not small.met_by(error)
 
 
-def test_files_and_pictures_show_the_tip_in_millimetres(reach: Diagram) -> None:
+def test_files_and_figures_show_tip_errors_in_millimetres(reach: Diagram) -> None:
     data, resolved = reach.to_dict(), reach.resolved.uncertainty
     assert data["resolved"]["uncertainty"]["tip"] == 1e3 * resolved.largest_tip
     for row, each in zip(data["runs"], reach.runs, strict=True):
@@ -113,11 +113,11 @@ def test_files_and_pictures_show_the_tip_in_millimetres(reach: Diagram) -> None:
     panel = work_precision_figure(reach).axes[2]
     assert panel.get_ylabel() == "largest error of the tip [mm]"
     shown = panel.lines[0].get_ydata()
-    counted = [1e3 * each.error.largest_tip for each in reach.of(FEW[0]) if each.counts]
+    counted = [1e3 * each.error.largest_tip for each in reach.of(SCHEMES[0]) if each.counts]
     np.testing.assert_array_equal(shown, np.maximum(counted, 1e-16))
 
 
-def test_the_motion_that_others_are_measured_against_solves_pontryagins_equations(
+def test_the_reference_motion_solves_pontryagins_equations(
     reach: Diagram,
 ) -> None:
     motion = reach.resolved.trajectory
@@ -129,10 +129,8 @@ def test_the_motion_that_others_are_measured_against_solves_pontryagins_equation
     np.testing.assert_allclose(motion.configurations(t), true.at(t)[0], rtol=0, atol=1e-8)
 
 
-@pytest.mark.parametrize("method", FEW)
-def test_the_error_of_the_cost_falls_with_the_order_of_the_scheme(
-    reach: Diagram, method: str
-) -> None:
+@pytest.mark.parametrize("method", SCHEMES)
+def test_the_cost_converges_with_the_order_of_the_scheme(reach: Diagram, method: str) -> None:
     fine = [r for r in reach.of(method) if 1e-10 < r.error.cost < 1e-5 and r.intervals >= 24]
     assert len(fine) >= 3
     slope = np.polyfit(
@@ -142,8 +140,8 @@ def test_the_error_of_the_cost_falls_with_the_order_of_the_scheme(
     assert -slope == pytest.approx(fine[0].order, abs=0.3)
 
 
-def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) -> None:
-    assert reach.methods == FEW
+def test_every_run_has_valid_times_and_repeats(reach: Diagram) -> None:
+    assert reach.methods == SCHEMES
     assert reach.complete
     for each in reach.runs:
         assert each.intervals in INTERVALS
@@ -156,7 +154,7 @@ def test_every_run_solves_the_same_motion_and_says_what_it_took(reach: Diagram) 
     assert finest.cost == pytest.approx(reach.resolved.cost, rel=1e-11)
 
 
-def test_what_a_tolerance_chooses_is_within_it(reach: Diagram) -> None:
+def test_choices_meet_their_tolerance(reach: Diagram) -> None:
     assert [choice.tolerance for choice in reach.choices] == [1e-3, 1e-5, 1e-7, 1e-9]
     for choice in reach.choices:
         assert choice.success
@@ -166,14 +164,14 @@ def test_what_a_tolerance_chooses_is_within_it(reach: Diagram) -> None:
         assert choice.intervals >= 1
 
 
-def test_a_goal_of_a_frame_has_a_diagram_too(arm_scene: Scene) -> None:
+def test_a_frame_goal_has_a_diagram(arm_scene: Scene) -> None:
     goal = FrameGoal(arm_scene.robot.tip_frame, position=(1.5, 0.0, 1.0))
     task = Task(arm_scene, State(paper_arm.HANG), goal, 1.0, PlanOptions(limits="none"))
     diagram = work_precision(task, schemes=["galerkin-3"], repeats=1, budget=10.0)
     assert min(run.error.cost for run in diagram.runs) < 1e-9
 
 
-def test_an_error_that_is_small_by_luck_promises_nothing(reach: Diagram) -> None:
+def test_an_error_counts_only_if_finer_grids_keep_it(reach: Diagram) -> None:
     lucky = run("a", 8, 1e-9, 1.0)
     diagram = diagram_of(reach, lucky, run("a", 16, 1e-5, 2.0), run("a", 32, 1e-7, 3.0))
     assert [error for _, error in diagram.kept("a")] == [1e-5, 1e-5, 1e-7]
@@ -183,15 +181,15 @@ def test_an_error_that_is_small_by_luck_promises_nothing(reach: Diagram) -> None
     assert diagram.cheapest(1e-8) is None
 
 
-def test_the_front_holds_what_nobody_beats_in_both_time_and_error(reach: Diagram) -> None:
+def test_the_front_is_the_pareto_front_of_valid_runs(reach: Diagram) -> None:
     fast, accurate = run("a", 8, 1e-3, 1.0), run("b", 8, 1e-6, 2.0)
-    beaten, astray = run("c", 8, 1e-4, 3.0), run("d", 8, 0.0, 0.1, joints=2.0)
-    assert not astray.counts
-    assert diagram_of(reach, fast, accurate, beaten, astray).front() == (fast, accurate)
+    beaten, wrong_minimum = run("c", 8, 1e-4, 3.0), run("d", 8, 0.0, 0.1, joints=2.0)
+    assert not wrong_minimum.counts
+    assert diagram_of(reach, fast, accurate, beaten, wrong_minimum).front() == (fast, accurate)
 
 
-class Pretended(Method):
-    """Errors of order 4 against a motion of cost 1, and times that it claims."""
+class FakeMethod(Method):
+    """A method with errors N^-4 against a motion of cost 1, and times proportional to N."""
 
     order = 4
 
@@ -220,42 +218,42 @@ def measured(pendulum: Robot, budget: float, *methods: Method) -> Any:
     return measure(methods, reference, Budget(budget), lambda text, fraction: None)
 
 
-def test_a_method_that_refuses_a_grid_keeps_its_runs_and_is_named(pendulum: Robot) -> None:
-    found = measured(pendulum, 1e6, Pretended("short", 1e-9))
+def test_a_method_that_raises_on_a_grid_keeps_its_runs_and_is_noted(pendulum: Robot) -> None:
+    found = measured(pendulum, 1e6, FakeMethod("short", 1e-9))
     assert max(run.intervals for run in found.runs) == 64
     assert found.notes == ("short: it has no more than 64 intervals.",)
 
 
-def test_a_solve_that_would_take_a_tenth_of_the_budget_is_the_last_of_its_method(
+def test_a_solve_of_a_tenth_of_the_budget_is_the_last_of_its_method(
     pendulum: Robot,
 ) -> None:
-    slow = Pretended("slow", 1.0)  # one second per interval
+    slow = FakeMethod("slow", 1.0)  # one second per interval
     found = measured(pendulum, 100.0, slow)
     assert [run.intervals for run in found.runs] == [4, 6, 8, 12]
     assert [len(run.repeats) for run in found.runs] == [2, 1, 1, 1]  # until they take 5 s
     assert slow.solves == 4 + 5
 
 
-def test_a_method_that_one_of_its_family_beats_by_far_stops_climbing(pendulum: Robot) -> None:
-    found = measured(pendulum, 1e9, Pretended("fast", 1.0), Pretended("slow", 40.0))
+def test_a_dominated_method_is_not_refined(pendulum: Robot) -> None:
+    found = measured(pendulum, 1e9, FakeMethod("fast", 1.0), FakeMethod("slow", 40.0))
     assert max(run.intervals for run in found.runs if run.method == "fast") == 64
     assert [run.intervals for run in found.runs if run.method == "slow"] == [4]
 
 
-def test_the_processor_clock_stands_still_while_a_process_waits() -> None:
+def test_processor_time_excludes_waiting_and_includes_children() -> None:
     watch = Stopwatch("processor")
     time.sleep(0.3)
     assert watch.seconds < 0.2
     subprocess.run([sys.executable, "-c", "sum(range(5_000_000))"], check=True)
-    assert watch.seconds > 0.01  # a child's work counts
+    assert watch.seconds > 0.01  # a child process counts
 
 
-def test_a_budget_of_nothing_is_refused() -> None:
+def test_a_budget_of_zero_raises() -> None:
     with pytest.raises(InputError, match="positive number of seconds, not 0"):
         Budget(0.0)
 
 
-def test_the_picture_has_a_curve_for_every_scheme(reach: Diagram) -> None:
+def test_the_figure_has_a_curve_for_every_scheme(reach: Diagram) -> None:
     figure = work_precision_figure(reach)
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend[:3] == [
@@ -270,7 +268,7 @@ def test_the_picture_has_a_curve_for_every_scheme(reach: Diagram) -> None:
     assert all(ax.get_yscale() == "log" for ax in figure.axes)
 
 
-def test_stars_that_coincide_have_one_label(reach: Diagram) -> None:
+def test_coincident_stars_share_one_label(reach: Diagram) -> None:
     errors = (1e-3, 1.1e-3, 1e-6, 1e-9)
     chosen = tuple(
         dataclasses.replace(choice, error=dataclasses.replace(choice.error, cost=error))
@@ -289,7 +287,7 @@ def test_the_csv_has_a_line_per_run(reach: Diagram) -> None:
         assert float(row["setup_seconds"]) == each.setup_seconds
 
 
-def test_the_command_writes_a_picture_and_both_tables(
+def test_the_command_writes_a_figure_and_both_tables(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["accuracy", "two_link_reach", "--budget", "3", "--out", str(tmp_path / "new")]
@@ -302,7 +300,7 @@ def test_the_command_writes_a_picture_and_both_tables(
     assert any("cost" in run["front"] for run in found["runs"])
 
 
-def test_a_scene_with_limits_says_that_the_diagram_leaves_them_out() -> None:
+def test_a_diagram_notes_that_limits_are_left_out() -> None:
     task = load_task(example("ur5_reach_limited"))
     diagram = work_precision(task, schemes=["galerkin-5"], budget=5.0, repeats=1)
     assert any("has limits" in note for note in diagram.notes)
@@ -318,7 +316,7 @@ def test_a_scene_with_limits_says_that_the_diagram_leaves_them_out() -> None:
         (["--peer", "drak=python"], "did you mean 'drake'"),
     ],
 )
-def test_misuse_is_one_sentence(
+def test_invalid_options_are_refused(
     arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["accuracy", "two_link_reach", *arguments]) == 2

@@ -1,4 +1,4 @@
-"""Work-precision diagrams: what each further digit costs in time, scheme by scheme."""
+"""Work-precision diagrams: error against computing time, scheme by scheme."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ __all__ = [
 ]
 
 
-def _replaced(name: str) -> Any:
-    """`MotionError`, which was a class of its own here; its name goes with the next version."""
+def _deprecated(name: str) -> Any:
+    """The deprecated name `MotionError`, to be removed in the next version."""
     if name != "MotionError":
         raise AttributeError(f"module 'hovi.accuracy' has no attribute {name!r}")
     from hovi.discrete.motion_error import MotionError
 
     warnings.warn(
-        "hovi.accuracy.MotionError is hovi.MotionError, with the tip in metres; what "
-        "work_precision(enough=) takes is hovi.accuracy.Thresholds.",
+        "hovi.accuracy.MotionError is now hovi.MotionError, with the tip in metres; pass "
+        "hovi.accuracy.Thresholds to work_precision(enough=).",
         DeprecationWarning,
         stacklevel=2,
     )
     return MotionError
 
 
-if not TYPE_CHECKING:  # or every misspelt name would pass the type checker
-    __getattr__ = _replaced
+if not TYPE_CHECKING:  # otherwise the type checker accepts every misspelt name
+    __getattr__ = _deprecated

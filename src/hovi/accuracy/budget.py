@@ -1,4 +1,4 @@
-"""A budget of wall time, kept by starting nothing that is expected to overrun it."""
+"""A wall-time budget: work that is expected to exceed it is not started."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from hovi.system.interruption import raise_if_interrupted
 
 
 class Budget:
-    """Wall time from when it was made.
+    """A wall-time budget that starts at construction.
 
-    seconds: all of it, positive. Raises InputError otherwise.
+    seconds: its length, positive, in [s]. Raises InputError otherwise.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -22,23 +22,23 @@ class Budget:
 
     @property
     def spent(self) -> float:
-        """Time since it began, in [s]."""
+        """Time since construction, in [s]."""
         return time.monotonic() - self._began
 
     @property
     def left(self) -> float:
-        """Time until it ends, at least 0, in [s]."""
+        """Remaining time, at least 0, in [s]."""
         return max(self.seconds - self.spent, 0.0)
 
     @property
     def fraction(self) -> float:
-        """Share that is spent, at most 1."""
+        """Fraction of the budget that is spent, at most 1."""
         return min(self.spent / self.seconds, 1.0)
 
     def allows(self, seconds: float, share: float = 1.0) -> bool:
-        """Whether work of such a length ends before `share` of it is spent.
+        """Whether work of this length, in [s], ends within `share` of the budget.
 
-        Raises KeyboardInterrupt where a person ended the work before it.
+        Raises KeyboardInterrupt after an interrupt.
         """
         raise_if_interrupted()
         return self.spent + seconds <= share * self.seconds

@@ -1,4 +1,4 @@
-"""The work-precision diagram of a scene: what each further digit costs, as typed records."""
+"""The work-precision diagram of a scene as a record of runs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from hovi.accuracy.tolerance_method import Choice
 class Diagram:
     """Runs of several methods on one scene, from one guess, on one machine.
 
-    scene: its name. guess: "near" or "cubic". resolved: what errors are against.
+    scene: its name. guess: "near" or "cubic". resolved: the motion that errors refer to.
     runs: by method, then by intervals. choices: of `plan(tolerance=)`, ascending in accuracy.
-    notes: sentences on what was left out. complete: False where the time budget ended it.
-    seconds: what measuring took. clock: "wall" or "processor", by which solves were timed.
+    notes: sentences on what was left out. complete: False if the time budget ran out.
+    seconds: duration of the measurement. clock: "wall" or "processor", used to time solves.
     """
 
     scene: str
@@ -34,18 +34,18 @@ class Diagram:
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Names of the methods, in their order."""
+        """Names of the methods, in the order of the runs."""
         return tuple(dict.fromkeys(run.method for run in self.runs))
 
     def of(self, method: str) -> tuple[Run, ...]:
-        """The runs of one method by intervals."""
+        """The runs of one method, by intervals."""
         return tuple(run for run in self.runs if run.method == method)
 
     def kept(self, method: str, measure: str = "cost") -> tuple[tuple[Run, float], ...]:
-        """The runs of a method that count, each with the largest error of it and all finer ones.
+        """The valid runs of a method, each with the largest error on its grid and all finer grids.
 
-        An error that is small by luck, and grows again on the next grid, promises nothing.
-        measure: in MEASURES, with its unit there.
+        So an error that is small by coincidence on one grid does not count.
+        measure: in MEASURES, which has the units.
         """
         worst, pairs = 0.0, []
         for run in reversed([run for run in self.of(method) if run.counts]):
@@ -60,17 +60,17 @@ class Diagram:
         among: Callable[[Run], bool] = lambda run: True,
         time: Callable[[Run], float] = lambda run: run.seconds,
     ) -> Run | None:
-        """The run of least time whose error, kept on all finer grids, is within a tolerance.
+        """The fastest run whose error, see `kept`, is within a tolerance; None if there is none.
 
-        among: which runs may be taken. time: in [s]. None where no run is so accurate.
+        among: runs to consider. time: of a run, in [s].
         """
-        enough = [
+        accurate = [
             run
             for method in self.methods
             for run, error in self.kept(method, measure)
             if error <= tolerance and among(run)
         ]
-        return min(enough, key=time, default=None)
+        return min(accurate, key=time, default=None)
 
     def front(
         self,
@@ -78,7 +78,7 @@ class Diagram:
         among: Callable[[Run], bool] = lambda run: True,
         time: Callable[[Run], float] = lambda run: run.seconds,
     ) -> tuple[Run, ...]:
-        """The runs that no other one beats in both time and kept error, the fastest first."""
+        """The Pareto front of time and error, see `kept`, fastest first."""
         pairs = [pair for method in self.methods for pair in self.kept(method, measure)]
         front, least = [], float("inf")
         for run, error in sorted(pairs, key=lambda pair: (time(pair[0]), pair[1])):
@@ -88,11 +88,11 @@ class Diagram:
         return tuple(front)
 
     def with_notes(self, *notes: str) -> Diagram:
-        """The diagram with more sentences."""
+        """The diagram with these notes appended."""
         return replace(self, notes=(*self.notes, *notes))
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it, errors of the tip in [mm]."""
+        """The JSON form, with tip errors in [mm]."""
         front = {measure: {id(run) for run in self.front(measure)} for measure in MEASURES}
         return {
             "scene": self.scene,

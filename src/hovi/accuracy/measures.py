@@ -1,4 +1,4 @@
-"""The numbers by which a work-precision diagram judges a motion, and thresholds for them."""
+"""The error measures of a work-precision diagram, and thresholds for them."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ _SIZES: dict[str, Callable[[MotionError], float]] = {
     "tip": lambda error: error.largest_tip,
 }
 MEASURES = tuple(_SIZES)
-"""Relative in the cost; of all joints, in [rad] or [m]; of the tip, in [m]."""
-_SHOWN = {"cost": 1.0, "joints": 1.0, "tip": 1e3}
+"""cost: relative; joints: largest of all joints, in [rad] or [m]; tip: in [m]."""
+_DISPLAY_SCALE = {"cost": 1.0, "joints": 1.0, "tip": 1e3}
 
 
 def size(error: MotionError, measure: str) -> float:
-    """The largest error over the whole motion. measure: in MEASURES, with their units."""
+    """The largest error over the whole motion, in the unit of MEASURES."""
     return _SIZES[measure](error)
 
 
 def shown_size(error: MotionError, measure: str) -> float:
-    """The same as people and files are shown it: of the tip in [mm]."""
-    return _SHOWN[measure] * size(error, measure)
+    """The error as displayed and written to files: that of the tip in [mm]."""
+    return _DISPLAY_SCALE[measure] * size(error, measure)
 
 
 def shown_sizes(error: MotionError) -> dict[str, float]:
-    """All of them as JSON holds them, by MEASURES: of the tip in [mm]."""
+    """All errors by MEASURES as written to JSON: that of the tip in [mm]."""
     return {measure: shown_size(error, measure) for measure in MEASURES}
 
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Errors that are small enough.
+    """Upper bounds of errors.
 
     cost: relative. joints: of every joint, in [rad] or [m]. tip: of the tip frame, in [m].
     """
@@ -44,5 +44,5 @@ class Thresholds:
     tip: float
 
     def met_by(self, error: MotionError) -> bool:
-        """Whether none of the errors is larger."""
+        """Whether no error exceeds its threshold."""
         return all(size(error, measure) <= getattr(self, measure) for measure in MEASURES)

@@ -1,4 +1,4 @@
-"""Measuring: methods on finer and finer grids, then again and again, within a time budget."""
+"""Measurement of methods on a sequence of grids, with repeats, within a time budget."""
 
 from __future__ import annotations
 
@@ -14,33 +14,34 @@ from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
 
 Progress = Callable[[str, float], None]
-"""Called with a line of text and the fraction done."""
+"""Called with a line of text and the fraction of the budget spent."""
 
 INTERVALS = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
-"""Numbers of intervals, from 4 on, each about 1.4 times the last."""
-ENOUGH = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
-"""Errors below which finer grids would measure rounding."""
+"""Numbers of intervals: 4, 6, 8, 12, 16, ..."""
+SUFFICIENT_ERRORS = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
+"""Errors below which finer grids only show rounding."""
 REPEATS = 7
-"""Solves by which a time is judged, after the first."""
-FIRST_SOLVES = 0.7
-"""Share of the budget in which first solves may start."""
-SLOWEST = 0.1
-"""Share of the budget that one solve may take, and about what its repeats may take."""
-DOMINATED = 15.0
-"""A method stops where one of its family was more accurate in so many times less time."""
-_GROWTH = 2.0  # of time from one number of intervals to the next, at most
+"""Timed solves of a run after the first."""
+FIRST_SOLVES_SHARE = 0.7
+"""Fraction of the budget for first solves."""
+MAX_SOLVE_SHARE = 0.1
+"""A method stops after a first solve longer than this fraction of the budget; a run is no longer
+repeated when its repeats have taken half of it."""
+DOMINANCE = 15.0
+"""A method stops when one of its family was at least as accurate in this many times less time."""
+_MAX_TIME_RATIO = 2.0  # assumed from one grid to the next finer one
 
 
 Solved = list[tuple[Prepared, Run]]
-"""What a method has solved, by number of intervals."""
+"""The prepared grids and runs of a method, by number of intervals."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What came of measuring.
+    """The result of a measurement.
 
-    runs: by method, then by intervals. complete: whether every method reached what is enough.
-    notes: why methods dropped out.
+    runs: by method, then by intervals. complete: whether no method ran out of time.
+    notes: why methods were stopped.
     """
 
     runs: tuple[Run, ...]
@@ -55,28 +56,28 @@ def measure(
     progress: Progress,
     share: float = 1.0,
     repeats: int = REPEATS,
-    enough: Thresholds = ENOUGH,
+    enough: Thresholds = SUFFICIENT_ERRORS,
 ) -> Measured:
-    """Every method on finer and finer grids, until it is exact or its time is up.
+    """Run every method on finer and finer grids until its errors are small or its time is up.
 
-    First solves come first; each method may take an equal part of what is left for them. The
-    repeats follow in rounds over all runs, so that a busy moment of the machine meets all alike.
+    First solves share their part of the budget evenly among the methods. The repeats follow in
+    rounds over all runs, so that other load on the machine affects all runs alike.
 
-    budget: of which `share` may be spent. repeats: of every run that counts.
-    enough: errors at which a method need not become finer.
+    budget: of which `share` may be spent. repeats: of every valid run.
+    enough: errors below which no finer grid is tried.
     """
     all_solved: list[Solved] = []
     notes, complete = [], True
     for number, method in enumerate(methods):
-        part = (FIRST_SOLVES * share - budget.fraction) / (len(methods) - number)
+        part = (FIRST_SOLVES_SHARE * share - budget.fraction) / (len(methods) - number)
         solved: Solved = []
         all_solved.append(solved)
         progress(method.name, budget.fraction)
         try:
             ended = _refine(method, all_solved, reference, budget, budget.fraction + part, enough)
             complete = complete and ended
-        except UnmeasurableError as refused:
-            notes.append(f"{method.name}: {refused}")
+        except UnmeasurableError as error:
+            notes.append(f"{method.name}: {error}")
     _repeat(all_solved, budget, progress, share, repeats)
     runs = tuple(run for solved in all_solved for _, run in solved)
     return Measured(runs, complete, tuple(notes))
@@ -90,10 +91,9 @@ def _refine(
     share: float,
     enough: Thresholds,
 ) -> bool:
-    """Finer and finer grids, as long as the next one is worth its time.
+    """Run one method on finer and finer grids; returns False if its time ran out.
 
-    all_solved: of all methods so far, of which the last is this one's. Returns whether it ended
-    for another reason than time.
+    all_solved: runs of all methods so far; those of this method are the last entry.
     """
     expected = 0.0
     for intervals in [each for each in INTERVALS if each >= method.coarsest]:
@@ -101,29 +101,28 @@ def _refine(
             return False
         watch = Stopwatch()
         prepared = method.prepare(intervals)
-        run = _first(method, intervals, prepared, reference)
+        run = _first_run(method, intervals, prepared, reference)
         all_solved[-1].append((prepared, run))
-        slow = run.first_seconds > SLOWEST * budget.seconds
+        slow = run.first_seconds > MAX_SOLVE_SHARE * budget.seconds
         if slow or enough.met_by(run.error) or _dominated(run, all_solved):
             break
-        expected = _GROWTH * watch.seconds
+        expected = _MAX_TIME_RATIO * watch.seconds
     return True
 
 
 def _dominated(run: Run, all_solved: list[Solved]) -> bool:
-    """Whether finer grids of a method have no hope of being worth their time.
-
-    A run that went astray says nothing of them.
-    """
+    """Whether a valid run of the same family was as accurate and much faster."""
     runs = (other for solved in all_solved for _, other in solved)
     others = [other for other in runs if other.family == run.family and other.counts]
     return run.counts and any(
-        other.error.cost <= run.error.cost and DOMINATED * other.first_seconds <= run.first_seconds
+        other.error.cost <= run.error.cost and DOMINANCE * other.first_seconds <= run.first_seconds
         for other in others
     )
 
 
-def _first(method: Method, intervals: int, prepared: Prepared, reference: ReferenceMotion) -> Run:
+def _first_run(
+    method: Method, intervals: int, prepared: Prepared, reference: ReferenceMotion
+) -> Run:
     answer = prepared.solve()
     return Run(
         method=method.name,
@@ -143,12 +142,12 @@ def _first(method: Method, intervals: int, prepared: Prepared, reference: Refere
 def _repeat(
     all_solved: list[Solved], budget: Budget, progress: Progress, share: float, repeats: int
 ) -> None:
-    """Rounds over all runs that count, as many as the budget allows."""
+    """Repeat all valid runs in rounds, as often as the budget allows."""
     for number in range(repeats):
         for solved in all_solved:
             for i, (prepared, run) in enumerate(solved):
-                often = sum(run.repeats) > SLOWEST * budget.seconds / 2
-                if not run.counts or often or not budget.allows(run.first_seconds, share):
+                enough = sum(run.repeats) > MAX_SOLVE_SHARE * budget.seconds / 2
+                if not run.counts or enough or not budget.allows(run.first_seconds, share):
                     continue
                 progress(f"repeat {number + 1} of {repeats}, {run.method}", budget.fraction)
                 seconds = (*run.repeats, prepared.solve().seconds)

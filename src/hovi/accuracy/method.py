@@ -1,4 +1,4 @@
-"""A method: something that plans the scene's motion with a number of intervals, and is timed."""
+"""The interface of a timed planning method."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from hovi.accuracy.reference_motion import Configurations
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One solve.
+    """The result of one solve.
 
-    success: whether the method says that it found a minimum. message: what it says.
+    success: whether the method reports a minimum. message: its own.
     cost: 1/2 integral |tau|^2 as the method computes it.
     configurations: the motion, by the method's own interpolant.
-    steps: iterations. seconds: wall time of this solve alone.
+    steps: iterations. seconds: time of this solve alone, by the clock of the diagram.
     """
 
     success: bool
@@ -31,10 +31,10 @@ class Answer:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A method that has built all it needs for one grid.
+    """A method set up for one grid.
 
-    solve: plans the motion from the guess, every time in the same way.
-    seconds: wall time of building, without that of sampling the guess.
+    solve: plans the motion from the guess, identically on every call.
+    seconds: setup time, without sampling the guess.
     """
 
     solve: Callable[[], Answer]
@@ -42,10 +42,10 @@ class Prepared:
 
 
 class Method(ABC):
-    """Plans one problem from one guess, on grids of any number of intervals.
+    """A planning method for one problem and guess, on uniform grids.
 
-    name: as tables and legends call it. family: what it shares a color with. order: of the cost
-    in the step length; None where there is none to state. coarsest: intervals to begin with.
+    name: in tables and legends. family: methods drawn in one color. order: convergence order of
+    the cost in the step length; None if unknown. coarsest: smallest number of intervals.
     """
 
     name: str
@@ -55,28 +55,27 @@ class Method(ABC):
 
     @abstractmethod
     def prepare(self, intervals: int) -> Prepared:
-        """Build everything for N equal intervals.
+        """Set up the method for N equal intervals.
 
-        intervals: N >= 2. Raises UnmeasurableError when the method cannot do it.
+        intervals: N >= 2. Raises UnmeasurableError when the method does not support them.
         """
 
     def close(self) -> None:
-        """Give back what the method holds."""
+        """Release the method's resources."""
 
 
 def processor_time() -> float:
-    """Processor time of this process and of the children that it has waited for, in [s]."""
+    """Processor time of this process and of its terminated child processes, in [s]."""
     spent = os.times()
     return time.process_time() + spent.children_user + spent.children_system
 
 
 CLOCKS: dict[str, Callable[[], float]] = {"wall": time.perf_counter, "processor": processor_time}
-"""By wall time one sees what one waits for; by processor time, what a busy machine would take if
-nobody else used it."""
+"""Wall time, and processor time, which depends less on other load."""
 
 
 class Stopwatch:
-    """Time since it was made, in [s].
+    """A stopwatch that starts at construction.
 
     clock: in CLOCKS.
     """
@@ -87,5 +86,5 @@ class Stopwatch:
 
     @property
     def seconds(self) -> float:
-        """Time that has passed."""
+        """Elapsed time, in [s]."""
         return self._now() - self._began

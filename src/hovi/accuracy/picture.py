@@ -14,17 +14,17 @@ from hovi.accuracy import MEASURES, Diagram, Run
 from hovi.accuracy.measures import shown_size
 from hovi.viewing.figures import write_figure
 
-OWN = "hovi"
+OWN_FAMILY = "hovi"
 _LABELS = {
     "cost": "error of the cost, relative",
     "joints": "largest error of a joint [rad]",
     "tip": "largest error of the tip [mm]",
 }
-_PEERS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a")
+_PEER_COLORS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a")
 _MILLISECONDS = 1e3
-_LEAST = 1e-16  # what stands for an error of zero
-_ONE_HEIGHT = 0.3  # decades of the error within which stars coincide
-_MARKS = "osD^vP*X<>"
+_ERROR_FLOOR = 1e-16  # drawn for smaller errors
+_COINCIDENT_DECADES = 0.3  # errors closer than this, in decades, share one label
+_MARKERS = "osD^vP*X<>"
 
 Time = Callable[[Run], float]
 
@@ -37,14 +37,13 @@ def plot_work_precision(
 
 
 def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
-    """Three panels over the time of a solve when warm, one over building and the first solve.
+    """Three panels over the time of a warm solve, one over setup and first solve.
 
-    One curve per scheme, a point per number of intervals; of each family of reference
-    tools all points, and a curve through those that none of the family beats. The cheapest
-    front is shaded, and what `plan(tolerance=)` chose is a star.
+    One curve per scheme of hovi, with a point per number of intervals. For each family of reference
+    tools, all points and their Pareto front. The Pareto front of all runs is shaded; the choices of
+    `plan(tolerance=)` are stars.
 
-    fastest: show the fastest of the repeats instead of their median, for a machine that is busy
-        with other work.
+    fastest: show the fastest repeat instead of the median, for a machine under other load.
     """
     warm = _fastest if fastest else _median
     figure = Figure(figsize=(11.0, 8.6), layout="constrained")
@@ -53,9 +52,9 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
         _panel(ax, diagram, measure, warm)
         _front(ax, diagram, measure, warm)
         _choices(ax, diagram, measure, fastest)
-        ax.set_xlabel("one solve, warm [ms]")
+        ax.set_xlabel("warm solve [ms]")
     _panel(panels[1, 1], diagram, "cost", _cold)
-    panels[1, 1].set_xlabel("building and the first solve [ms]")
+    panels[1, 1].set_xlabel("setup and first solve [ms]")
     handles, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(_title(diagram), fontsize="medium")
@@ -77,12 +76,14 @@ def _cold(run: Run) -> float:
 def _title(diagram: Diagram) -> str:
     start = {"near": "a guess near the motion", "cubic": "the cubic guess"}[diagram.guess]
     clock = "" if diagram.clock == "wall" else ", in processor time"
-    return f"{diagram.scene}: what accuracy costs, from {start}{clock}"
+    return f"{diagram.scene}: error against time, from {start}{clock}"
 
 
 def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     families = dict.fromkeys(run.family for run in diagram.runs)
-    for color, family in zip(_PEERS * 9, [f for f in families if f != OWN], strict=False):
+    for color, family in zip(
+        _PEER_COLORS * 9, [f for f in families if f != OWN_FAMILY], strict=False
+    ):
         _peer_family(ax, diagram, family, measure, time, color)
     _own_schemes(ax, diagram, measure, time)
     ax.set_xscale("log")
@@ -93,14 +94,14 @@ def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
 
 
 def _own_schemes(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
-    own = dict.fromkeys(run.method for run in diagram.runs if run.family == OWN)
+    own = dict.fromkeys(run.method for run in diagram.runs if run.family == OWN_FAMILY)
     shades = matplotlib.colormaps["viridis"]
     for i, name in enumerate(own):
         runs = [run for run in diagram.of(name) if run.counts]
         x, y = _points(runs, measure, time)
         order = next((f", order {run.order}" for run in runs if run.order), "")
         (line,) = ax.plot(x, y, linewidth=1.3, label=f"{name}{order}")
-        line.set(color=shades(0.92 * i / max(len(own) - 1, 1)), marker=_MARKS[i % 10], ms=4)
+        line.set(color=shades(0.92 * i / max(len(own) - 1, 1)), marker=_MARKERS[i % 10], ms=4)
 
 
 def _peer_family(
@@ -120,23 +121,23 @@ def _front(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
 
 
 def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
-    """A star per tolerance, with the tolerance beside it where it is of the cost."""
+    """Draw a star per tolerance, labelled in the panel of the cost."""
     chosen = diagram.choices
     x = [_MILLISECONDS * (c.best_seconds if fastest else c.seconds) for c in chosen]
-    y = [max(shown_size(choice.error, measure), _LEAST) for choice in chosen]
-    look = {"linestyle": "none", "marker": "*", "markersize": 12.0, "zorder": 9.0}
+    y = [max(shown_size(choice.error, measure), _ERROR_FLOOR) for choice in chosen]
+    style = {"linestyle": "none", "marker": "*", "markersize": 12.0, "zorder": 9.0}
     if chosen:
         (stars,) = ax.plot(x, y, color="#d00000", label="chosen by a tolerance")
-        stars.set(**look)
+        stars.set(**style)
     if measure == "cost":
-        _name_tolerances(ax, diagram, x, y)
+        _label_tolerances(ax, diagram, x, y)
 
 
-def _name_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]) -> None:
-    """The tolerance beside its star, or from the first to the last of stars at one height."""
+def _label_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]) -> None:
+    """Write the tolerance beside each star; stars of nearly equal error share one label."""
     groups: list[list[int]] = []
     for i, error in enumerate(y):
-        if groups and abs(math.log10(error / y[groups[-1][0]])) < _ONE_HEIGHT:
+        if groups and abs(math.log10(error / y[groups[-1][0]])) < _COINCIDENT_DECADES:
             groups[-1].append(i)
         else:
             groups.append([i])
@@ -154,4 +155,4 @@ def _name_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float])
 
 def _points(runs: Sequence[Run], measure: str, time: Time) -> tuple[list[float], list[float]]:
     x = [_MILLISECONDS * time(run) for run in runs]
-    return x, [max(shown_size(run.error, measure), _LEAST) for run in runs]
+    return x, [max(shown_size(run.error, measure), _ERROR_FLOOR) for run in runs]

@@ -1,4 +1,4 @@
-"""The motion that others are measured against, and how far they are from it."""
+"""The reference motion of a diagram, and the errors of other motions."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ Configurations = Callable[[Array], Array]
 """Times (M,) in [s] -> configurations (M, nq)."""
 
 SAMPLES = 1009
-"""Times at which motions are compared: a prime, so that they fall on all places of intervals."""
+"""Number of times at which motions are compared: prime, so that they do not align with any grid."""
 _SHIFT = 0.382
 
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:
-    """A motion that others are measured against, sampled once.
+    """A motion whose samples are the reference for errors.
 
-    robot: what moves; its `tip_frame` is the tip.
+    robot: the robot; its `tip_frame` is the tip.
     duration: T, in [s].
-    configurations: the motion.
+    configurations: times -> configurations of the motion.
     cost: its cost J*, positive.
     """
 
@@ -39,15 +39,15 @@ class ReferenceMotion:
 
     @cached_property
     def times(self) -> Array:
-        """Where motions are compared, shape (SAMPLES,), in [s]."""
+        """Times at which motions are compared, shape (SAMPLES,), in [s]."""
         return np.asarray(self.duration * (np.arange(SAMPLES) + _SHIFT) / SAMPLES)
 
     def error(self, cost: float, configurations: Configurations) -> MotionError:
-        """The error of a motion of the same duration, of which only q(t) is known.
+        """The error of a motion of the same duration, given q(t) only.
 
-        The whole motion is one interval: q has shape (1, nv), tip (1,), and the nodes are its two
-        ends. v and tau are NaN. cost: J as the method computes it; where it is not finite, the
-        errors are infinite.
+        The whole motion counts as one interval: q has shape (1, nv), tip (1,), and the nodes are
+        its two ends. v and tau are NaN. cost: J as computed by the method; if it is not finite,
+        the errors are infinite.
         """
         if not math.isfinite(cost):
             return self._record(math.inf, np.full((3, self.robot.nv), np.inf), np.full(3, np.inf))
@@ -60,7 +60,7 @@ class ReferenceMotion:
         )
 
     def _record(self, cost: float, q: Array, tip: Array) -> MotionError:
-        """From what is largest along the motion and what is at its ends, (3, nv) and (3,)."""
+        """The record of q (3, nv) and tip (3,): largest along the motion, then at its two ends."""
         unknown = np.full((1, self.robot.nv), np.nan)
         return MotionError(
             cost=cost,
@@ -74,10 +74,10 @@ class ReferenceMotion:
             sliding=self.robot.sliding,
         )
 
-    def _distances(self, own: tuple[Array, Array], q: Array) -> tuple[Array, Array]:
-        """|q - q*| of every joint coordinate and the distance of the tips, (M, nv) and (M,)."""
-        tip = np.linalg.norm(self._tip_of(q) - own[1], axis=1)
-        return np.abs(self.robot.difference(own[0], q)), tip
+    def _distances(self, reference: tuple[Array, Array], q: Array) -> tuple[Array, Array]:
+        """|q - q*| per joint coordinate and the distance between the tips, (M, nv) and (M,)."""
+        tip = np.linalg.norm(self._tip_of(q) - reference[1], axis=1)
+        return np.abs(self.robot.difference(reference[0], q)), tip
 
     @property
     def _ends(self) -> Array:

@@ -1,4 +1,4 @@
-"""The motion that methods are measured against: resolved until it stops changing."""
+"""The reference motion of a diagram, refined until it no longer changes."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution, solve
 from hovi.schemes import galerkin
 
-MODES = 8
-"""Inner modes of the resolved motion: more than those of any scheme that is measured by default."""
-COARSEST, FINEST = 16, 1024
-STILL = Thresholds(cost=1e-13, joints=1e-9, tip=1e-9)
-"""Changes below which a doubling of the intervals has changed nothing."""
-TRUSTED = 1e-6
-"""Change of the cost at the last doubling above which there is nothing to measure against."""
+INNER_MODES = 8
+"""Inner modes of the resolved motion: more than any scheme in SCHEMES has."""
+MIN_INTERVALS, MAX_INTERVALS = 16, 1024
+CONVERGED = Thresholds(cost=1e-13, joints=1e-9, tip=1e-9)
+"""Changes by a doubling of the intervals below which the motion is resolved."""
+MAX_COST_CHANGE = 1e-6
+"""Relative change of the cost at the last doubling above which the motion is no reference."""
 
-NO_COST = 1e-12
-"""A cost that is nothing but rounding."""
+COST_FLOOR = 1e-12
+"""Cost below which only rounding is left."""
 
 
 @dataclass(frozen=True, eq=False)
 class ResolvedMotion:
-    """A minimum by `galerkin-8` on so many intervals that half of them give the same.
+    """A minimum of `galerkin-8`, converged under doubling of the intervals.
 
-    trajectory, cost: the motion. uncertainty: what the last doubling of the intervals changed,
-    an upper estimate of its own error.
+    trajectory, cost: the motion. uncertainty: change by the last doubling of the intervals, an
+    upper estimate of the motion's own error.
     """
 
     trajectory: Trajectory = field(repr=False)
@@ -53,44 +53,44 @@ class ResolvedMotion:
 
     @cached_property
     def reference(self) -> ReferenceMotion:
-        """What measures the distance from it."""
+        """The motion as the reference for errors."""
         return _reference(self.trajectory, self.cost)
 
 
 def resolve(
     problem: TrajectoryProblem, found: Solution, expired: Callable[[], bool]
 ) -> ResolvedMotion:
-    """The minimum that a coarse solution stands for.
+    """Refine a coarse solution to the minimum that it approximates.
 
-    problem: on any grid; its limits are left out. found: where to start.
+    problem: on any grid; its limits are ignored. found: the coarse solution.
     expired: whether time is up. Raises UnmeasurableError when no minimum can be resolved.
     """
-    scheme, T = galerkin(MODES), problem.grid.duration
-    intervals, previous = COARSEST, found
+    scheme, T = galerkin(INNER_MODES), problem.grid.duration
+    intervals, previous = MIN_INTERVALS, found
     change = None
     while True:
         grid = Grid.uniform(T, intervals, scheme)
         solution = solve(on_grid(problem, grid), previous.trajectory)
         if not solution.success:
             raise UnmeasurableError(
-                f"no motion to measure against was found with {scheme.name} on {intervals} "
-                f"intervals: {solution.message}"
+                f"no reference motion was found with {scheme.name} on {intervals} intervals: "
+                f"{solution.message}"
             )
-        if intervals > COARSEST:
+        if intervals > MIN_INTERVALS:
             fine = _reference(solution.trajectory, solution.cost)
             change = fine.error(previous.cost, previous.trajectory.configurations)
-            if STILL.met_by(change) or intervals >= FINEST or expired():
+            if CONVERGED.met_by(change) or intervals >= MAX_INTERVALS or expired():
                 break
         previous, intervals = solution, 2 * intervals
-    if abs(solution.cost) < NO_COST:
+    if abs(solution.cost) < COST_FLOOR:
         raise UnmeasurableError(
-            f"the motion costs {solution.cost:.0e}, and errors are relative to its cost; give it "
-            "somewhere to go."
+            f"the cost of the motion is {solution.cost:.0e}, and errors are relative to its cost; "
+            "choose a goal away from the start."
         )
-    if change.cost > TRUSTED:
+    if change.cost > MAX_COST_CHANGE:
         raise UnmeasurableError(
-            f"the motion still changes by {change.cost:.0e} in its cost from {intervals // 2} to "
-            f"{intervals} intervals of {scheme.name}; give it a smoother scene or more time."
+            f"the cost still changes by {change.cost:.0e} from {intervals // 2} to {intervals} "
+            f"intervals of {scheme.name}; use a smoother scene or a larger budget."
         )
     return ResolvedMotion(solution.trajectory, solution.cost, change)
 

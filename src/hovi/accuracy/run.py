@@ -1,4 +1,4 @@
-"""A run: one method on one grid, its error and its times."""
+"""A run: the error and the times of one method on one grid."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Any
 from hovi.accuracy.measures import shown_size, size
 from hovi.discrete.motion_error import MotionError
 
-ASTRAY = 0.1
-"""[rad] or [m] beyond which a motion is taken for another one than that which was looked for."""
+MAX_JOINT_ERROR = 0.1
+"""Joint error in [rad] or [m] beyond which the run found another motion."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one method made of the scene on one grid.
+    """The result of one method on one grid.
 
     method, family, order: see Method. intervals: N.
-    success, message: what the method said. cost: as it computes it. steps: iterations.
+    success, message, cost: as reported by the method. steps: iterations.
     error: against the resolved motion.
-    setup_seconds: building. first_seconds: the first solve. repeats: later solves, one by one.
+    setup_seconds: setup. first_seconds: first solve. repeats: each later solve. All in [s].
     """
 
     method: str
@@ -38,26 +38,26 @@ class Run:
 
     @property
     def counts(self) -> bool:
-        """Whether it found the motion that was looked for: a minimum, and not another one."""
-        return self.success and size(self.error, "joints") <= ASTRAY
+        """Whether the run is valid: it ended in a minimum, close to the resolved motion."""
+        return self.success and size(self.error, "joints") <= MAX_JOINT_ERROR
 
     @property
     def seconds(self) -> float:
-        """A solve when warm: the median of the repeats, or the first where there are none."""
+        """Time of a warm solve: the median of the repeats, or the first if there are none."""
         return statistics.median(self.repeats) if self.repeats else self.first_seconds
 
     @property
     def best_seconds(self) -> float:
-        """The fastest solve: what the machine does when nobody else uses it."""
+        """Time of the fastest solve, which depends least on other load."""
         return min((*self.repeats, self.first_seconds))
 
     @property
     def cold_seconds(self) -> float:
-        """Building and the first solve."""
+        """Time of setup and first solve."""
         return self.setup_seconds + self.first_seconds
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it, times in [s]."""
+        """The JSON form, with times in [s]."""
         return {
             "method": self.method,
             "family": self.family,

@@ -1,4 +1,4 @@
-"""A diagram as rows: for a terminal, for Markdown, for a spreadsheet."""
+"""A diagram as a table, as CSV and as JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ COLUMNS = (
     "cost",
     "joints [rad]",
     "tip [mm]",
-    "building [ms]",
+    "setup [ms]",
     "first [ms]",
     "warm [ms]",
     "steps",
@@ -30,7 +30,7 @@ COLUMNS = (
 def cheapest_rows(
     diagram: Diagram, tolerances: Sequence[float] = TOLERANCES
 ) -> list[tuple[str, ...]]:
-    """What a tolerance costs at least, one row per relative error of the cost: see COLUMNS."""
+    """The fastest run per tolerance of the relative cost error, in COLUMNS."""
     rows = []
     for tolerance in tolerances:
         run = diagram.cheapest(tolerance)
@@ -52,7 +52,7 @@ def _cells(run: Run) -> tuple[str, ...]:
 
 
 def as_csv(diagram: Diagram) -> str:
-    """Every run as one line under a header, times in [s]."""
+    """One line per run below a header, with times in [s]."""
     rows = [run.to_dict() for run in diagram.runs]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, [name for name in rows[0] if name != "repeats"])
@@ -63,5 +63,5 @@ def as_csv(diagram: Diagram) -> str:
 
 
 def as_json(diagram: Diagram) -> str:
-    """The diagram as one JSON object; numbers that are not finite become null."""
+    """The diagram as one JSON object; non-finite numbers become null."""
     return json.dumps(finite(diagram.to_dict()), allow_nan=False)

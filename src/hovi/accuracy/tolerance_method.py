@@ -1,4 +1,4 @@
-"""What a tolerance chooses, measured like any other method."""
+"""Runs of `plan(tolerance=)`, measured like those of other methods."""
 
 from __future__ import annotations
 
@@ -20,16 +20,17 @@ from hovi.planning.refinement.adaptive import first_grid, solve_to_tolerance
 from hovi.planning.solver.solver import Solution
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
+"""Relative tolerances of the cost."""
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What `plan(tolerance=)` chose, with the time that it took and the error that it has.
+    """The scheme and grid chosen by `plan(tolerance=)`, its time and its error.
 
-    tolerance: relative, in the cost. scheme, intervals: of the grid that it ended on.
-    estimate: the error of the cost that it states. error: the true one, and those of the motion.
-    success: whether it says that the tolerance is met. repeats: all solves, coarser grids and
-    estimates included, in [s].
+    tolerance: relative, of the cost. scheme, intervals: of the final grid.
+    estimate: estimated relative error of the cost. error: true errors, against the reference.
+    success: whether the tolerance is reported as met. repeats: time of each run, coarser grids and
+    error estimates included, in [s].
     """
 
     tolerance: float
@@ -42,16 +43,16 @@ class Choice:
 
     @property
     def seconds(self) -> float:
-        """The median of the repeats."""
+        """The median of the repeats, in [s]."""
         return statistics.median(self.repeats)
 
     @property
     def best_seconds(self) -> float:
-        """The fastest of the repeats."""
+        """The fastest of the repeats, in [s]."""
         return min(self.repeats)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON holds it, times in [s], the error of the tip in [mm]."""
+        """The JSON form, with times in [s] and the tip error in [mm]."""
         return {**vars(self), "error": shown_sizes(self.error), "seconds": self.seconds}
 
 
@@ -64,9 +65,9 @@ def choices(
     repeats: int,
     clock: str,
 ) -> tuple[Choice, ...]:
-    """One choice per tolerance in TOLERANCES, as far as the budget allows.
+    """One choice per tolerance in TOLERANCES, as the budget allows.
 
-    problem: on any grid. intervals: of the scene; see first_grid.
+    problem: on any grid. intervals: those of the scene, see `first_grid`.
     clock: in CLOCKS.
     """
     coarse = on_grid(problem, first_grid(problem.grid.duration, intervals))

@@ -26,13 +26,13 @@ SCHEMES = (
     "galerkin-4",
     "galerkin-5",
 )
-"""What a diagram shows unless it is told otherwise."""
+"""Schemes of a diagram by default."""
 
 
 class VariationalMethod(Method):
-    """A scheme, solved by the trust region.
+    """A scheme of hovi, solved by the trust-region method.
 
-    problem: what is planned, on any grid. guess: where every solve starts. scheme: its name.
+    problem: on any grid. guess: of every solve. scheme: its name.
     clock: in CLOCKS.
     """
 
@@ -44,12 +44,12 @@ class VariationalMethod(Method):
         self.name, self.family, self.order = scheme, "hovi", self._scheme.order
 
     def prepare(self, intervals: int) -> Prepared:
-        """Everything from the loaded robot on, as if nothing had been solved before."""
+        """Set up everything after loading the robot, with no cached function."""
         grid = Grid.uniform(self._problem.grid.duration, intervals, self._scheme)
         path = on_grid(self._problem, grid).path(self._guess)
         watch = Stopwatch(self._clock)
-        problem = on_grid(self._problem, grid, anew=True)
-        problem.structure  # noqa: B018 - built here, and not in the first solve
+        problem = on_grid(self._problem, grid, rebuild=True)
+        problem.structure  # noqa: B018 - computed here rather than in the first solve
         seconds = watch.seconds
 
         def run() -> Answer:
@@ -57,20 +57,20 @@ class VariationalMethod(Method):
             found = solve(problem, path)
             seconds = watch.seconds
             cost = found.cost if np.isfinite(found.cost) else float("inf")
-            where = found.trajectory.configurations
-            return Answer(found.success, found.message, cost, where, found.nit, seconds)
+            motion = found.trajectory.configurations
+            return Answer(found.success, found.message, cost, motion, found.nit, seconds)
 
         return Prepared(run, seconds)
 
 
-def on_grid(problem: TrajectoryProblem, grid: Grid, anew: bool = False) -> TrajectoryProblem:
+def on_grid(problem: TrajectoryProblem, grid: Grid, rebuild: bool = False) -> TrajectoryProblem:
     """The problem on another grid, without its limits.
 
-    anew: with all of its functions built again.
+    rebuild: build all of its functions again.
     """
     lagrangian = problem.ld.lagrangian
-    if anew:
+    if rebuild:
         assert isinstance(lagrangian, EffortLagrangian)
-        scene = copy.copy(problem.scene)  # which leaves behind what is cached
+        scene = copy.copy(problem.scene)  # without the cached functions
         lagrangian = scene.effort_lagrangian(lagrangian.weight)
     return dataclasses.replace(problem, ld=DiscreteLagrangian(lagrangian, grid), limits=None)

@@ -1,4 +1,4 @@
-"""work_precision: what each further digit costs on a scene, on this machine."""
+"""`work_precision`: measure the work-precision diagram of a scene."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
-from hovi.accuracy.guess_motion import NEARER, guess_curve
+from hovi.accuracy.guess_motion import NEARER_RESOLVED_SHARE, guess_curve
 from hovi.accuracy.measures import Thresholds
-from hovi.accuracy.measuring import ENOUGH, REPEATS, SLOWEST, Progress, measure
+from hovi.accuracy.measuring import MAX_SOLVE_SHARE, REPEATS, SUFFICIENT_ERRORS, Progress, measure
 from hovi.accuracy.method import CLOCKS, Method
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.tolerance_method import choices
@@ -22,19 +22,20 @@ from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
 from hovi.system.interruption import interruptible, raise_if_interrupted
 
-SEARCHING = 0.3
-"""Share of the budget in which the motion may be found and resolved."""
-MEASURING = 0.9
-"""Share of the budget in which methods are measured; tolerances may choose in what is left."""
+PLANNING_SHARE = 0.3
+"""Fraction of the budget for planning and resolving the motion."""
+MEASURING_SHARE = 0.9
+"""Fraction of the budget after which methods are no longer measured; the rest is for
+`plan(tolerance=)`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What all methods have in common.
+    """The problem, guess and time limits shared by all methods.
 
-    problem: on the grid of the resolved motion. guess: where every solve starts. nearer: a guess
-    that is ten times nearer, for a method that would end in other minima otherwise.
-    longest: what one solve may take, in [s]. clock: in CLOCKS.
+    problem: on the grid of the resolved motion. guess: of every solve. nearer: a guess ten times
+    nearer, for methods that otherwise converge to other minima.
+    longest: time limit of one solve, in [s]. clock: in CLOCKS.
     """
 
     problem: TrajectoryProblem
@@ -45,7 +46,7 @@ class Setting:
 
 
 Peer = Callable[[Setting], Method]
-"""What makes a reference tool's method for a setting. Raises UnmeasurableError if it cannot."""
+"""Creates the method of a reference tool. Raises UnmeasurableError for unsupported settings."""
 
 
 @interruptible
@@ -58,32 +59,32 @@ def work_precision(
     budget: float = 60.0,
     repeats: int = REPEATS,
     clock: str = "wall",
-    enough: Thresholds = ENOUGH,
+    enough: Thresholds = SUFFICIENT_ERRORS,
     progress: Progress | None = None,
 ) -> Diagram:
-    """Errors in cost, joints and tip against time, of many schemes on many grids.
+    """Errors of cost, joints and tip against time, of several schemes on several grids.
 
-    The motion is planned as the task says, without its limits, and resolved until it stops
-    changing; every method then solves the same problem from the same guess.
+    The motion of the task is planned without its limits and refined until it no longer changes;
+    every method then solves the same problem from the same guess.
 
-    guess: "near" (nine tenths of the resolved motion, one tenth of the cubic: all methods work on
-        the same minimum) or "cubic" (they may end in others, and then do not count).
-    schemes: names as by_name takes them. peers: reference tools for comparison.
-    budget: of wall time, in [s]. repeats: of every solve, by which its time is judged.
-    clock: "wall", or "processor" on a machine that is busy with other work.
-    enough: errors at which a method need not become finer.
-    progress: called with a line of text and the fraction done.
-    Raises InputError and what `plan` raises for bad input, UnmeasurableError when no motion can be
-    resolved.
+    guess: "near" (nine tenths of the resolved motion, one tenth of the cubic: all methods converge
+        to the same minimum) or "cubic" (runs that end in another minimum are not valid).
+    schemes: names for `by_name`. peers: reference tools for comparison.
+    budget: wall time, in [s]. repeats: timed solves of every run after the first.
+    clock: "wall", or "processor" for a machine under other load.
+    enough: errors below which no finer grid is tried.
+    progress: called with a line of text and the fraction of the budget spent.
+    Raises InputError and the errors of `plan` for invalid input, UnmeasurableError when no motion
+    can be resolved.
     """
     if task.options.via:
         raise InputError(
-            f"{task.name} has via points, and a diagram is of a motion between two ends: leave "
-            "them out."
+            f"{task.name} has via points, but a diagram needs a motion between two states; remove "
+            "the via points."
         )
     if clock not in CLOCKS:
         raise InputError(f"there is no clock {clock!r}: {nearest(clock, CLOCKS)}")
-    time, report = Budget(budget), progress or _silent
+    time, report = Budget(budget), progress or _no_progress
     report(f"planning {task.name}", 0.0)
     found = plan(
         task.scene,
@@ -95,27 +96,29 @@ def work_precision(
         obstacles=(),
         self_collision=False,
         tolerance=None,
-        time_limit=SEARCHING * budget,
+        time_limit=PLANNING_SHARE * budget,
     )
     raise_if_interrupted()
     if not found.success or found.problem is None:
-        raise UnmeasurableError(f"no motion of {task.name} to measure against: {found.message}")
+        raise UnmeasurableError(f"no reference motion of {task.name} was found: {found.message}")
     report("resolving the motion", time.fraction)
-    resolved = resolve(found.problem, found, lambda: time.fraction > SEARCHING)
+    resolved = resolve(found.problem, found, lambda: time.fraction > PLANNING_SHARE)
     problem = found.problem.on(resolved.trajectory.grid)
     curve = guess_curve(guess, problem, resolved.trajectory)
-    nearer = guess_curve(guess, problem, resolved.trajectory, NEARER)
-    setting = Setting(problem, curve, nearer, SLOWEST * budget, clock)
+    nearer = guess_curve(guess, problem, resolved.trajectory, NEARER_RESOLVED_SHARE)
+    setting = Setting(problem, curve, nearer, MAX_SOLVE_SHARE * budget, clock)
     methods: list[Method] = [VariationalMethod(problem, curve, name, clock) for name in schemes]
-    notes = list(_left_out(task))
+    notes = list(_omissions(task))
     for peer in peers:
         try:
             methods.append(peer(setting))
-        except UnmeasurableError as refused:
-            notes.append(str(refused))
+        except UnmeasurableError as error:
+            notes.append(str(error))
     try:
-        measured = measure(methods, resolved.reference, time, report, MEASURING, repeats, enough)
-        report("what a tolerance chooses", time.fraction)
+        measured = measure(
+            methods, resolved.reference, time, report, MEASURING_SHARE, repeats, enough
+        )
+        report("measuring plan(tolerance=)", time.fraction)
         intervals = task.options.intervals
         chosen = choices(problem, curve, resolved.reference, time, intervals, repeats, clock)
     finally:
@@ -134,15 +137,15 @@ def work_precision(
     )
 
 
-def _left_out(task: Task) -> Sequence[str]:
-    """What the diagram does not show of the task."""
+def _omissions(task: Task) -> Sequence[str]:
+    """Notes on parts of the task that the diagram ignores."""
     if not as_limits(task.scene.robot, task.options.limits).bounded.any():
         return ()
     return (
-        "The scene has limits; the diagram is of its motion without them: under limits the error "
-        "is that of the places where they begin and end to hold, whatever the scheme.",
+        "The scene has limits; the diagram shows the motion without them, since with limits the "
+        "error is dominated by the times at which they become active, for every scheme.",
     )
 
 
-def _silent(text: str, fraction: float) -> None:
-    """No progress."""
+def _no_progress(text: str, fraction: float) -> None:
+    """Discard progress reports."""

@@ -1,4 +1,4 @@
-"""Which effect matters: each alone, what it changes against what it costs."""
+"""The study of effects: trials, tables, candidates and the command."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def study(task: Task) -> EffectStudy:
     return study_effects(task, CANDIDATES)
 
 
-def test_a_trial_is_the_scene_planned_and_played_with_one_effect_more(
+def test_a_trial_plans_and_plays_the_scene_with_one_more_effect(
     study: EffectStudy, task: Task, two_link: Robot
 ) -> None:
     trial = study.trials[0]
@@ -59,7 +59,7 @@ def test_a_trial_is_the_scene_planned_and_played_with_one_effect_more(
     assert trial.instructions == grown > 0
 
 
-def test_an_effect_that_the_scene_names_is_taken_away(study: EffectStudy, task: Task) -> None:
+def test_an_effect_of_the_scene_is_removed(study: EffectStudy, task: Task) -> None:
     trial = study.trials[3]
     bare = plan(task.scene.without("gravity"), task.start, task.goal, 0.4, intervals=8)
     assert (trial.name, trial.added, trial.effect) == ("- gravity", False, Gravity(9.8))
@@ -68,7 +68,7 @@ def test_an_effect_that_the_scene_names_is_taken_away(study: EffectStudy, task: 
     assert trial.instructions < 0
 
 
-def test_an_effect_of_no_strength_changes_nothing(study: EffectStudy) -> None:
+def test_an_effect_of_zero_strength_changes_nothing(study: EffectStudy) -> None:
     trial = study.trials[1]
     assert trial.torque == 0
     assert abs(study.change(trial)) < 1e-9
@@ -76,7 +76,7 @@ def test_an_effect_of_no_strength_changes_nothing(study: EffectStudy) -> None:
     assert trial.tip < 1e-6
 
 
-def test_a_cost_moves_the_plan_and_no_simulation(study: EffectStudy) -> None:
+def test_a_cost_term_changes_the_plan_but_not_the_simulation(study: EffectStudy) -> None:
     trial = study.trials[2]
     assert (trial.torque, trial.open_loop, trial.held) == (0.0, 0.0, 0.0)
     assert study.change(trial) > 0
@@ -84,21 +84,21 @@ def test_a_cost_moves_the_plan_and_no_simulation(study: EffectStudy) -> None:
     assert trial.tip > 1e-3
 
 
-def test_time_is_measured_for_all(study: EffectStudy) -> None:
+def test_every_trial_is_timed(study: EffectStudy) -> None:
     assert study.seconds > 0
     assert all(trial.seconds > 0 and trial.plan_seconds > 0 for trial in study.trials)
 
 
-def test_the_table_has_a_row_for_the_scene_and_one_a_trial(study: EffectStudy) -> None:
+def test_the_table_has_a_row_for_the_scene_and_for_every_trial(study: EffectStudy) -> None:
     rows = study_rows(study)
-    assert [row[0] for row in rows] == ["(as it is)", *(trial.name for trial in study.trials)]
+    assert [row[0] for row in rows] == ["(unchanged)", *(trial.name for trial in study.trials)]
     assert {len(row) for row in rows} == {len(COLUMNS)}
     fields = json.loads(study_json(study))
     assert fields["cost"] == study.solution.cost
     assert [trial["cost"] for trial in fields["trials"]] == [t.cost for t in study.trials]
 
 
-def test_the_picture_has_a_bar_for_every_trial(study: EffectStudy) -> None:
+def test_the_figure_has_a_bar_for_every_trial(study: EffectStudy) -> None:
     for panel in study_figure(study).axes:
         assert len(panel.patches) == len(study.trials)
         lowest, highest = panel.get_xlim()
@@ -106,7 +106,7 @@ def test_the_picture_has_a_bar_for_every_trial(study: EffectStudy) -> None:
             assert lowest <= bar.get_width() <= highest  # type: ignore[attr-defined]
 
 
-def test_an_effect_without_a_minimum_has_no_numbers_of_a_motion(study: EffectStudy) -> None:
+def test_a_trial_without_a_minimum_shows_no_cost(study: EffectStudy) -> None:
     found, *others = study.trials
     failed = dataclasses.replace(found, success=False, tip=None)
     study = dataclasses.replace(study, trials=(failed, *others))
@@ -119,7 +119,7 @@ def test_an_effect_without_a_minimum_has_no_numbers_of_a_motion(study: EffectStu
     assert widths[-1] == panel.get_xlim()[0] < min(widths[:-1])
 
 
-def test_a_study_that_is_interrupted_keeps_what_was_tried(study: EffectStudy, task: Task) -> None:
+def test_an_interrupted_study_keeps_its_trials(study: EffectStudy, task: Task) -> None:
     def interrupt(text: str, share: float) -> None:
         if "velocity_cost" in text:
             raise KeyboardInterrupt
@@ -130,20 +130,20 @@ def test_a_study_that_is_interrupted_keeps_what_was_tried(study: EffectStudy, ta
     assert json.loads(study_json(part))["untried"] == ["velocity_cost", "gravity"]
 
 
-def test_nothing_pushes_a_base_that_floats_without_motors() -> None:
+def test_an_unactuated_floating_base_gets_no_constant_force() -> None:
     robot = load_robot(with_arm("free-flyer"))
     keys = {e.key for e in effect_candidates(robot)}
     arm = {e.key for e in effect_candidates(robot, robot.joint_names[1:])}
-    adrift = {e.key for e in effect_candidates(robot, robot.joint_names[:1])}
-    assert keys == arm == adrift | {"gravity", "wrench"}
+    unactuated_base = {e.key for e in effect_candidates(robot, robot.joint_names[:1])}
+    assert keys == arm == unactuated_base | {"gravity", "wrench"}
 
 
-def test_a_motion_that_runs_away_is_called_lost(task: Task) -> None:
+def test_a_diverging_simulation_has_no_tip_deviation(task: Task) -> None:
     heavy = study_effects(task, [Payload(task.scene.robot.tip_frame, 1e5)]).trials[0]
     assert heavy.open_loop is None or math.isfinite(heavy.open_loop)
 
 
-def test_a_task_without_a_motion_has_no_study(task: Task, two_link: Robot) -> None:
+def test_an_infeasible_task_raises(task: Task, two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity(9.8)])
     limits = {"base": "none", "v": 0.1}
     stuck = Task(scene, task.start, task.goal, 0.4, PlanOptions(limits=limits), "stuck")
@@ -152,7 +152,7 @@ def test_a_task_without_a_motion_has_no_study(task: Task, two_link: Robot) -> No
 
 
 @pytest.mark.parametrize("name", ["two_link", "ur5", "panda", "pendulum"])
-def test_candidates_fit_their_robot(request: pytest.FixtureRequest, name: str) -> None:
+def test_candidates_suit_their_robot(request: pytest.FixtureRequest, name: str) -> None:
     robot: Robot = request.getfixturevalue(name)
     candidates = effect_candidates(robot)
     assert len({effect.key for effect in candidates}) == len(candidates) >= 5
@@ -160,7 +160,7 @@ def test_candidates_fit_their_robot(request: pytest.FixtureRequest, name: str) -
     assert np.isfinite(scene.inverse_dynamics(*np.zeros((3, 1, robot.nv)))).all()
 
 
-def test_candidates_take_what_the_model_states(two_link: Robot) -> None:
+def test_candidates_use_the_parameters_of_the_model(two_link: Robot) -> None:
     model = two_link.model.copy()
     model.damping, model.friction = np.array([0.1, 0.2]), np.array([0.3, 0.4])
     model.armature = np.array([0.5, 0.6])
@@ -168,7 +168,7 @@ def test_candidates_take_what_the_model_states(two_link: Robot) -> None:
     assert all(by_key[key].from_urdf for key in ("viscous_friction", "dry_friction", "armature"))
 
 
-def test_a_robot_that_floats_is_not_put_on_a_moving_base() -> None:
+def test_a_floating_base_gets_no_moving_base() -> None:
     keys = [effect.key for effect in effect_candidates(load_robot("solo8", free_flyer=True))]
     assert "moving_base" not in keys
 
@@ -176,7 +176,7 @@ def test_a_robot_that_floats_is_not_put_on_a_moving_base() -> None:
 @pytest.mark.parametrize(
     ("base", "floating"), [("free-flyer", 6), ("spherical", 3), ("planar", 3), ("continuous", 0)]
 )
-def test_nothing_rubs_where_a_base_floats(base: str, floating: int) -> None:
+def test_a_floating_base_gets_no_joint_friction(base: str, floating: int) -> None:
     by_key = {e.key: e for e in effect_candidates(load_robot(with_arm(base)))}
     assert ("moving_base" in by_key) == (floating == 0)
     for effect in (by_key["viscous_friction"], by_key["dry_friction"], by_key["armature"]):
@@ -185,7 +185,7 @@ def test_nothing_rubs_where_a_base_floats(base: str, floating: int) -> None:
         assert min(numbers[floating:]) > 0.0
 
 
-def test_a_study_of_continuous_joints_is_that_of_their_revolute_twins(
+def test_continuous_joints_give_the_study_of_revolute_joints(
     study: EffectStudy, task: Task, models: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "turning.urdf"
@@ -220,7 +220,7 @@ intervals = 8
 """
 
 
-def test_the_command_prints_a_table_and_draws_a_picture(
+def test_the_command_prints_a_table_and_writes_a_figure(
     models: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene, rich = tmp_path / "reach.toml", tmp_path / "rich.toml"

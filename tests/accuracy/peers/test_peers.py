@@ -1,4 +1,4 @@
-"""Reference tools: their tables, their programs, their robot, and tools in other Pythons."""
+"""Reference tools: tables, programs, the robot model, and tools in other Python environments."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from hovi.accuracy.peers.collocation_table import (
     lagrange_integrals,
     radau_points,
 )
-from hovi.accuracy.peers.external_method import OutsideMethod
+from hovi.accuracy.peers.external_method import ExternalMethod
 from hovi.accuracy.peers.ipopt_method import CollocationMethod, Kernels
-from hovi.accuracy.peers.tools import OUTSIDE, tool_peers
+from hovi.accuracy.peers.tools import EXTERNAL, tool_peers
 from hovi.accuracy.peers.worker import Worker
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
@@ -58,40 +58,40 @@ def setting(arm_scene: Scene) -> Setting:
 
 
 def polynomial_motion(power: int, t: Array) -> tuple[Array, Array, Array]:
-    """a = t^power, at rest in 0 at t = 0."""
+    """q, v and a for a = t^power with q(0) = v(0) = 0."""
     a = t**power
     return t ** (power + 2) / ((power + 1) * (power + 2)), t ** (power + 1) / (power + 1), a
 
 
 EXACT = {"hermite-simpson": 0, "lg-3": 2, "lg-4": 3, "lg-5": 4, "lgr-3": 2, "lgr-4": 3, "lgr-5": 4}
-"""Degree of the acceleration up to which a table has nothing to approximate."""
+"""Largest degree of the acceleration for which a table is exact."""
 
 
 @pytest.mark.parametrize(
     ("name", "power"), [(name, power) for name in EXACT for power in range(EXACT[name] + 1)]
 )
-def test_a_motion_of_low_degree_fulfils_the_ties_and_passes_through_the_points(
+def test_polynomials_of_low_degree_have_no_defects_and_pass_through_the_points(
     name: str, power: int
 ) -> None:
     table = collocation_table(name)
     ends = np.array(polynomial_motion(power, np.array([0.0, 1.0])))[: table.node_size]
     inner = polynomial_motion(power, table.inner)[2]
     w = np.concatenate([ends[:, 0], inner, ends[:, 1]])
-    np.testing.assert_allclose(table.ties @ w, 0, atol=1e-14)
+    np.testing.assert_allclose(table.defects @ w, 0, atol=1e-14)
     c = np.array([0.5]) if name == "hermite-simpson" else table.inner
     expected = np.stack(polynomial_motion(power, c), axis=1)
     np.testing.assert_allclose(table.points @ w, expected, atol=1e-14)
 
 
-def test_the_trapezoidal_ties_are_its_rules() -> None:
+def test_trapezoidal_defects_are_the_trapezoidal_rules() -> None:
     q0, hv0, hha0, hv1, hha1 = 0.3, -0.2, 0.5, 0.7, -0.1
     q1, hv1_found = q0 + (hv0 + hv1) / 2, hv0 + (hha0 + hha1) / 2
-    ties = collocation_table("trapezoidal").ties @ np.array([q0, hv0, hha0, q1, hv1, hha1])
-    np.testing.assert_allclose(ties, [0.0, hv1_found - hv1], atol=1e-15)
+    defects = collocation_table("trapezoidal").defects @ np.array([q0, hv0, hha0, q1, hv1, hha1])
+    np.testing.assert_allclose(defects, [0.0, hv1_found - hv1], atol=1e-15)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_weights_integrate_one(name: str) -> None:
+def test_weights_sum_to_one(name: str) -> None:
     table = collocation_table(name)
     assert table.weights.sum() + 2 * table.end_weight == pytest.approx(1.0, rel=1e-14)
 
@@ -105,7 +105,7 @@ def test_radau_points_integrate_polynomials_of_degree_2s_minus_2(s: int) -> None
     assert c[-1] == 1.0
 
 
-def test_an_unknown_table_is_refused_with_the_nearest() -> None:
+def test_an_unknown_table_raises_with_a_suggestion() -> None:
     with pytest.raises(SchemeError, match="did you mean 'hermite-simpson'"):
         collocation_table("hermit-simpson")
 
@@ -114,7 +114,7 @@ def test_an_unknown_table_is_refused_with_the_nearest() -> None:
 
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
-def test_legendre_gauss_collocation_is_the_galerkin_scheme_with_two_modes_less(
+def test_legendre_gauss_collocation_equals_galerkin_with_two_modes_fewer(
     setting: Setting, modes: int
 ) -> None:
     ours = solve(reach(setting.problem.scene, 8, modes))
@@ -129,7 +129,7 @@ def test_legendre_gauss_collocation_is_the_galerkin_scheme_with_two_modes_less(
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_collocation_finds_the_motion_with_its_order(setting: Setting, name: str) -> None:
+def test_collocation_converges_with_its_order(setting: Setting, name: str) -> None:
     exact = solve(reach(setting.problem.scene, 64, 5)).cost
     method = CollocationMethod(setting, name, Kernels(compiled=False))
     assert method.order is not None
@@ -138,7 +138,7 @@ def test_collocation_finds_the_motion_with_its_order(setting: Setting, name: str
     assert errors[1] < max(4 * errors[0] / 2**method.order, 1e-13)
 
 
-def test_compiled_kernels_give_what_interpreted_ones_give(setting: Setting) -> None:
+def test_compiled_and_interpreted_kernels_agree(setting: Setting) -> None:
     costs = [
         CollocationMethod(setting, "lgr-3", Kernels(compiled=c)).prepare(6).solve().cost
         for c in (True, False)
@@ -146,21 +146,21 @@ def test_compiled_kernels_give_what_interpreted_ones_give(setting: Setting) -> N
     assert costs[0] == pytest.approx(costs[1], rel=1e-12)
 
 
-def test_a_guess_is_put_on_the_nodes_and_keeps_the_ends(two_link: Robot) -> None:
+def test_a_cubic_guess_is_represented_exactly(two_link: Robot) -> None:
     boundary = (np.array([0.1, 0.2]), np.array([0.3, 0.4]), np.array([1.0, -1.0]), np.zeros(2))
     curve = cubic(two_link, boundary, 2.0)
-    it = Collocation(collocation_table("lg-3"), 5, 2.0, 2)
-    w = it.unknowns(curve, boundary)
+    method = Collocation(collocation_table("lg-3"), 5, 2.0, 2)
+    w = method.unknowns(curve, boundary)
     t = np.linspace(0.0, 2.0, 23)
-    np.testing.assert_allclose(it.configurations(w, t), curve(t)[0], atol=1e-13)
-    np.testing.assert_array_equal(w[it.held], np.stack(boundary))
-    ties = np.array(it.program.ties @ w.ravel()).ravel()
-    np.testing.assert_allclose(ties, 0, atol=1e-13)
+    np.testing.assert_allclose(method.configurations(w, t), curve(t)[0], atol=1e-13)
+    np.testing.assert_array_equal(w[method.fixed], np.stack(boundary))
+    defects = np.array(method.program.defects @ w.ravel()).ravel()
+    np.testing.assert_allclose(defects, 0, atol=1e-13)
 
 
-def test_a_scene_that_other_tools_do_not_know_is_refused(two_link: Robot) -> None:
-    kept = JointLimitPotential({"elbow": (0.0, 1.0)}, slope=10.0)
-    problem = reach(Scene(two_link, [Gravity(), kept]))
+def test_an_unsupported_scene_raises(two_link: Robot) -> None:
+    elbow = JointLimitPotential({"elbow": (0.0, 1.0)}, slope=10.0)
+    problem = reach(Scene(two_link, [Gravity(), elbow]))
     with pytest.raises(UnmeasurableError, match="gravity and armature"):
         CollocationMethod(Setting(problem, None, None), "lg-3", Kernels(compiled=False))
 
@@ -169,7 +169,7 @@ def test_a_scene_that_other_tools_do_not_know_is_refused(two_link: Robot) -> Non
 
 
 @pytest.mark.parametrize("fixture", ["two_link", "ur5", "panda"])
-def test_the_bare_urdf_is_the_same_robot(fixture: str, request: pytest.FixtureRequest) -> None:
+def test_the_bare_urdf_has_the_same_dynamics(fixture: str, request: pytest.FixtureRequest) -> None:
     model = request.getfixturevalue(fixture).model
     bare = pin.buildModelFromXML(bare_urdf(model))
     assert bare.nv == model.nv
@@ -178,7 +178,7 @@ def test_the_bare_urdf_is_the_same_robot(fixture: str, request: pytest.FixtureRe
     np.testing.assert_allclose(pin.rnea(bare, bare.createData(), q, v, a), tau, atol=1e-12)
 
 
-def test_sliding_joints_are_in_the_bare_urdf() -> None:
+def test_the_bare_urdf_has_prismatic_joints() -> None:
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelPY(), pin.SE3.Random(), "slide")
     model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
@@ -192,25 +192,25 @@ def test_sliding_joints_are_in_the_bare_urdf() -> None:
 # Tools in another Python
 
 
-def outside(setting: Setting, python: Path) -> OutsideMethod:
-    return OutsideMethod(
+def external_method(setting: Setting, python: Path) -> ExternalMethod:
+    return ExternalMethod(
         setting, python, "crocoddyl_worker", "tool", "Tool", 2, {"control": "zero"}
     )
 
 
-def test_a_python_that_is_not_there_is_one_sentence(setting: Setting) -> None:
+def test_a_missing_python_raises(setting: Setting) -> None:
     with pytest.raises(InputError, match="cannot be started: No such file"):
-        outside(setting, Path("/nowhere/bin/python"))
+        external_method(setting, Path("/nowhere/bin/python"))
 
 
-def test_a_python_without_the_tool_says_which_module_it_lacks(setting: Setting) -> None:
+def test_a_python_without_the_tool_raises_with_the_missing_module(setting: Setting) -> None:
     with pytest.raises(UnmeasurableError, match="No module named 'crocoddyl'"):
-        outside(setting, Path(sys.executable))
+        external_method(setting, Path(sys.executable))
 
 
-@pytest.mark.parametrize("name", OUTSIDE)
+@pytest.mark.parametrize("name", EXTERNAL)
 def test_a_tool_has_a_worker_and_a_method_per_variant(name: str, setting: Setting) -> None:
-    tool = OUTSIDE[name]
+    tool = EXTERNAL[name]
     assert find_spec(f"hovi.accuracy.peers.{tool.worker}") is not None
     peers = tool_peers(name, Path("/nowhere/bin/python"))
     assert len(peers) == len(tool.variants) > 0
@@ -219,7 +219,7 @@ def test_a_tool_has_a_worker_and_a_method_per_variant(name: str, setting: Settin
             peer(setting)
 
 
-def test_a_tool_of_this_python_needs_no_other(setting: Setting) -> None:
+def test_collocation_runs_in_this_process(setting: Setting) -> None:
     peers = tool_peers("collocation")
     methods = [peer(setting).name for peer in peers]
     assert methods[: len(NAMES)] == [f"{name}, Ipopt, compiled" for name in NAMES]
@@ -234,22 +234,22 @@ def test_a_tool_of_this_python_needs_no_other(setting: Setting) -> None:
         ("collocation", Path("python3"), "runs in this Python"),
     ],
 )
-def test_a_peer_that_cannot_be_is_refused(name: str, python: Path | None, sentence: str) -> None:
+def test_an_invalid_peer_raises(name: str, python: Path | None, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
         tool_peers(name, python)
 
 
-def test_a_tool_that_says_nothing_is_given_up(tmp_path: Path) -> None:
+def test_a_silent_tool_times_out(tmp_path: Path) -> None:
     silent = tmp_path / "python"
     silent.write_text("#!/bin/sh\nexec sleep 60\n")
     silent.chmod(0o755)
-    worker = Worker(silent, "crocoddyl_worker", patience=0.2)
+    worker = Worker(silent, "crocoddyl_worker", timeout=0.2)
     with pytest.raises(UnmeasurableError, match="gave no answer"):
         worker.ask({"urdf": ""})
     worker.close()
 
 
-def test_a_tool_that_ends_is_given_up(tmp_path: Path) -> None:
+def test_a_tool_that_exits_raises(tmp_path: Path) -> None:
     short = tmp_path / "python"
     short.write_text("#!/bin/sh\nread line\n")
     short.chmod(0o755)

@@ -1,1 +1,1 @@
-"""Which effect matters on a scene, and what it costs."""
+"""The influence of single effects on a motion, and their computing time."""

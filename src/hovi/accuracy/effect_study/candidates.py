@@ -1,8 +1,8 @@
-"""Effects worth trying on a robot that a scene leaves out, at a plausible strength.
+"""Candidate effects for a robot, with plausible parameters.
 
-What the robot's model states is taken from there. The rest are stand-ins: one percent of the effort
-limit for friction, a tenth of the inertia for rotors, a twentieth of the mass for a payload and of
-the weight for a push. Whoever knows better names them in a scene file.
+Parameters are taken from the robot's model where it has them. Otherwise friction is one percent of
+the effort limit, rotor inertia a tenth of the joint's inertia, payload a twentieth of the mass, and
+the external force a twentieth of the weight. Known values belong in a scene file.
 """
 
 from __future__ import annotations
@@ -29,64 +29,64 @@ from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
-FRICTION = 0.01
-ROTORS = 0.1
-BURDEN = 0.05
-_EARTH = 9.81
+FRICTION_SHARE = 0.01  # of the effort limit
+ROTOR_SHARE = 0.1  # of the joint's inertia
+LOAD_SHARE = 0.05  # of the mass, or of the weight
+_EARTH = 9.81  # [m/s^2]
 
 
 def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect, ...]:
-    """One of each effect that most robots feel, in the order of the effects page.
+    """One effect of each common kind, in the order of docs/effects.md.
 
-    passive: joints without motors. A base that floats without any gains the momentum that a steady
-        force gives it whatever the other motors do, and comes to rest nowhere: gravity and the
-        push are left out.
+    passive: joints without motors. An unactuated floating base gains momentum under a constant
+        force whatever the other motors do, and cannot come to rest: gravity and the external
+        force are left out.
     """
-    tip, level = robot.tip_frame, _efforts(robot)
+    tip, efforts = robot.tip_frame, _typical_efforts(robot)
     mass = sum(inertia.mass for inertia in robot.model.inertias[1:])
-    stated = {
+    in_model = {
         "damping": robot.damping.any(),
         "friction": robot.friction.any(),
         "armature": robot.armature.any(),
     }
-    borne = _borne(robot)
-    rub = _rounded(FRICTION * level * borne)
-    rotors = _rounded(ROTORS * _inertia(robot) * borne)
+    has_bearing = _has_bearing(robot)
+    friction = _rounded(FRICTION_SHARE * efforts * has_bearing)
+    rotors = _rounded(ROTOR_SHARE * _inertia(robot) * has_bearing)
     candidates: list[Effect] = [
         Gravity(),
-        ViscousFriction(from_urdf=True) if stated["damping"] else ViscousFriction(rub),
-        DryFriction(from_urdf=True) if stated["friction"] else DryFriction(rub, width=0.1),
-        Armature(from_urdf=True) if stated["armature"] else Armature(rotors),
+        ViscousFriction(from_urdf=True) if in_model["damping"] else ViscousFriction(friction),
+        DryFriction(from_urdf=True) if in_model["friction"] else DryFriction(friction, width=0.1),
+        Armature(from_urdf=True) if in_model["armature"] else Armature(rotors),
         MovingBase((0.0, 0.0, "0.01*sin(4*pi*t)")),
     ]
     if robot.model.frames[robot.model.getFrameId(tip)].parentJoint > 0:
-        (load,), (push,) = _rounded(BURDEN * mass), _rounded(BURDEN * mass * _EARTH)
+        (load,), (push,) = _rounded(LOAD_SHARE * mass), _rounded(LOAD_SHARE * mass * _EARTH)
         candidates += [
             Payload(tip, load),
             Wrench(tip, (0.0, push, 0.0)),
             Drag(tip, 0.05, wind=(0.0, 5.0, 0.0)),
         ]
-    unfit: list[type[Effect]] = []
-    if not borne.all():
-        adrift = robot.joint_names[0] in passive
-        unfit = [MovingBase, Gravity, Wrench] if adrift else [MovingBase]
-    return tuple(e for e in candidates if not isinstance(e, tuple(unfit)))
+    excluded: list[type[Effect]] = []
+    if not has_bearing.all():
+        unactuated_base = robot.joint_names[0] in passive
+        excluded = [MovingBase, Gravity, Wrench] if unactuated_base else [MovingBase]
+    return tuple(e for e in candidates if not isinstance(e, tuple(excluded)))
 
 
-def _borne(robot: Robot) -> Array:
-    """1 for coordinates with a bearing and perhaps a motor, 0 for those of a base that floats.
+def _has_bearing(robot: Robot) -> Array:
+    """1 for joint coordinates, 0 for those of a floating base.
 
-    A base is a first joint on SE(2), SO(3) or SE(3).
+    A floating base is a first joint on SE(2), SO(3) or SE(3).
     """
-    borne = np.ones(robot.nv)
+    has_bearing = np.ones(robot.nv)
     for factor in robot.space.curved[:1]:
         if factor.v.start == 0:
-            borne[factor.v] = 0.0
-    return borne
+            has_bearing[factor.v] = 0.0
+    return has_bearing
 
 
-def _efforts(robot: Robot) -> Array:
-    """The effort limit of every coordinate, or where none is known, the largest weight found."""
+def _typical_efforts(robot: Robot) -> Array:
+    """The effort limit of every coordinate; where unknown, the largest gravity torque found."""
     limit = robot.effort_limit
     known = (limit > 0) & (limit < 1e15)
     model = robot.model.copy()
@@ -110,5 +110,5 @@ def _inertia(robot: Robot) -> Array:
 
 
 def _rounded(values: npt.ArrayLike) -> tuple[float, ...]:
-    """Two digits are enough for a stand-in."""
+    """Rounded to two digits."""
     return tuple(float(f"{value:.2g}") for value in np.atleast_1d(values))

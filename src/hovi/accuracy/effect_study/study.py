@@ -1,4 +1,4 @@
-"""Which effect matters: each added alone to a scene, what it changes against what it costs."""
+"""The influence of each effect, added alone to a scene, and its computing time."""
 
 from __future__ import annotations
 
@@ -27,25 +27,26 @@ Array = npt.NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 BANDWIDTH = 10.0
-"""Of the feedback that holds a motion to its plan, in [rad/s]."""
-_SAMPLES = 20
-_PATIENCE = 10.0
-_LEAST_SECONDS = 10.0
+"""Bandwidth of the tracking feedback, in [rad/s]."""
+_SAMPLES = 20  # per interval
+_TIME_FACTOR = 10.0  # default limit of a candidate, relative to the time of the task
+_MIN_TIME_LIMIT = 10.0  # [s]
 
 
 @dataclass(frozen=True)
 class EffectTrial:
-    """A scene with one effect more or less, beside the scene itself.
+    """A scene with one effect added or removed, compared with the scene itself.
 
-    effect: which. added: whether it was added, or taken away since the scene names it.
-    torque: largest change of a torque that the scene's own motion needs, in [N m].
-    cost: of the motion planned with it, from the scene's own as the guess. success: whether that
-        is a minimum; where it is not, the cost says nothing. nit, plan_seconds: what planning took.
-    tip: largest distance of its tip from the scene's own motion, in [m]; None where the two do
-        not last equally long, or no minimum was found.
-    open_loop, held: how far the tip ends off when the scene's own torques are played with it,
-        alone and held by a feedback of 10 rad/s, in [m]; None where the motion is lost.
-    instructions: what it adds to the expression graph.
+    effect: the effect. added: False if it was removed because the scene has it.
+    torque: largest change of the torque along the scene's own motion, in [N m].
+    cost: of the motion planned with the change, with the scene's own motion as the guess.
+        success: whether that is a minimum; if not, the cost has no meaning.
+        nit, plan_seconds: iterations and time of planning.
+    tip: largest distance of its tip from the scene's own motion, in [m]; None if the durations
+        differ or no minimum was found.
+    open_loop, held: tip deviation at the end when the planned torques are applied in the changed
+        scene, without and with a feedback of 10 rad/s, in [m]; None if the simulation diverged.
+    instructions: added to the expression graph.
     seconds: of an evaluation with derivatives, per point.
     """
 
@@ -64,17 +65,17 @@ class EffectTrial:
 
     @property
     def name(self) -> str:
-        """The effect's key with a sign."""
+        """The effect's key, after + or -."""
         return f"{'+' if self.added else '-'} {self.effect.key}"
 
 
 @dataclass(frozen=True, eq=False)
 class EffectStudy:
-    """A scene's own motion and one trial for each candidate.
+    """The motion of a scene and one trial per candidate effect.
 
-    task: what was planned. solution: its motion. seconds: of an evaluation, per point.
+    task: the task. solution: its motion. seconds: of an evaluation with derivatives, per point.
     plan_seconds: of planning it again from its own motion.
-    untried: candidates that were not reached when time was up or a person ended the study.
+    untried: candidates not reached before the time limit or an interrupt.
     """
 
     task: Task
@@ -85,7 +86,7 @@ class EffectStudy:
     untried: tuple[Effect, ...] = ()
 
     def change(self, trial: EffectTrial) -> float:
-        """Relative change of the cost; NaN where no minimum was found with the effect."""
+        """Relative change of the cost; NaN if no minimum was found with the effect."""
         if not trial.success:
             return np.nan
         return trial.cost / self.solution.cost - 1.0 if self.solution.cost else np.inf
@@ -98,52 +99,51 @@ def study_effects(
     progress: Progress | None = None,
     time_limit: float | None = None,
 ) -> EffectStudy:
-    """Plan a task, then each candidate effect alone.
+    """Plan a task, then again with each candidate effect alone.
 
-    candidates: effects to add; one that the scene names is taken away instead. When not given,
-        those of `effect_candidates`.
-    time_limit: of everything, in [s], shared evenly by the candidates that are left: each is
-        planned within its share, and none is begun when time is up. When not given, planning one
-        takes at most ten times what the task took, or 10 s. A KeyboardInterrupt ends the study
-        with the trials so far.
-    Raises SceneError when the task itself has no motion to compare with.
+    candidates: effects to add; one that the scene has is removed instead. By default those of
+        `effect_candidates`.
+    time_limit: of the whole study, in [s], shared evenly by the remaining candidates; none is
+        started when time is up. By default a candidate is planned in at most ten times the time
+        of the task, at least 10 s. A KeyboardInterrupt ends the study with the trials so far.
+    Raises SceneError when no motion of the task itself is found.
     """
-    tell = progress or (lambda text, share: None)
+    report = progress or (lambda text, share: None)
     deadline, began = Deadline(time_limit), time.perf_counter()
-    tell("planning the scene as it is", 0.0)
+    report("planning the unchanged scene", 0.0)
     solution = _plan(task, task.scene, "cubic", task.options.starts, deadline.seconds_left)
     if not solution.success:
         raise SceneError(
-            f"the effects of {task.name!r} cannot be compared, as no motion was found to compare "
-            f"with: {solution.message}"
+            f"the effects of {task.name!r} cannot be compared, as no motion of the scene itself "
+            f"was found: {solution.message}"
         )
-    patience = max(_PATIENCE * (time.perf_counter() - began), _LEAST_SECONDS)
+    default_limit = max(_TIME_FACTOR * (time.perf_counter() - began), _MIN_TIME_LIMIT)
     began = time.perf_counter()
     _plan(task, task.scene, solution.trajectory, 1)
-    again = time.perf_counter() - began
+    replan_seconds = time.perf_counter() - began
     scene = task.scene
     tried = tuple(
         effect_candidates(scene.robot, scene.passive) if candidates is None else candidates
     )
-    scenes = [_changed(scene, effect) for effect in tried]
+    scenes = [_with_or_without(scene, effect) for effect in tried]
     own_seconds, *times = seconds_per_point([scene, *scenes])
     trials: list[EffectTrial] = []
     try:
         for i, (effect, changed, seconds) in enumerate(zip(tried, scenes, times, strict=True)):
-            tell(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
+            report(f"trying {effect.key}", (1 + i) / (1 + len(tried)))
             rest = deadline.seconds_left
-            limit = patience if rest is None else rest / (len(tried) - i)
+            limit = default_limit if rest is None else rest / (len(tried) - i)
             if limit <= 0:
                 break
             trials.append(_trial(task, solution.trajectory, effect, changed, seconds, limit))
     except KeyboardInterrupt:
         record_interrupt()
     untried = tried[len(trials) :]
-    return EffectStudy(task, solution, own_seconds, again, tuple(trials), untried)
+    return EffectStudy(task, solution, own_seconds, replan_seconds, tuple(trials), untried)
 
 
-def _changed(scene: Scene, effect: Effect) -> Scene:
-    """The scene with the effect, or without it where it has one of its kind."""
+def _with_or_without(scene: Scene, effect: Effect) -> Scene:
+    """The scene with the effect added, or removed if it has one of this kind."""
     without = scene.without(effect.key)
     if len(without.effects) < len(scene.effects):
         return without
@@ -153,7 +153,7 @@ def _changed(scene: Scene, effect: Effect) -> Scene:
 def _trial(
     task: Task, own: Trajectory, effect: Effect, scene: Scene, seconds: float, limit: float
 ) -> EffectTrial:
-    """The trial of an effect, planned in at most limit seconds. Raises KeyboardInterrupt."""
+    """The trial of an effect; limit: of planning, in [s]. Raises KeyboardInterrupt."""
     named = {each.key: each for each in task.scene.effects}
     began = time.perf_counter()
     found = _plan(task, scene, own, 1, limit)
@@ -168,8 +168,8 @@ def _trial(
         found.nit,
         took,
         _tip_distance(own, found.trajectory) if found.success else None,
-        _off(scene, own, "none") if moves else 0.0,
-        _off(scene, own, "pd") if moves else 0.0,
+        _tip_deviation(scene, own, "none") if moves else 0.0,
+        _tip_deviation(scene, own, "pd") if moves else 0.0,
         scene.graph().n_instructions() - task.scene.graph().n_instructions(),
         seconds,
     )
@@ -180,7 +180,7 @@ def _plan(
 ) -> Solution:
     changed = dataclasses.replace(task, scene=scene)
     solution = plan_task(changed, starts=starts, guess=guess, time_limit=limit)
-    raise_if_interrupted()  # with the other plans, unless a person ended this one
+    raise_if_interrupted()  # unless this plan was interrupted
     return solution
 
 
@@ -199,12 +199,12 @@ def _tip_distance(own: Trajectory, other: Trajectory) -> float | None:
         return None
     t = np.linspace(0.0, own.duration, 1 + _SAMPLES * own.grid.intervals)
     t = np.minimum(t, other.duration)
-    places = (robot.frame_position(robot.tip_frame, m.configurations(t)) for m in (own, other))
-    return float(np.linalg.norm(np.subtract(*places), axis=1).max())
+    positions = (robot.frame_position(robot.tip_frame, m.configurations(t)) for m in (own, other))
+    return float(np.linalg.norm(np.subtract(*positions), axis=1).max())
 
 
-def _off(scene: Scene, own: Trajectory, feedback: str) -> float | None:
+def _tip_deviation(scene: Scene, own: Trajectory, feedback: str) -> float | None:
     try:
         return float(play(scene, own, feedback, bandwidth=BANDWIDTH).tip_deviation[-1])
-    except InputError:  # a motion that runs away leaves no step that could be solved
+    except InputError:  # the simulation diverged and a step has no solution
         return None

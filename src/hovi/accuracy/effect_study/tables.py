@@ -1,4 +1,4 @@
-"""A study of effects as a table, as one JSON object, and as a picture."""
+"""A study of effects as a table, as JSON and as a figure."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ COLUMNS = (
     "held [mm]",
     "instructions",
     "us/point",
-    "times",
+    "ratio",
     "plan [s]",
 )
 NOTE = (
-    "torque: the largest change of what the scene's own motion needs; cost, change, tip: the "
-    "motion planned with the effect; open loop, held: where the tip ends when the scene's own "
-    "torques are played with it, alone and under feedback of 10 rad/s; us/point: an evaluation "
-    "with derivatives, times that of the scene."
+    "torque: largest change along the scene's own motion; cost, change, tip: the motion planned "
+    "with the effect; open loop, held: tip deviation at the end when the planned torques are "
+    "applied with the effect, without and with a feedback of 10 rad/s; us/point: one evaluation "
+    "with derivatives; ratio: us/point relative to the unchanged scene."
 )
 _EFFECT, _TIME = "#0072B2", "#D55E00"
 
 
 def study_rows(study: EffectStudy) -> list[list[str]]:
-    """The table: the scene as it is, then one row for each trial."""
-    own = ["(as it is)", "", f"{study.solution.cost:.6g}", "", "", "", "", ""]
+    """Rows of COLUMNS: the unchanged scene, then one row per trial."""
+    own = ["(unchanged)", "", f"{study.solution.cost:.6g}", "", "", "", "", ""]
     own += [f"{1e6 * study.seconds:.3g}", "1", f"{study.plan_seconds:.2g}"]
     return [own, *(_row(study, trial) for trial in study.trials)]
 
@@ -61,12 +61,12 @@ def _row(study: EffectStudy, trial: EffectTrial) -> list[str]:
 
 def _millimetres(distance: float | None) -> str:
     if distance is None:
-        return "lost"
+        return "diverged"
     return f"{1e3 * distance:.3g}" if distance < 1 else f"{1e3 * distance:.0f}"
 
 
 def study_json(study: EffectStudy) -> str:
-    """One JSON object; numbers are finite or null."""
+    """The study as one JSON object; non-finite numbers become null."""
     trials = [
         {
             "effect": trial.effect.key,
@@ -107,9 +107,9 @@ def plot_study(study: EffectStudy, path: str | os.PathLike[str]) -> None:
 
 
 def study_figure(study: EffectStudy) -> Figure:
-    """What each effect changes (torque, cost, tip) beside what it costs in time, as bars.
+    """Bars of the changes of torque, cost and tip, and of the evaluation time, per effect.
 
-    Where no minimum was found with an effect, the cost has no bar.
+    If no minimum was found with an effect, the cost has no bar.
     """
     trials = study.trials[::-1]
     names = [trial.name for trial in trials]
@@ -119,12 +119,12 @@ def study_figure(study: EffectStudy) -> Figure:
     changes = [100 * abs(study.change(t)) for t in trials]
     signs = ["-" if study.change(t) < 0 else "+" for t in trials]
     _bars(panels[1], names, changes, "change of the cost [%]", signs, without="no minimum")
-    off = [1e3 * (np.nan if t.held is None else t.held) for t in trials]
-    _bars(panels[2], names, off, "tip off at the end, held [mm]")
+    deviations = [1e3 * (np.nan if t.held is None else t.held) for t in trials]
+    _bars(panels[2], names, deviations, "tip deviation at the end, held [mm]")
     ratios = [t.seconds / study.seconds for t in trials]
-    _bars(panels[3], names, ratios, "time of an evaluation, times", color=_TIME)
+    _bars(panels[3], names, ratios, "evaluation time, relative", color=_TIME)
     panels[3].axvline(1.0, color="0.4", linewidth=0.8)
-    figure.suptitle(f"{study.task.name}: what each effect changes, and what it costs")
+    figure.suptitle(f"{study.task.name}: influence and evaluation time of each effect")
     return figure
 
 
@@ -137,9 +137,9 @@ def _bars(
     color: str = _EFFECT,
     without: str | None = None,
 ) -> None:
-    """Bars on a logarithmic axis over six decades at most, each with its number.
+    """Draw bars on a logarithmic axis over at most six decades, each with its number.
 
-    without: what is said, without a bar, where there is no number; when None, a full bar is lost.
+    without: label of a non-finite value, drawn without a bar; by default a full bar, "diverged".
     """
     largest = max([v for v in values if np.isfinite(v)], default=1.0) or 1.0
     least = largest * 1e-6
@@ -149,10 +149,10 @@ def _bars(
     ax.barh(names, shown, left=0.0, color=color, height=0.6)
     ax.set_xscale("log")
     ax.set_xlim(lowest, largest * 30)
-    for i, (value, place) in enumerate(zip(values, shown, strict=True)):
+    for i, (value, end) in enumerate(zip(values, shown, strict=True)):
         sign = signs[i] if signs else ""
-        text = sign + _short(value) if np.isfinite(value) else without or "lost"
-        ax.annotate(text, (place, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
+        text = sign + _short(value) if np.isfinite(value) else without or "diverged"
+        ax.annotate(text, (end, i), (4, 0), textcoords="offset points", va="center", fontsize=8)
     ax.set_xlabel(label, fontsize=9)
     ax.tick_params(labelsize=9)
     ax.spines[["top", "right"]].set_visible(False)

@@ -1,1 +1,1 @@
-"""Other tools as methods of a work-precision diagram."""
+"""Reference tools as methods of a work-precision diagram."""

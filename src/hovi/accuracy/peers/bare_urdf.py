@@ -1,4 +1,4 @@
-"""A robot as a URDF of joints and inertias alone, which every other tool reads in the same way."""
+"""A minimal URDF of joints and inertias, which all reference tools read in the same way."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from hovi.errors import UnmeasurableError
 
 Array = npt.NDArray[np.float64]
 
-_WIDE = 'lower="-1000" upper="1000" effort="1000000" velocity="1000000"'
+_WIDE_LIMITS = 'lower="-1000" upper="1000" effort="1000000" velocity="1000000"'
 
 
 def bare_urdf(model: pin.Model) -> str:
     """The URDF of a model's movable joints: links l1, l2, ... on joints j1, j2, ... from base l0.
 
-    Frames are those of Pinocchio's joints, numbers are written to the last digit, limits are
-    wide. Gravity and armature have no place in it. Raises UnmeasurableError for joints that are
-    neither revolute nor prismatic.
+    Frames are those of Pinocchio's joints, numbers have full precision, and limits are wide.
+    Gravity and armature are not included. Raises UnmeasurableError for joints that are neither
+    revolute nor prismatic.
     """
     parts = ['<robot name="bare">', f'<link name="{_link(0)}"/>']
     for joint in list(model.joints)[1:]:
@@ -44,18 +44,18 @@ def _body(model: pin.Model, joint: pin.JointModel) -> str:
 
 def _joint(model: pin.Model, joint: pin.JointModel) -> str:
     kind, axis = _kind(model, joint)
-    place = model.jointPlacements[joint.id]
+    placement = model.jointPlacements[joint.id]
     parent = int(model.parents[joint.id])
     return (
         f'<joint name="j{joint.id:03d}" type="{kind}"><parent link="{_link(parent)}"/>'
-        f'<child link="{_link(joint.id)}"/><origin xyz="{_text(place.translation)}" '
-        f'rpy="{_text(pin.rpy.matrixToRpy(place.rotation))}"/><axis xyz="{_text(axis)}"/>'
-        f"<limit {_WIDE}/></joint>"
+        f'<child link="{_link(joint.id)}"/><origin xyz="{_text(placement.translation)}" '
+        f'rpy="{_text(pin.rpy.matrixToRpy(placement.rotation))}"/><axis xyz="{_text(axis)}"/>'
+        f"<limit {_WIDE_LIMITS}/></joint>"
     )
 
 
 def _kind(model: pin.Model, joint: pin.JointModel) -> tuple[str, Array]:
-    """What the joint is in a URDF, and its axis."""
+    """The URDF type of a joint, and its axis."""
     if (joint.nq, joint.nv) == (1, 1):
         data = model.createData()
         pin.forwardKinematics(model, data, pin.neutral(model), np.eye(model.nv)[joint.idx_v])
@@ -66,8 +66,8 @@ def _kind(model: pin.Model, joint: pin.JointModel) -> tuple[str, Array]:
         if not angular.any():
             return "prismatic", linear
     raise UnmeasurableError(
-        f"joint {model.names[joint.id]!r} is neither revolute nor prismatic, and other tools are "
-        "measured on such joints only."
+        f"joint {model.names[joint.id]!r} is neither revolute nor prismatic; the reference tools "
+        "support only these."
     )
 
 

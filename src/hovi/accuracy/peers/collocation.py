@@ -1,4 +1,4 @@
-"""A collocation on a grid: its nonlinear program, its guess, and the motion that it found."""
+"""Collocation on a grid: nonlinear program, initial guess, and interpolated motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import scipy.sparse as sparse
 from scipy.interpolate import CubicHermiteSpline
 
 from hovi.accuracy.peers.collocation_table import CollocationTable, lagrange_integrals
-from hovi.accuracy.peers.point_program import PointProgram, dm
+from hovi.accuracy.peers.point_program import PointProgram, casadi_matrix
 from hovi.discrete.guess import Boundary, Curve
 
 Array = npt.NDArray[np.float64]
@@ -19,9 +19,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Collocation:
-    """Unknowns w, shape (rows, n): node 0, its inner accelerations, node 1, and so on, in [s].
+    """A collocation method on N equal intervals.
 
-    table: the method. intervals: N, of equal length. duration: T. joints: n.
+    The unknowns w, shape (rows, n), are node 0, the inner accelerations of interval 0, node 1, ...
+
+    table: the method. intervals: N. duration: T, in [s]. joints: n.
     """
 
     table: CollocationTable
@@ -31,7 +33,7 @@ class Collocation:
 
     @property
     def h(self) -> float:
-        """Length of an interval, in [s]."""
+        """Length T / N of an interval, in [s]."""
         return self.duration / self.intervals
 
     @property
@@ -46,23 +48,23 @@ class Collocation:
 
     @cached_property
     def program(self) -> PointProgram:
-        """What Ipopt solves."""
+        """The nonlinear program for Ipopt."""
         table, N, h = self.table, self.intervals, self.h
         weights = [np.tile(h * table.weights, N)]
-        points = [self._placed(self._scaled(table.points.reshape(-1, self._columns)))]
+        points = [self._along_motion(self._scaled(table.points.reshape(-1, self._columns)))]
         if table.end_weight:
             weights.append(h * table.end_weight * np.where(self._at_ends, 1.0, 2.0))
             nodes = np.flatnonzero(np.arange(self.rows) % self.stride < 3)
             points.append(sparse.identity(self.rows, format="csr")[nodes])
         joints = sparse.identity(self.joints)
         return PointProgram(
-            dm(sparse.kron(sparse.vstack(points), joints)),
-            dm(sparse.kron(self._placed(self._scaled(table.ties)), joints)),
+            casadi_matrix(sparse.kron(sparse.vstack(points), joints)),
+            casadi_matrix(sparse.kron(self._along_motion(self._scaled(table.defects)), joints)),
             np.concatenate(weights),
         )
 
     def unknowns(self, guess: Curve, boundary: Boundary) -> Array:
-        """w of a curve, its ends put on the boundary data."""
+        """w of a curve, with the boundary values at its ends."""
         q, v, a = guess(np.linspace(0.0, self.duration, self.intervals + 1))
         w, size = np.zeros((self.rows, self.joints)), self.table.node_size
         for i, x in enumerate((q, v, a)[:size]):
@@ -75,16 +77,16 @@ class Collocation:
         return w
 
     @property
-    def held(self) -> Array:
-        """Which rows of w are boundary data, shape (rows,)."""
-        held = np.zeros(self.rows, dtype=bool)
-        held[[0, 1, self._last, self._last + 1]] = True
-        return held
+    def fixed(self) -> Array:
+        """Mask of the rows of w that are boundary values, shape (rows,)."""
+        fixed = np.zeros(self.rows, dtype=bool)
+        fixed[[0, 1, self._last, self._last + 1]] = True
+        return fixed
 
     def configurations(self, w: Array, t: Array) -> Array:
         """q at times (M,), shape (M, n).
 
-        The collocation polynomial, or the Hermite cubic where accelerations stand at the nodes.
+        By the collocation polynomial, or by the Hermite cubic when accelerations are at the nodes.
         """
         nodes = np.linspace(0.0, self.duration, self.intervals + 1)
         q, v = (w[i :: self.stride][: self.intervals + 1] for i in (0, 1))
@@ -93,9 +95,9 @@ class Collocation:
         k = np.clip((t / self.h).astype(int), 0, self.intervals - 1)
         s = t / self.h - k
         inner = w[: self._last].reshape(self.intervals, self.stride, -1)[:, 2:]
-        twice = lagrange_integrals(self.table.inner, s)[1]
-        move = np.einsum("mj,mjn->mn", twice, inner[k])
-        return np.asarray(q[k] + self.h * s[:, None] * v[k] + self.h**2 * move)
+        double_integrals = lagrange_integrals(self.table.inner, s)[1]
+        displacement = np.einsum("mj,mjn->mn", double_integrals, inner[k])
+        return np.asarray(q[k] + self.h * s[:, None] * v[k] + self.h**2 * displacement)
 
     @property
     def _columns(self) -> int:
@@ -103,7 +105,7 @@ class Collocation:
 
     @property
     def _last(self) -> int:
-        """The row of the last node."""
+        """Row of the last node."""
         return self.intervals * self.stride
 
     @property
@@ -113,18 +115,18 @@ class Collocation:
 
     @property
     def _inner_times(self) -> Array:
-        begins = self.h * np.arange(self.intervals)
-        return np.asarray(begins[:, None] + self.h * self.table.inner).ravel()
+        starts = self.h * np.arange(self.intervals)
+        return np.asarray(starts[:, None] + self.h * self.table.inner).ravel()
 
     def _scaled(self, rows: Array) -> Array:
-        """Rows for (q, v, a) instead of (q, h v, h^2 a), in and out."""
+        """Rows in terms of (q, v, a) instead of (q, h v, h^2 a), for inputs and outputs."""
         size = self.table.node_size
         node = self.h ** np.arange(size)
         into = np.concatenate([node, np.full(len(self.table.inner), self.h**2), node])
         out = self.h ** (np.arange(len(rows)) % 3) if len(rows) % 3 == 0 else np.ones(len(rows))
         return np.asarray(rows * into / out[:, None])
 
-    def _placed(self, rows: Array) -> sparse.spmatrix:
+    def _along_motion(self, rows: Array) -> sparse.spmatrix:
         """The rows of one interval, repeated along the motion."""
         N = self.intervals
         i, j = np.nonzero(rows)

@@ -1,7 +1,7 @@
 """Collocation tables: trapezoidal, Hermite-Simpson, Legendre-Gauss and Legendre-Gauss-Radau.
 
-A motion is q' = v, v' = a, with accelerations as unknowns. What stands at the points of an
-interval, and what ties its two ends together, is linear in its end data and its accelerations.
+The dynamics are q' = v, v' = a with accelerations as unknowns. The states at the points of an
+interval and its defects are linear in the end states and the accelerations.
 [Kelly2017] [GargPattersonHager2010]
 """
 
@@ -27,11 +27,11 @@ class CollocationTable:
     A node is (q, h v) or, where its acceleration is an unknown too, (q, h v, h^2 a); inner
     accelerations are h^2 a.
 
-    name: in NAMES. order: of the cost in h.
+    name: in NAMES. order: convergence order of the cost in h.
     node_size: 2 or 3. inner: times of the inner accelerations in [0, 1], shape (s,).
     points: rows (q, h v, h^2 a) of each inner quadrature point, shape (Q, 3, columns).
     weights: of these points, shape (Q,). end_weight: of the two nodes.
-    ties: two rows that vanish on a motion, shape (2, columns).
+    defects: two rows that are zero on a motion, shape (2, columns).
     """
 
     name: str
@@ -41,39 +41,39 @@ class CollocationTable:
     points: Array
     weights: Array
     end_weight: float
-    ties: Array
+    defects: Array
 
 
 def collocation_table(name: str) -> CollocationTable:
-    """The table of a name in NAMES. Raises SchemeError for others."""
+    """The table with a name in NAMES. Raises SchemeError for other names."""
     match = re.fullmatch(r"(lgr?)-([1-9])", name)
     if match:
         return _gauss(name, int(match.group(2)), radau=match.group(1) == "lgr")
     if name in _NODAL:
         return _NODAL[name]()
-    raise SchemeError(f"there is no collocation {name!r}: {nearest(name, NAMES)}")
+    raise SchemeError(f"there is no collocation method {name!r}: {nearest(name, NAMES)}")
 
 
 def _trapezoidal() -> CollocationTable:
     """q1 = q0 + h (v0 + v1)/2, v1 = v0 + h (a0 + a1)/2."""
-    ties = np.array([[1, 0.5, 0, -1, 0.5, 0], [0, 1, 0.5, 0, -1, 0.5]])
+    defects = np.array([[1, 0.5, 0, -1, 0.5, 0], [0, 1, 0.5, 0, -1, 0.5]])
     return CollocationTable(
-        "trapezoidal", 2, 3, np.zeros(0), np.zeros((0, 3, 6)), np.zeros(0), 0.5, ties
+        "trapezoidal", 2, 3, np.zeros(0), np.zeros((0, 3, 6)), np.zeros(0), 0.5, defects
     )
 
 
 def _hermite_simpson() -> CollocationTable:
-    """Simpson's rule for q and v, whose values in the middle are those of Hermite cubics."""
+    """Simpson's rule for q and v, with midpoint values of Hermite cubics."""
     # q0, v0, a0, am, q1, v1, a1
     v = np.array([0, 0.5, 0.125, 0, 0, 0.5, -0.125])
     q = np.array([0.5, 0.125, 0, 0, 0.5, -0.125, 0])
     a = np.array([0, 0, 0, 1.0, 0, 0, 0])
-    q_tie = np.array([1, 1 / 6, 0, 0, -1, 1 / 6, 0]) + 4 / 6 * v
-    v_tie = np.array([0, 1, 1 / 6, 4 / 6, 0, -1, 1 / 6])
+    q_defect = np.array([1, 1 / 6, 0, 0, -1, 1 / 6, 0]) + 4 / 6 * v
+    v_defect = np.array([0, 1, 1 / 6, 4 / 6, 0, -1, 1 / 6])
     middle = np.stack([q, v, a])[None]
-    ties = np.stack([q_tie, v_tie])
+    defects = np.stack([q_defect, v_defect])
     return CollocationTable(
-        "hermite-simpson", 4, 3, np.array([0.5]), middle, np.array([4 / 6]), 1 / 6, ties
+        "hermite-simpson", 4, 3, np.array([0.5]), middle, np.array([4 / 6]), 1 / 6, defects
     )
 
 
@@ -81,23 +81,23 @@ _NODAL = {"trapezoidal": _trapezoidal, "hermite-simpson": _hermite_simpson}
 
 
 def _gauss(name: str, s: int, radau: bool) -> CollocationTable:
-    """s accelerations per interval; q and v at their points are integrals, and eliminated."""
+    """s accelerations per interval; q and v at the points are eliminated as their integrals."""
     c = radau_points(s) if radau else (np.polynomial.legendre.leggauss(s)[0] + 1) / 2
-    once, twice = lagrange_integrals(c, c)
+    single, double = lagrange_integrals(c, c)
     b, bb = (row[0] for row in lagrange_integrals(c, np.ones(1)))
     points = np.zeros((s, 3, s + 4))  # columns q0, v0, a_1 .. a_s, q1, v1
     points[:, 0, 0] = points[:, 1, 1] = 1.0
     points[:, 0, 1] = c
-    points[:, 0, 2:-2], points[:, 1, 2:-2], points[:, 2, 2:-2] = twice, once, np.eye(s)
-    ties = np.zeros((2, s + 4))
-    ties[0, :2], ties[1, 1] = 1.0, 1.0
-    ties[0, 2:-2], ties[1, 2:-2] = bb, b
-    ties[0, -2] = ties[1, -1] = -1.0
-    return CollocationTable(name, 2 * s - radau, 2, c, points, b, 0.0, ties)
+    points[:, 0, 2:-2], points[:, 1, 2:-2], points[:, 2, 2:-2] = double, single, np.eye(s)
+    defects = np.zeros((2, s + 4))
+    defects[0, :2], defects[1, 1] = 1.0, 1.0
+    defects[0, 2:-2], defects[1, 2:-2] = bb, b
+    defects[0, -2] = defects[1, -1] = -1.0
+    return CollocationTable(name, 2 * s - radau, 2, c, points, b, 0.0, defects)
 
 
 def radau_points(s: int) -> Array:
-    """The s points of Radau's quadrature in (0, 1], the last of them 1: roots of P_s - P_{s-1}."""
+    """The s Radau points in (0, 1], the last of them 1: roots of P_s - P_{s-1}."""
     series = np.zeros(s + 1)
     series[s - 1 :] = -1.0, 1.0
     roots = np.polynomial.legendre.legroots(series)
@@ -107,16 +107,16 @@ def radau_points(s: int) -> Array:
 
 
 def lagrange_integrals(c: Array, s: Array) -> tuple[Array, Array]:
-    """Integrals from 0 to s of the Lagrange polynomials of the points c, once and twice.
+    """Single and double integrals from 0 to s of the Lagrange polynomials of the points c.
 
     c: shape (n,). s: shape (M,). Returns two arrays of shape (M, n).
     """
     legendre = np.polynomial.legendre
     n = len(c)
     to_series = np.linalg.inv(legendre.legvander(2 * c - 1, n - 1))  # (n, n) coefficients by point
-    once, twice = np.empty((len(s), n)), np.empty((len(s), n))
+    single, double = np.empty((len(s), n)), np.empty((len(s), n))
     for j in range(n):
         first = legendre.legint(to_series[:, j], lbnd=-1, scl=0.5)
-        once[:, j] = legendre.legval(2 * s - 1, first)
-        twice[:, j] = legendre.legval(2 * s - 1, legendre.legint(first, lbnd=-1, scl=0.5))
-    return once, twice
+        single[:, j] = legendre.legval(2 * s - 1, first)
+        double[:, j] = legendre.legval(2 * s - 1, legendre.legint(first, lbnd=-1, scl=0.5))
+    return single, double

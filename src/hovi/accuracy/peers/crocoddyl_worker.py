@@ -1,8 +1,8 @@
-"""Crocoddyl on a scene: loaded by serve.py in a Python that has it.
+"""Crocoddyl on a scene, loaded by serve.py in a Python environment with Crocoddyl.
 
-The torques are squared in the running cost; the goal is a heavy terminal
-cost whose target is then shifted by what is still missed (method of multipliers), so that the
-penalty leaves no bias. A lighter weight to begin with leads away from a guess that is near.
+The running cost is the squared torque. The goal is a terminal cost of large weight, whose target is
+then shifted by the remaining error (method of multipliers), so that the penalty leaves no bias.
+Starting with a smaller weight would lead away from a near guess.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import crocoddyl as cr
 import numpy as np
 import pinocchio as pin
 
-WEIGHT = 1e6
-SHIFTS = 2
-STOP = 1e-7
-STEPS = 300
-CONVERGED = 1e-6
-REACHED = 1e-6
-"""Largest miss of the goal, in [rad] and [rad/s], with which a motion counts as found."""
+TERMINAL_WEIGHT = 1e6
+TARGET_SHIFTS = 2
+STOP_TOLERANCE = 1e-7
+MAX_ITERATIONS = 300
+CONVERGENCE_TOLERANCE = 1e-6
+GOAL_TOLERANCE = 1e-6
+"""Largest error of the goal state, in [rad] and [rad/s], of a successful solve."""
 
 
 class Arm:
@@ -38,16 +38,16 @@ class Arm:
         self._check(scene["check"])
 
     def _check(self, check: dict[str, Any]) -> None:
-        """Wheels that do not fit Pinocchio's lose gravity without a word."""
+        """Incompatible binary packages of Crocoddyl and Pinocchio silently ignore gravity."""
         running = self.dynamics(cr.CostModelSum(self.state, self.model.nv))
         data = running.createData()
         for q, v, a, tau in zip(*(np.array(check[k]) for k in ("q", "v", "a", "tau")), strict=True):
             running.calc(data, np.concatenate([q, v]), tau)
-            off = np.abs(data.xout - a).max()
-            if not off < 1e-8 * max(1.0, np.abs(a).max()):
+            error = np.abs(data.xout - a).max()
+            if not error < 1e-8 * max(1.0, np.abs(a).max()):
                 raise RuntimeError(
-                    f"Crocoddyl {cr.__version__} beside pin {pin.__version__} is off by {off:.2g} "
-                    "in an acceleration: the two packages do not fit together"
+                    f"an acceleration of Crocoddyl {cr.__version__} with pin {pin.__version__} is "
+                    f"wrong by {error:.2g}: the two packages are not compatible"
                 )
 
     def dynamics(self, cost: Any) -> Any:
@@ -61,7 +61,7 @@ class Arm:
 
 
 class Solve:
-    """A shooting problem on N intervals, and the guess that every solve starts from."""
+    """A shooting problem on N intervals, and the initial guess of every solve."""
 
     def __init__(self, arm: Arm, intervals: int, guess: dict[str, Any]) -> None:
         nu, state = arm.model.nv, arm.state
@@ -70,7 +70,7 @@ class Solve:
         running.addCost("effort", effort, 1.0)
         self.terminal = cr.CostModelSum(state, nu)
         goal = cr.CostModelResidual(state, cr.ResidualModelState(state, arm.goal, nu))
-        self.terminal.addCost("goal", goal, WEIGHT)
+        self.terminal.addCost("goal", goal, TERMINAL_WEIGHT)
         rk4, step = cr.RKType.four, arm.T / intervals
         held = cr.ControlParametrizationModelPolyZero(nu)
         curved = cr.ControlParametrizationModelPolyTwoRK(nu, rk4)
@@ -78,9 +78,9 @@ class Solve:
         stage = cr.IntegratedActionModelRK(arm.dynamics(running), control, rk4, step)
         last = cr.IntegratedActionModelEuler(arm.dynamics(self.terminal), 0.0)
         self.problem = cr.ShootingProblem(arm.start, [stage] * intervals, last)
-        self.problem.nthreads = 1  # as everything that is measured
+        self.problem.nthreads = 1  # like all measured methods
         self.solver = cr.SolverFDDP(self.problem)
-        self.solver.th_stop = STOP
+        self.solver.th_stop = STOP_TOLERANCE
         self.goal = arm.goal
         q, v, a = (np.array(guess[k]) for k in "qva")
         tau = arm.torques(q, v, a)
@@ -97,25 +97,25 @@ class Solve:
         xs, us, self.steps, feasible = self.xs, self.us, 0, False
         reference = self.terminal.costs["goal"].cost.residual
         target = self.goal.copy()
-        for shift in range(SHIFTS + 1):
+        for shift in range(TARGET_SHIFTS + 1):
             if shift:
                 target = target + self.goal - np.array(xs[-1])
             reference.reference = target
-            self.done = self.solver.solve(xs, us, STEPS, feasible, 1e-9)
+            self.done = self.solver.solve(xs, us, MAX_ITERATIONS, feasible, 1e-9)
             self.steps += self.solver.iter
             xs, us = list(self.solver.xs), list(self.solver.us)
             feasible = self.solver.isFeasible
         self.found = xs, us
 
     def answer(self) -> dict[str, Any]:
-        """What the last solve found."""
+        """The result of the last solve."""
         self.problem.calc(*self.found)
         x = np.array([np.array(each) for each in self.found[0]])
         n = x.shape[1] // 2
         missed = float(np.abs(x[-1] - self.goal).max())
-        converged = bool(self.done) or self.solver.stop < CONVERGED
+        converged = bool(self.done) or self.solver.stop < CONVERGENCE_TOLERANCE
         return {
-            "success": converged and missed < REACHED,
+            "success": converged and missed < GOAL_TOLERANCE,
             "message": f"stop {self.solver.stop:.1e}, goal missed by {missed:.1e}",
             "cost": float(sum(data.cost for data in self.problem.runningDatas)),
             "steps": self.steps,

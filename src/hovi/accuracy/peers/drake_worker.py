@@ -1,8 +1,8 @@
-"""Drake's DirectCollocation on a scene: loaded by serve.py in a Python that has it.
+"""Drake's DirectCollocation on a scene, loaded by serve.py in a Python environment with Drake.
 
-Hermite-Simpson defects with piecewise linear torque, whose square is
-integrated exactly; steps of equal length; solved by Ipopt (whose Hessian is approximated, since
-DirectCollocation has first derivatives only) or by SNOPT.
+Hermite-Simpson defects with piecewise linear torque, whose square is integrated exactly; equal
+steps; solved by Ipopt (with an approximate Hessian, since DirectCollocation has first derivatives
+only) or by SNOPT.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from pydrake.all import (
     SolverOptions,
 )
 
-OPTIMAL, FEASIBLE = 1e-6, 1e-8
-STEPS = 3000
+OPTIMALITY_TOLERANCE, FEASIBILITY_TOLERANCE = 1e-6, 1e-8
+MAX_ITERATIONS = 3000
 
 
 class Arm:
@@ -42,9 +42,9 @@ class Arm:
         self.longest = scene["longest"]
         self.ends = [np.array(x) for x in scene["ends"]]
         q, v, a, tau = (np.array(scene["check"][k]) for k in ("q", "v", "a", "tau"))
-        off = np.abs(self.torques(q, v, a) - tau).max()
-        if not off < 1e-8 * max(1.0, np.abs(tau).max()):
-            raise RuntimeError(f"Drake's torques differ from hovi's by {off:.2g}")
+        error = np.abs(self.torques(q, v, a) - tau).max()
+        if not error < 1e-8 * max(1.0, np.abs(tau).max()):
+            raise RuntimeError(f"Drake's torques differ from hovi's by {error:.2g}")
 
     def torques(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
         """Inverse dynamics at M points, shape (M, n)."""
@@ -59,18 +59,18 @@ class Arm:
 
 
 class Solve:
-    """A program on N intervals, and the guess that every solve starts from."""
+    """A program on N intervals, and the initial guess of every solve."""
 
     def __init__(self, arm: Arm, intervals: int, guess: dict[str, Any]) -> None:
         N, h, n = intervals, arm.T / intervals, arm.plant.num_positions()
         port = arm.plant.get_actuation_input_port().get_index()
-        it = DirectCollocation(arm.plant, arm.context, N + 1, h, h, input_port_index=port)
-        self.prog, self.n = it.prog(), n
+        collocation = DirectCollocation(arm.plant, arm.context, N + 1, h, h, input_port_index=port)
+        self.prog, self.n = collocation.prog(), n
         for k in range(N):
-            self.prog.AddBoundingBoxConstraint(h, h, it.time_step(k))
-            self.prog.SetInitialGuess(it.time_step(k), [h])
-        self.x = [it.state(k) for k in range(N + 1)]
-        u = [it.input(k) for k in range(N + 1)]
+            self.prog.AddBoundingBoxConstraint(h, h, collocation.time_step(k))
+            self.prog.SetInitialGuess(collocation.time_step(k), [h])
+        self.x = [collocation.state(k) for k in range(N + 1)]
+        u = [collocation.input(k) for k in range(N + 1)]
         q0, v0, q1, v1 = arm.ends
         for state, x in ((self.x[0], (q0, v0)), (self.x[-1], (q1, v1))):
             self.prog.AddBoundingBoxConstraint(np.concatenate(x), np.concatenate(x), state)
@@ -92,7 +92,7 @@ class Solve:
         self.found = self.solver.Solve(self.prog, self.guess, self.options)
 
     def answer(self) -> dict[str, Any]:
-        """What the last solve found."""
+        """The result of the last solve."""
         x = np.array([self.found.GetSolution(state) for state in self.x])
         return {
             "success": self.found.is_success(),
@@ -109,14 +109,18 @@ def _solver(name: str, longest: float) -> tuple[Any, Any]:
     if name == "SNOPT":
         solver = SnoptSolver()
         values: dict[str, Any] = {
-            "Major optimality tolerance": OPTIMAL,
-            "Major feasibility tolerance": FEASIBLE,
+            "Major optimality tolerance": OPTIMALITY_TOLERANCE,
+            "Major feasibility tolerance": FEASIBILITY_TOLERANCE,
         }
-        values |= {"Major iterations limit": STEPS, "Iterations limit": 2_000_000}
+        values |= {"Major iterations limit": MAX_ITERATIONS, "Iterations limit": 2_000_000}
         values |= {"Superbasics limit": 2000, "Time limit (secs)": longest, "Timing level": 3}
     else:
         solver = IpoptSolver()
-        values = {"tol": OPTIMAL, "constr_viol_tol": FEASIBLE, "max_iter": STEPS}
+        values = {
+            "tol": OPTIMALITY_TOLERANCE,
+            "constr_viol_tol": FEASIBILITY_TOLERANCE,
+            "max_iter": MAX_ITERATIONS,
+        }
         values |= {"hessian_approximation": "limited-memory", "limited_memory_max_history": 30}
         values |= {"max_wall_time": longest, "acceptable_iter": 0}
     for key, value in values.items():

@@ -1,4 +1,4 @@
-"""Tools that live in a Python of their own, as methods of a work-precision diagram."""
+"""Tools in Python environments of their own, as methods of a work-precision diagram."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from scipy.interpolate import CubicHermiteSpline
 from hovi.accuracy import Setting
 from hovi.accuracy.method import Answer, Method, Prepared
 from hovi.accuracy.peers.bare_urdf import bare_urdf
-from hovi.accuracy.peers.supported_scenes import require_plain
+from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.accuracy.peers.worker import Worker
 
 Array = npt.NDArray[np.float64]
 
-_CHECKS = 5
-STARTING = 20.0
-"""Seconds that a tool may need to be imported."""
+_CHECK_POINTS = 5
+STARTUP_TIME = 20.0
+"""Time allowed for importing a tool, in [s]."""
 
 
-class OutsideMethod(Method):
-    """A tool that answers questions in JSON: see serve.py.
+class ExternalMethod(Method):
+    """A tool that answers JSON requests in a process of its own, see serve.py.
 
-    setting: what is planned. python: of the tool's environment. tool: its worker.
-    options: what the worker needs to know of the method. nearer: start from the nearer guess.
+    setting: problem and guess. python: of the tool's environment. tool: name of its worker module.
+    options: passed to the worker. nearer: start from the nearer guess.
     """
 
     coarsest = 24
@@ -45,12 +45,12 @@ class OutsideMethod(Method):
         options: Mapping[str, Any],
         nearer: bool = False,
     ) -> None:
-        require_plain(setting)
+        require_supported(setting)
         self._setting = setting
         self._guess = setting.nearer if nearer else setting.guess
         self.name, self.family, self.order = name, family, order
         scene = _scene(setting) | {"options": dict(options)}
-        self._worker = Worker(python, tool, patience=2 * setting.longest + STARTING)
+        self._worker = Worker(python, tool, timeout=2 * setting.longest + STARTUP_TIME)
         try:
             self._worker.ask(scene)
         except BaseException:
@@ -58,7 +58,7 @@ class OutsideMethod(Method):
             raise
 
     def prepare(self, intervals: int) -> Prepared:
-        """What the tool builds for N intervals, in its own process."""
+        """Set up the tool for N intervals, in its own process."""
         T = self._setting.problem.grid.duration
         t = np.linspace(0.0, T, 2 * intervals + 1)
         q, v, a = (x.tolist() for x in self._guess(t))
@@ -70,22 +70,22 @@ class OutsideMethod(Method):
         answer = self._worker.ask({"solve": intervals})
         q, v = np.array(answer["q"]), np.array(answer["v"])
         t = np.linspace(0.0, self._setting.problem.grid.duration, intervals + 1)
-        where: Callable[[Array], Array] = CubicHermiteSpline(t, q, v)
-        said = bool(answer["success"]), str(answer["message"]), float(answer["cost"])
-        return Answer(*said, where, int(answer["steps"]), float(answer["seconds"]))
+        motion: Callable[[Array], Array] = CubicHermiteSpline(t, q, v)
+        report = bool(answer["success"]), str(answer["message"]), float(answer["cost"])
+        return Answer(*report, motion, int(answer["steps"]), float(answer["seconds"]))
 
     def close(self) -> None:
-        """End the tool's process."""
+        """Terminate the tool's process."""
         self._worker.close()
 
 
 @dataclass(frozen=True, eq=False)
-class OutsideTool:
-    """A tool in an environment of its own, with the variants of it that are measured.
+class ExternalTool:
+    """A tool in an environment of its own, and its measured variants.
 
-    worker: the module of this folder that serve.py loads there. family: see Method.
-    variants: names, each with its order, see Method, and with what the worker needs to know.
-    nearer: whether it starts from the nearer guess, where it would end in other minima otherwise.
+    worker: module of this folder that serve.py loads there. family: see Method.
+    variants: by name, the order, see Method, and the options for the worker.
+    nearer: whether to start from the nearer guess, if the tool otherwise finds other minima.
     """
 
     worker: str
@@ -93,11 +93,11 @@ class OutsideTool:
     variants: Mapping[str, tuple[int | None, Mapping[str, Any]]]
     nearer: bool = False
 
-    def peers(self, python: Path) -> list[partial[OutsideMethod]]:
-        """A method per variant, for `work_precision(peers=)`. python: of its environment."""
+    def peers(self, python: Path) -> list[partial[ExternalMethod]]:
+        """One method per variant, for `work_precision(peers=)`, run by the tool's `python`."""
         return [
             partial(
-                OutsideMethod,
+                ExternalMethod,
                 python=python,
                 tool=self.worker,
                 name=f"{self.family}, {name}",
@@ -111,10 +111,10 @@ class OutsideTool:
 
 
 def _scene(setting: Setting) -> dict[str, Any]:
-    """The robot, its ends, and torques by which a tool can tell whether it has the same robot."""
+    """The robot and boundary states, and torques that let a tool check its robot model."""
     problem = setting.problem
     model, n = problem.scene.model, problem.robot.nv
-    q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, _CHECKS, n))
+    q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, _CHECK_POINTS, n))
     tau = problem.scene.inverse_dynamics(q, v, a)
     check = {"q": q, "v": v, "a": a, "tau": tau}
     return {

@@ -17,45 +17,47 @@ from hovi.accuracy.method import CLOCKS, Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.peers.collocation import Collocation
 from hovi.accuracy.peers.collocation_table import NAMES, collocation_table
 from hovi.accuracy.peers.point_program import LIBRARY, PointKernels, compiled, point_kernels
-from hovi.accuracy.peers.supported_scenes import require_plain
+from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 
 FAMILIES = {True: "Ipopt, compiled", False: "Ipopt, interpreted"}
 
 
 class CollocationMethod(Method):
-    """A collocation whose program Ipopt solves.
+    """Collocation solved by Ipopt.
 
-    setting: what is planned. scheme: in collocation_table.NAMES. kernels: of its points.
+    setting: problem and guess. scheme: in collocation_table.NAMES. kernels: cost kernels of the
+        points.
     """
 
     def __init__(self, setting: Setting, scheme: str, kernels: Kernels) -> None:
-        require_plain(setting)
+        require_supported(setting)
         self._setting, self._table, self._kernels = setting, collocation_table(scheme), kernels
         self.family = FAMILIES[kernels.compiled]
         self.name, self.order = f"{scheme}, {self.family}", self._table.order
 
     def prepare(self, intervals: int) -> Prepared:
-        """The program and its solver; kernels count as if they were made for it alone."""
+        """Set up the program and solver; the time includes building the kernels."""
         problem = self._setting.problem
         kernels, before = self._kernels.of(self._setting)
-        it = Collocation(self._table, intervals, problem.grid.duration, problem.robot.nv)
-        w = it.unknowns(self._setting.guess, problem.boundary)
+        collocation = Collocation(self._table, intervals, problem.grid.duration, problem.robot.nv)
+        w = collocation.unknowns(self._setting.guess, problem.boundary)
         watch = Stopwatch(self._setting.clock)
-        solver = it.program.solver(kernels)
+        solver = collocation.program.solver(kernels)
         seconds = before + watch.seconds
-        free = np.where(it.held[:, None], 0.0, np.inf)
+        free = np.where(collocation.fixed[:, None], 0.0, np.inf)
         bounds = {"lbx": (w - free).ravel(), "ubx": (w + free).ravel(), "lbg": 0, "ubg": 0}
         arguments = {"x0": w.ravel()} | bounds
-        return Prepared(partial(_solve, it, solver, arguments, self._setting.clock), seconds)
+        return Prepared(
+            partial(_solve, collocation, solver, arguments, self._setting.clock), seconds
+        )
 
 
 class Kernels:
-    """Kernels that the collocations of one scene share, with the time that they took.
+    """Kernels shared by the collocation methods of one scene, and the time of building them.
 
-    compiled: by gcc, or for CasADi's interpreter.
-    folder: where what was compiled is kept from run to run, with the time that it took; nowhere
-        when None.
+    compiled: by gcc, or evaluated by CasADi's interpreter.
+    folder: cache of compiled kernels and their compile times; None for no cache.
     """
 
     def __init__(self, compiled: bool, folder: Path | None = None) -> None:
@@ -63,13 +65,13 @@ class Kernels:
         self._made: tuple[PointKernels, float] | None = None
 
     def of(self, setting: Setting) -> tuple[PointKernels, float]:
-        """The kernels, and what making them took, in [s]."""
+        """The kernels and the time of building them, in [s]."""
         if self._made is None:
             watch = Stopwatch(setting.clock)
             kernels = point_kernels(casadi_functions(setting.problem.scene.model).inverse_dynamics)
             seconds = watch.seconds
             if self.compiled and self._folder is not None:
-                kernels, more = _kept(kernels, self._folder, setting.clock)
+                kernels, more = _cached(kernels, self._folder, setting.clock)
                 seconds += more
             elif self.compiled:
                 with tempfile.TemporaryDirectory(prefix="hovi-kernels-") as folder:
@@ -82,7 +84,7 @@ class Kernels:
 def ipopt_peers(
     compiled: bool, schemes: tuple[str, ...] = NAMES, folder: Path | None = None
 ) -> list[partial[CollocationMethod]]:
-    """All collocations with one kind of kernels, for `work_precision(peers=)`.
+    """All collocation methods with one kind of kernels, for `work_precision(peers=)`.
 
     folder: see Kernels.
     """
@@ -91,38 +93,40 @@ def ipopt_peers(
 
 
 def collocation_peers() -> list[partial[CollocationMethod]]:
-    """All collocations with both kinds of kernels."""
+    """All collocation methods with both kinds of kernels."""
     return [*ipopt_peers(compiled=True), *ipopt_peers(compiled=False)]
 
 
-def _kept(kernels: PointKernels, folder: Path, clock: str) -> tuple[PointKernels, float]:
-    """Compiled kernels from a folder, put there if they are new, and what compiling took."""
+def _cached(kernels: PointKernels, folder: Path, clock: str) -> tuple[PointKernels, float]:
+    """Compiled kernels from a cache folder, added if new, and their compile time, in [s]."""
     text = kernels.hessian.serialize().encode()
-    place = folder / hashlib.sha256(text).hexdigest()[:16]
-    times = place / "seconds.json"
+    entry = folder / hashlib.sha256(text).hexdigest()[:16]
+    times = entry / "seconds.json"
     if times.exists():
         names = (kernels.value, kernels.gradient, kernels.hessian)
-        library = str(place / LIBRARY)
-        there = PointKernels(*(ca.external(each.name(), library) for each in names))
-        return there, float(json.loads(times.read_text())[clock])
-    place.mkdir(parents=True, exist_ok=True)
+        library = str(entry / LIBRARY)
+        functions = PointKernels(*(ca.external(each.name(), library) for each in names))
+        return functions, float(json.loads(times.read_text())[clock])
+    entry.mkdir(parents=True, exist_ok=True)
     watches = {name: Stopwatch(name) for name in CLOCKS}
-    made = compiled(kernels, place)
+    built = compiled(kernels, entry)
     times.write_text(json.dumps({name: watch.seconds for name, watch in watches.items()}))
-    return made, watches[clock].seconds
+    return built, watches[clock].seconds
 
 
-def _solve(it: Collocation, solver: ca.Function, arguments: dict[str, Any], clock: str) -> Answer:
+def _solve(
+    collocation: Collocation, solver: ca.Function, arguments: dict[str, Any], clock: str
+) -> Answer:
     watch = Stopwatch(clock)
     found = solver(**arguments)
     seconds = watch.seconds
     stats = solver.stats()
-    w = found["x"].full().reshape(it.rows, it.joints)
+    w = found["x"].full().reshape(collocation.rows, collocation.joints)
     return Answer(
         success=bool(stats["success"]),
         message=str(stats["return_status"]),
         cost=float(found["f"]),
-        configurations=partial(it.configurations, w),
+        configurations=partial(collocation.configurations, w),
         steps=int(stats["iter_count"]),
         seconds=seconds,
     )

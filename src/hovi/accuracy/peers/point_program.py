@@ -1,8 +1,8 @@
-"""A direct transcription for Ipopt, as an expert would write it.
+"""An efficient direct transcription for Ipopt.
 
-All unknowns w enter the points p = (q, v, a) linearly, and so do the conditions that tie the
-motion together; the cost is a weighted sum of 1/2 |tau(p)|^2. Gradient and exact Hessian are put
-together from kernels of one point, which gcc has compiled or CasADi interprets.
+The points p = (q, v, a) and the defects are linear in the unknowns w; the cost is a weighted sum of
+1/2 |tau(p)|^2. Gradient and exact Hessian are assembled from kernels of one point, which are
+compiled by gcc or interpreted by CasADi.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class PointKernels:
 
 
 def point_kernels(inverse_dynamics: ca.Function) -> PointKernels:
-    """The kernels of a torque (q, v, a) -> tau, for CasADi's interpreter."""
+    """The kernels of an inverse dynamics function (q, v, a) -> tau, for CasADi's interpreter."""
     n = int(inverse_dynamics.size1_in(1))
     p = ca.SX.sym("p", 3 * n)
     tau = ca.cse(inverse_dynamics(p[:n], p[n : 2 * n], p[2 * n :]))
@@ -61,12 +61,12 @@ def point_kernels(inverse_dynamics: ca.Function) -> PointKernels:
 
 
 def compiled(kernels: PointKernels, folder: Path) -> PointKernels:
-    """The same kernels as machine code, in a library that goes to `folder`.
+    """The kernels compiled by gcc into a library in `folder`.
 
-    Raises UnmeasurableError where there is no gcc, or it fails.
+    Raises UnmeasurableError if gcc is missing or fails.
     """
     if shutil.which(COMPILE[0]) is None:
-        raise UnmeasurableError("compiled kernels need gcc, which was not found.")
+        raise UnmeasurableError("compiled kernels need gcc, which was not found; install gcc.")
     functions = (kernels.value, kernels.gradient, kernels.hessian)
     generator = ca.CodeGenerator("kernels.c")
     for function in functions:
@@ -82,23 +82,23 @@ def compiled(kernels: PointKernels, folder: Path) -> PointKernels:
 
 @dataclass(frozen=True, eq=False)
 class PointProgram:
-    """min sum_j weights_j L(p_j) over w, with p = points w and ties w = 0.
+    """min sum_j weights_j L(p_j) over w, with p = points w and defects w = 0.
 
-    points: shape (3 n P, W). ties: shape (E, W). weights: shape (P,).
+    points: shape (3 n P, W). defects: shape (E, W). weights: shape (P,).
     """
 
     points: ca.DM
-    ties: ca.DM
+    defects: ca.DM
     weights: Array
 
     def solver(self, kernels: PointKernels) -> ca.Function:
-        """Ipopt on this program."""
+        """An Ipopt solver for this program."""
         P = len(self.weights)
         m = self.points.shape[0] // P
         w = ca.MX.sym("w", self.points.shape[1])
         p = ca.reshape(ca.mtimes(self.points, w), m, P)
         f = ca.dot(kernels.value.map(P)(p).T, ca.DM(self.weights))
-        g = ca.mtimes(self.ties, w)
+        g = ca.mtimes(self.defects, w)
         options: dict[str, Any] = {"print_time": 0, "ipopt": IPOPT, "no_nlp_grad": True}
         options |= self._derivatives(w, p, g, kernels)
         return ca.nlpsol("S", "ipopt", {"x": w, "f": f, "g": g}, options)
@@ -106,10 +106,10 @@ class PointProgram:
     def _derivatives(
         self, w: ca.MX, p: ca.MX, g: ca.MX, kernels: PointKernels
     ) -> dict[str, ca.Function]:
-        """The functions that nlpsol would otherwise generate, by the names that it asks for."""
+        """The functions that nlpsol would otherwise generate, by their option names."""
         m, P = p.shape
         W = ca.DM(self.weights)
-        nothing, lf, lg = ca.MX.sym("par", 0, 1), ca.MX.sym("lf"), ca.MX.sym("lg", g.shape[0])
+        no_parameters, lf, lg = ca.MX.sym("par", 0, 1), ca.MX.sym("lf"), ca.MX.sym("lg", g.shape[0])
         value, slope = kernels.gradient.map(P)(p)
         slope = ca.mtimes(self.points.T, ca.vec(slope * ca.repmat(W.T, m, 1)))
         columns = list(range(0, m * m * P + 1, m))
@@ -118,20 +118,24 @@ class PointProgram:
         scale = ca.repmat(ca.DM(np.repeat(self.weights, m)).T, m, 1)
         H = ca.MX(blocks, lf * ca.vec(kernels.hessian.map(P)(p) * scale))
         H = ca.mtimes(ca.mtimes(self.points.T, H), self.points)
-        fgrad, jacobian = [ca.dot(value.T, W), slope], [g, ca.MX(self.ties)]
+        fgrad, jacobian = [ca.dot(value.T, W), slope], [g, ca.MX(self.defects)]
         hessian_of = ["x", "p", "lam:f", "lam:g"]
         upper = ["triu:hess:gamma:x:x"]
         return {
-            "grad_f": ca.Function("nlp_grad_f", [w, nothing], fgrad, ["x", "p"], ["f", "grad:f:x"]),
-            "jac_g": ca.Function("nlp_jac_g", [w, nothing], jacobian, ["x", "p"], ["g", "jac:g:x"]),
+            "grad_f": ca.Function(
+                "nlp_grad_f", [w, no_parameters], fgrad, ["x", "p"], ["f", "grad:f:x"]
+            ),
+            "jac_g": ca.Function(
+                "nlp_jac_g", [w, no_parameters], jacobian, ["x", "p"], ["g", "jac:g:x"]
+            ),
             "hess_lag": ca.Function(
-                "nlp_hess_l", [w, nothing, lf, lg], [ca.triu(H)], hessian_of, upper
+                "nlp_hess_l", [w, no_parameters, lf, lg], [ca.triu(H)], hessian_of, upper
             ),
         }
 
 
-def dm(matrix: sparse.spmatrix) -> ca.DM:
-    """A sparse matrix for CasADi."""
+def casadi_matrix(matrix: sparse.spmatrix) -> ca.DM:
+    """A sparse matrix as a CasADi DM."""
     columns = sparse.csc_matrix(matrix)
     columns.sum_duplicates()
     columns.sort_indices()

@@ -1,8 +1,8 @@
-"""Answers questions about one tool: run by the Python of its environment, without hovi.
+"""The server process of one tool, run by the Python of its environment, without hovi.
 
-One JSON object per line, in and out. The first question is the scene; each later one is "prepare"
-or "solve" with a number of intervals. The argument names a module of this folder, which has an
-Arm (the scene, checked) and a Solve (a grid), which can `run` and then has an `answer`.
+It reads and writes one JSON object per line. The first request is the scene; each later one is
+"prepare" or "solve" with a number of intervals. The command-line argument names a module of this
+folder that defines Arm (the checked scene) and Solve (one grid, with methods `run` and `answer`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ CLOCKS = {"wall": time.perf_counter, "processor": time.process_time}
 
 
 class Session:
-    """A tool with its scene and the grids that were prepared for it."""
+    """A tool, its scene and its prepared grids."""
 
     def __init__(self, tool: Any) -> None:
         self._tool = tool
@@ -25,23 +25,23 @@ class Session:
         self._clock = time.perf_counter
         self._solves: dict[int, Any] = {}
 
-    def answer(self, question: dict[str, Any]) -> dict[str, Any]:
-        """What the other side asked for."""
-        if "urdf" in question:
-            self._arm, self._clock = self._tool.Arm(question), CLOCKS[question["clock"]]
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        """The response to one request."""
+        if "urdf" in request:
+            self._arm, self._clock = self._tool.Arm(request), CLOCKS[request["clock"]]
             return {"ready": True}
-        if "solve" in question:
-            solve = self._solves[question["solve"]]
+        if "solve" in request:
+            solve = self._solves[request["solve"]]
             began = self._clock()
             solve.run()
             return {"seconds": self._clock() - began, **solve.answer()}
-        began, intervals = self._clock(), question["prepare"]
-        self._solves[intervals] = self._tool.Solve(self._arm, intervals, question["guess"])
+        began, intervals = self._clock(), request["prepare"]
+        self._solves[intervals] = self._tool.Solve(self._arm, intervals, request["guess"])
         return {"seconds": self._clock() - began}
 
 
 def main() -> None:
-    """Serve until the other side closes."""
+    """Answer requests until standard input is closed."""
     try:
         session = Session(importlib.import_module(sys.argv[1]))
     except ImportError as missing:
@@ -50,7 +50,7 @@ def main() -> None:
     for line in sys.stdin:
         try:
             answer = session.answer(json.loads(line))
-        except Exception as error:  # the other side is told, and decides
+        except Exception as error:  # reported to the client
             answer = {"error": f"{type(error).__name__}: {error}"}
         print("\n" + json.dumps(answer), flush=True)
 

@@ -1,4 +1,4 @@
-"""Which scenes the reference tools support: rigid bodies on vector joints, gravity, armature."""
+"""The check that the reference tools support a scene: vector joints, gravity and armature."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ from hovi.accuracy import Setting
 from hovi.errors import UnmeasurableError
 
 POINTS = 20
-SAME = 1e-9
-"""Relative difference of the cost's integrand up to which two scenes are the same."""
+MAX_RELATIVE_DIFFERENCE = 1e-9
+"""Largest relative difference of the integrand of the cost from 1/2 |RNEA|^2."""
 
 
-def require_plain(setting: Setting) -> None:
+def require_supported(setting: Setting) -> None:
     """Raise UnmeasurableError for a scene whose cost is not 1/2 |RNEA|^2."""
     problem = setting.problem
     if not problem.plain:
         raise UnmeasurableError(
-            "reference tools are measured between two states, with a torque at every joint."
+            "the reference tools need two boundary states and a torque at every joint."
         )
     if not problem.robot.vector_joints:
-        raise UnmeasurableError("reference tools are measured on revolute and sliding joints only.")
+        raise UnmeasurableError("the reference tools support only revolute and prismatic joints.")
     model, n = problem.scene.model, problem.robot.nv
     data = model.createData()
     q, v, a = np.random.default_rng(0).uniform(-1, 1, (3, POINTS, n))
     tau = np.array([pin.rnea(model, data, *point) for point in zip(q, v, a, strict=True)])
-    plain, ours = 0.5 * np.sum(tau**2, axis=1), problem.ld.lagrangian.value(q, v, a)
-    if np.max(np.abs(plain - ours) / np.maximum(plain, 1.0)) > SAME:
+    reference, ours = 0.5 * np.sum(tau**2, axis=1), problem.ld.lagrangian.value(q, v, a)
+    if np.max(np.abs(reference - ours) / np.maximum(reference, 1.0)) > MAX_RELATIVE_DIFFERENCE:
         raise UnmeasurableError(
-            "reference tools know rigid bodies, gravity and armature, and this scene has more in "
-            "its torques or in its cost; they are left out."
+            "the reference tools support rigid bodies, gravity and armature, but this scene has "
+            "further torques or costs; they are left out."
         )

@@ -1,7 +1,7 @@
-"""The one list of reference tools for comparison: `hovi accuracy --peer NAME[=PYTHON]`.
+"""The reference tools of `hovi accuracy --peer NAME[=PYTHON]`.
 
-A tool in an environment of its own is a worker in this folder and an entry of OUTSIDE; one that
-runs in this process is a file with its methods and an entry of INSIDE.
+To add a tool in an environment of its own, write a worker module in this folder and an entry of
+EXTERNAL; to add one that runs in this process, write its methods and an entry of IN_PROCESS.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from hovi.accuracy import Peer
-from hovi.accuracy.peers.external_method import OutsideTool
+from hovi.accuracy.peers.external_method import ExternalTool
 from hovi.accuracy.peers.ipopt_method import collocation_peers
 from hovi.errors import InputError, nearest
 
-INSIDE: Mapping[str, Callable[[], Sequence[Peer]]] = {"collocation": collocation_peers}
+IN_PROCESS: Mapping[str, Callable[[], Sequence[Peer]]] = {"collocation": collocation_peers}
 
-OUTSIDE: Mapping[str, OutsideTool] = {
-    # FDDP with two ways to write the torque in an interval. From the near guess it leaves for
-    # other minima on the arms.
-    "crocoddyl": OutsideTool(
+EXTERNAL: Mapping[str, ExternalTool] = {
+    # FDDP with two parametrizations of the torque in an interval. From the near guess it finds
+    # other minima on the robot arms.
+    "crocoddyl": ExternalTool(
         worker="crocoddyl_worker",
         family="Crocoddyl",
         variants={
@@ -28,7 +28,7 @@ OUTSIDE: Mapping[str, OutsideTool] = {
         },
         nearer=True,
     ),
-    "drake": OutsideTool(
+    "drake": ExternalTool(
         worker="drake_worker",
         family="Drake",
         variants={
@@ -42,15 +42,15 @@ OUTSIDE: Mapping[str, OutsideTool] = {
 def tool_peers(name: str, python: Path | None = None) -> list[Peer]:
     """The methods of a tool, for `work_precision(peers=)`.
 
-    name: in INSIDE or OUTSIDE. python: of the tool's environment, for those of OUTSIDE.
-    Raises InputError for an unknown name, and for a Python that is missing or has no use.
+    name: in IN_PROCESS or EXTERNAL. python: of the tool's environment, for tools in EXTERNAL.
+    Raises InputError for an unknown name, and for a Python that is missing or superfluous.
     """
-    if name in INSIDE:
+    if name in IN_PROCESS:
         if python is not None:
-            raise InputError(f"{name} runs in this Python, not in {str(python)!r}; leave it out.")
-        return list(INSIDE[name]())
-    if name not in OUTSIDE:
-        raise InputError(f"there is no peer {name!r}: {nearest(name, (*INSIDE, *OUTSIDE))}")
+            raise InputError(f"{name} runs in this Python; leave out {str(python)!r}.")
+        return list(IN_PROCESS[name]())
+    if name not in EXTERNAL:
+        raise InputError(f"there is no peer {name!r}: {nearest(name, (*IN_PROCESS, *EXTERNAL))}")
     if python is None:
-        raise InputError(f"{name} needs the Python of its environment: {name}=PYTHON.")
-    return list(OUTSIDE[name].peers(python))
+        raise InputError(f"{name} needs the Python of its environment; write {name}=PYTHON.")
+    return list(EXTERNAL[name].peers(python))
