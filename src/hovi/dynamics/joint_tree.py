@@ -97,7 +97,7 @@ def read_joint_tree(model: pin.Model) -> JointTree:
     axes = np.array([row.axis for row in rows]).reshape(-1, 6)
     rotating = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
     frames = _frames_along(np.where(rotating[:, None], axes[:, 3:], axes[:, :3]))
-    twist_indices = base.places if base else ()
+    twist_indices = base.se3_indices if base else ()
     frames[: len(twist_indices)] = np.eye(3)
     parent_frames = np.concatenate([frames, np.eye(3)[None]])[parents]
     rotations = np.array([row.placement.rotation for row in rows]).reshape(-1, 3, 3)
