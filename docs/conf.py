@@ -44,6 +44,7 @@ sphinx_gallery_conf = {
     "nested_sections": False,
     "download_all_examples": False,
     "remove_config_comments": True,
+    "write_computation_times": False,
 }
 
 KEY = re.compile(r"\[([A-Za-z]+\d{4})[],; ]|; ([A-Za-z]+\d{4})[],; ]")
