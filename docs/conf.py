@@ -1,4 +1,4 @@
-"""Sphinx: the pages of this folder, the examples as a gallery, docstrings as they were written."""
+"""Sphinx: the pages of this folder, the examples as a gallery, docstrings shown verbatim."""
 
 from __future__ import annotations
 
@@ -51,30 +51,32 @@ KEY = re.compile(r"\[([A-Za-z]+\d{4})[],; ]|; ([A-Za-z]+\d{4})[],; ]")
 
 
 def check_references(app: Sphinx) -> None:
-    """Every source that a docstring names is in references.md."""
+    """Raise SphinxError where a docstring cites a source that references.md does not list."""
     listed = (TOP / "docs" / "references.md").read_text()
     for path in sorted((TOP / "src").rglob("*.py")):
         for match in KEY.finditer(path.read_text()):
             key = match[1] or match[2]
             if f"[{key}]" not in listed:
-                raise SphinxError(f"{path.name} refers to [{key}], which references.md lacks")
+                raise SphinxError(f"{path.name} cites [{key}]: add it to docs/references.md")
 
 
-def as_written(app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Docstrings are prose with formulas, not reStructuredText: show them as they are."""
+def show_verbatim(
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    """Docstrings are prose with formulas, not reStructuredText: show them verbatim."""
     if lines:
         lines[:] = [".. code-block:: none", "", *(f"   {line}" for line in lines)]
 
 
-def no_substitutions(app: Sphinx, docname: str, source: list[str]) -> None:
+def escape_norms(app: Sphinx, docname: str, source: list[str]) -> None:
     """|tau| in the prose of an example is a norm, not a substitution."""
     if docname.startswith("gallery/"):
         lines = source[0].split("\n")
         source[0] = "\n".join(x if x.startswith(" ") else x.replace("|", r"\|") for x in lines)
 
 
-def list_names(app: Sphinx, docname: str, source: list[str]) -> None:
-    """The reference page: one entry per public name, whatever they are today."""
+def list_public_names(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Append one entry for each public class and function to the reference page."""
     if docname != "api":
         return
     entries = []
@@ -89,6 +91,6 @@ def list_names(app: Sphinx, docname: str, source: list[str]) -> None:
 
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", check_references)
-    app.connect("source-read", no_substitutions)
-    app.connect("source-read", list_names)
-    app.connect("autodoc-process-docstring", as_written)
+    app.connect("source-read", escape_norms)
+    app.connect("source-read", list_public_names)
+    app.connect("autodoc-process-docstring", show_verbatim)
