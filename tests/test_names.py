@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from hovi.__main__ import EXTENSION, MEMORY
+from hovi.__main__ import EXTENSION_MODULE, INTERRUPTION_MODULE
 
 TOP = Path(__file__).resolve().parents[1]
 FOLDERS = ("src", "tests", "examples", "docs", "models", ".ci")
@@ -87,5 +87,5 @@ def test_what_a_text_names_exists(page: Path) -> None:
 
 def test_ctrl_c_finds_what_it_calls() -> None:
     """A signal handler has to find these in sys.modules: what is not there it does without."""
-    assert callable(import_module(EXTENSION).ignore_leaks)
-    assert callable(import_module(MEMORY).record_interrupt)
+    assert callable(import_module(EXTENSION_MODULE).ignore_leaks)
+    assert callable(import_module(INTERRUPTION_MODULE).record_interrupt)

@@ -1,4 +1,4 @@
-"""`python -m hovi` is the command `hovi`; Ctrl-C ends it without noise from the first import on."""
+"""The entry point of the command `hovi`, with Ctrl-C handled from the first import on."""
 
 from __future__ import annotations
 
@@ -10,91 +10,92 @@ from _thread import interrupt_main, start_new_thread
 from collections.abc import Iterator
 from types import FrameType
 
-INTERRUPTED = 130
-IMPORTING = "<frozen importlib"
-"""What the file names of Python's own frames begin with while a module is imported."""
-EXTENSION = "hovi._native.dynamics"
-"""What counts its objects at the end; those of a program that was interrupted are no leaks."""
-MEMORY = "hovi.system.interruption"
-"""What remembers an interrupt that comes where Python drops exceptions, as in a destructor."""
-PATIENCE = 0.05
-"""Seconds after which Ctrl-C is heard again that came while a run imported what it needs."""
+EXIT_INTERRUPTED = 130
+IMPORTLIB_FILE = "<frozen importlib"
+"""Prefix of the file names of frames of Python's import system."""
+EXTENSION_MODULE = "hovi._native.dynamics"
+"""The module that reports leaked objects at exit, except after an interrupt."""
+INTERRUPTION_MODULE = "hovi.system.interruption"
+"""The module that records interrupts raised where Python drops exceptions, as in a destructor."""
+RETRY_DELAY = 0.05
+"""Delay in [s] before Ctrl-C is raised again, if it came during an import within a run."""
 
 
 def run() -> None:
-    """Run the command that the command line asks for and leave with its exit code."""
+    """Run the command line and exit with its code."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
-        signal.signal(signal.SIGINT, _interrupt)
+        signal.signal(signal.SIGINT, _handle_interrupt)
     try:
         from hovi.cli.application import main
 
         code = main()
     except KeyboardInterrupt:
-        code = INTERRUPTED
+        code = EXIT_INTERRUPTED
     except RuntimeError as error:
-        # Python 3.11 wraps what is raised while a class names its descriptors.
+        # Python 3.11 wraps exceptions raised in __set_name__.
         if not isinstance(error.__cause__, KeyboardInterrupt):
             raise
-        code = INTERRUPTED
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left is only to leave
+        code = EXIT_INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # exiting is all that is left
     # Python remembers an interrupt inside `exec`, which dataclasses use, until the next `exec`,
-    # and would end by that signal although it was handled.
+    # and would otherwise exit with that signal although it was handled.
     exec("")
-    sys.exit(_flushed(code))
+    sys.exit(_flush_output(code))
 
 
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Ctrl-C. While a command imports what it begins with, the program ends at once.
+def _handle_interrupt(number: int, frame: FrameType | None) -> None:
+    """Handle Ctrl-C: exit at once during the imports of a command, before any work is done.
 
-    Raises KeyboardInterrupt at any other time. A module that is imported in the middle of a run may
-    swallow that, so that the run hears of it when the module is there.
+    Otherwise raises KeyboardInterrupt. A module imported in the middle of a run may swallow it, so
+    there the interrupt is raised again after the import.
     """
-    extension = sys.modules.get(EXTENSION)
-    if extension is not None and hasattr(extension, "ignore_leaks"):  # imported to its end
+    extension = sys.modules.get(EXTENSION_MODULE)
+    if extension is not None and hasattr(extension, "ignore_leaks"):  # completely imported
         extension.ignore_leaks()
-    asking = _asks_for_imports(frame)
-    if asking is None:
-        memory = sys.modules.get(MEMORY)
-        if memory is not None:
-            memory.record_interrupt()
+    importer = _importing_frame(frame)
+    if importer is None:
+        interruption = sys.modules.get(INTERRUPTION_MODULE)
+        if interruption is not None:
+            interruption.record_interrupt()
         raise KeyboardInterrupt
-    if not any(map(_of_a_run, _outward(asking))):
-        os._exit(_flushed(INTERRUPTED))  # nothing is there to finish
-    start_new_thread(_again, ())  # a Timer takes locks that what was interrupted may hold
+    if not any(map(_is_library_frame, _callers(importer))):
+        os._exit(_flush_output(EXIT_INTERRUPTED))  # no work to finish
+    # Not a Timer, which takes locks that the interrupted code may hold.
+    start_new_thread(_interrupt_later, ())
 
 
-def _again() -> None:
-    time.sleep(PATIENCE)
+def _interrupt_later() -> None:
+    time.sleep(RETRY_DELAY)
     interrupt_main()
 
 
-def _asks_for_imports(frame: FrameType | None) -> FrameType | None:
-    """What imports, and is not imported itself; None where nothing is imported."""
-    asking = None
-    for each in _outward(frame):
-        if each.f_code.co_filename.startswith(IMPORTING):
-            asking = each.f_back
-    return asking
+def _importing_frame(frame: FrameType | None) -> FrameType | None:
+    """The outermost frame that imports a module; None outside of imports."""
+    importer = None
+    for each in _callers(frame):
+        if each.f_code.co_filename.startswith(IMPORTLIB_FILE):
+            importer = each.f_back
+    return importer
 
 
-def _outward(frame: FrameType | None) -> Iterator[FrameType]:
+def _callers(frame: FrameType | None) -> Iterator[FrameType]:
     while frame is not None:
         yield frame
         frame = frame.f_back
 
 
-def _of_a_run(frame: FrameType) -> bool:
-    """Whether it is one of the library's own, neither of the commands nor of this module."""
+def _is_library_frame(frame: FrameType) -> bool:
+    """Whether a frame belongs to the library, and not to the command line or this module."""
     package, *module = frame.f_globals.get("__name__", "").split(".")[:2]
     return package == "hovi" and module not in ([], ["cli"], ["__main__"])
 
 
-def _flushed(code: int) -> int:
-    """Write out what was printed; what cannot be written is dropped with one sentence."""
+def _flush_output(code: int) -> int:
+    """Flush stdout, with one sentence if that fails; returns the exit code."""
     try:
         sys.stdout.flush()
     except OSError as error:
-        # Python would flush again at its end, and complain.
+        # Otherwise Python flushes again at exit, and prints a traceback.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):
             print(f"error: cannot write the output: {error.strerror}.", file=sys.stderr)

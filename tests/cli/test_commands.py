@@ -1,4 +1,4 @@
-"""The command: exit codes, one JSON object, one sentence for every bad input, Ctrl-C."""
+"""The command: exit codes, JSON output, one sentence per invalid input, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Run = Callable[..., Outcome]
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Run:
-    """One command in this process: exit code, stdout, stderr."""
+    """Run a command in this process; returns exit code, stdout and stderr."""
 
     def run(*arguments: str | Path) -> Outcome:
         code = main([str(each) for each in arguments])
@@ -42,7 +42,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 def run_process(*arguments: str | Path, cwd: Path | None = None) -> Outcome:
-    """One command as a person starts it."""
+    """Run a command as from a shell."""
     command = [sys.executable, "-m", "hovi", *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=120)
     return done.returncode, done.stdout, done.stderr
@@ -69,7 +69,7 @@ NUMBERS = ("cost", "nit", "n_neg", "setup_seconds", "solve_seconds", "intervals"
 
 
 def only_object(text: str) -> dict[str, Any]:
-    """The one JSON object on stdout, free of NaN and infinities."""
+    """The one JSON object on stdout, which must not contain NaN or infinities."""
 
     def refuse(constant: str) -> float:
         raise AssertionError(f"{constant} is not JSON")
@@ -79,7 +79,7 @@ def only_object(text: str) -> dict[str, Any]:
     return fields
 
 
-def test_json_is_one_object_with_the_promised_keys(run: Run) -> None:
+def test_json_is_one_object_with_the_documented_keys(run: Run) -> None:
     code, out, err = run("plan", "two_link_reach", "--json")
     assert (code, err) == (0, "")
     fields = only_object(out)
@@ -95,7 +95,7 @@ def test_json_is_one_object_with_the_promised_keys(run: Run) -> None:
     assert fields["excess"] is None
 
 
-def test_options_take_the_place_of_what_the_scene_says(run: Run) -> None:
+def test_options_override_the_scene(run: Run) -> None:
     options = ("--scheme", "galerkin-1", "--intervals", "24", "--seed", "7", "--starts", "1")
     _, out, _ = run("plan", "two_link_reach", "--json", *options)
     fields = only_object(out)
@@ -107,7 +107,7 @@ def test_options_take_the_place_of_what_the_scene_says(run: Run) -> None:
     ]
 
 
-def test_without_limits_people_see_which_of_the_urdf_are_exceeded(run: Run) -> None:
+def test_without_limits_the_report_marks_exceeded_urdf_limits(run: Run) -> None:
     code, out, _ = run("plan", "ur5_reach")
     assert code == 0
     for fragment in ("minimum", "galerkin-2 on 16 intervals", "wrist_3_joint", "150"):
@@ -115,7 +115,7 @@ def test_without_limits_people_see_which_of_the_urdf_are_exceeded(run: Run) -> N
     assert "! beyond a limit of the URDF: the motion was planned without it." in out
 
 
-def test_with_limits_people_see_the_room_that_is_left(run: Run) -> None:
+def test_with_limits_the_report_shows_the_margins(run: Run) -> None:
     code, out, _ = run("plan", "ur5_reach_limited", "--no-certificate")
     assert code == 0
     assert "beyond" not in out
@@ -126,7 +126,7 @@ def test_with_limits_people_see_the_room_that_is_left(run: Run) -> None:
     assert "*" not in row
 
 
-def test_json_tells_how_close_each_limit_comes(run: Run, tmp_path: Path) -> None:
+def test_json_has_the_margin_to_each_limit(run: Run, tmp_path: Path) -> None:
     motion = tmp_path / "ur5.npz"
     code, out, _ = run("plan", "ur5_reach_limited", "--json", "--out", motion)
     fields = only_object(out)
@@ -149,14 +149,14 @@ def test_split_intervals_are_counted(run: Run) -> None:
 
 def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
     code, out, _ = run("plan", "ur5_reach", "--tolerance", "1e-6", "--json")
-    told = json.loads(out)
+    fields = json.loads(out)
     assert code == 0
-    assert 0 < told["error_estimate"] <= 1e-6
-    assert told["tolerance_reached"] is True
-    assert told["errors"]["cost"] == pytest.approx(told["error_estimate"])
-    assert told["errors"]["frame"] == "tool0"
-    assert told["grids"][-1]["intervals"] == told["intervals"]
-    assert told["grids"][-1]["error"] < 1e-2 * told["grids"][0]["error"]
+    assert 0 < fields["error_estimate"] <= 1e-6
+    assert fields["tolerance_reached"] is True
+    assert fields["errors"]["cost"] == pytest.approx(fields["error_estimate"])
+    assert fields["errors"]["frame"] == "tool0"
+    assert fields["grids"][-1]["intervals"] == fields["intervals"]
+    assert fields["grids"][-1]["error"] < 1e-2 * fields["grids"][0]["error"]
     _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm")
     assert re.search(r"estimated error \S+ mm at the tip, 0.1 mm at the tip asked for", out)
     assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
@@ -171,7 +171,7 @@ goal.q = [1.5707963267948966, 0.0]
 """
 
 
-def test_a_cost_that_means_nothing_is_called_so_right_below_it(run: Run, tmp_path: Path) -> None:
+def test_a_meaningless_cost_has_a_warning_right_below_it(run: Run, tmp_path: Path) -> None:
     code, out, _ = run("plan", scene(tmp_path, SWING_UP.format(duration=200.0)))
     assert code == 0
     found = re.search(
@@ -190,40 +190,40 @@ def test_a_cost_that_means_nothing_is_called_so_right_below_it(run: Run, tmp_pat
 
 
 def test_a_plan_comes_with_its_certificate(run: Run) -> None:
-    told = json.loads(run("plan", "two_link_reach", "--json")[1])
-    certificate = told["certificate"]
-    assert certificate["action"] == pytest.approx(told["cost"], rel=1e-14)
-    assert certificate["integral"] == pytest.approx(told["cost"], rel=1e-5)
-    assert told["error_estimate"] == certificate["errors"]["cost"] < 1e-7
+    fields = json.loads(run("plan", "two_link_reach", "--json")[1])
+    certificate = fields["certificate"]
+    assert certificate["action"] == pytest.approx(fields["cost"], rel=1e-14)
+    assert certificate["integral"] == pytest.approx(fields["cost"], rel=1e-5)
+    assert fields["error_estimate"] == certificate["errors"]["cost"] < 1e-7
     assert certificate["hamiltonian"] == pytest.approx(55.452, abs=1e-2)
     assert certificate["replay"]["q_rad"] < 1e-8
     assert certificate["replay"]["certifies"] == "dynamics and torques, not optimality"
     text = run("plan", "two_link_reach")[1]
     assert "this certifies dynamics and torques, not optimality" in text
     assert re.search(r"^energy +Pontryagin's H = 55\.45", text, re.MULTILINE)
-    told = json.loads(run("plan", "two_link_reach", "--no-certificate", "--json")[1])
-    assert (told["certificate"], told["error_estimate"]) == (None, None)
+    fields = json.loads(run("plan", "two_link_reach", "--no-certificate", "--json")[1])
+    assert (fields["certificate"], fields["error_estimate"]) == (None, None)
 
 
-def test_a_scene_may_name_a_tolerance(run: Run, tmp_path: Path) -> None:
+def test_a_scene_may_have_a_tolerance(run: Run, tmp_path: Path) -> None:
     path = scene(tmp_path, "tolerance = '0.01 deg'\n" + REACH)
-    told = json.loads(run("plan", path, "--json")[1])
-    assert told["tolerance"] == "0.01 deg"
-    assert told["errors"]["q_rad"] <= np.deg2rad(0.01)
-    told = json.loads(run("plan", path, "--intervals", "8", "--json")[1])
-    assert (told["scheme"], told["intervals"]) == ("galerkin-2", 8)
-    assert "tolerance" not in told
+    fields = json.loads(run("plan", path, "--json")[1])
+    assert fields["tolerance"] == "0.01 deg"
+    assert fields["errors"]["q_rad"] <= np.deg2rad(0.01)
+    fields = json.loads(run("plan", path, "--intervals", "8", "--json")[1])
+    assert (fields["scheme"], fields["intervals"]) == ("galerkin-2", 8)
+    assert "tolerance" not in fields
     assert "tolerance 0.01 deg" in run("info", path)[1]
 
 
-def test_limits_are_overridden_by_a_word(run: Run) -> None:
+def test_limits_are_overridden_by_an_option(run: Run) -> None:
     fields = only_object(run("plan", "ur5_reach_limited", "--limits", "none", "--json")[1])
     assert fields["limits"] is None
     fields = only_object(run("plan", "two_link_reach", "--limits", "urdf", "--json")[1])
     assert all(room > 0.4 for room in fields["limits"]["tau"].values())
 
 
-def test_a_goal_outside_the_limits_is_infeasible_with_the_reason(run: Run, tmp_path: Path) -> None:
+def test_a_goal_outside_the_limits_is_infeasible_and_named(run: Run, tmp_path: Path) -> None:
     text = REACH.replace('limits = "none"\n', "") + "[limits.q]\nelbow = 0.5\n"
     code, out, _ = run("plan", scene(tmp_path, text), "--json")
     fields = only_object(out)
@@ -233,7 +233,7 @@ def test_a_goal_outside_the_limits_is_infeasible_with_the_reason(run: Run, tmp_p
     assert "! beyond one" in run("plan", tmp_path / "scene.toml")[1]
 
 
-def test_a_written_motion_is_the_one_that_was_planned(motion: Path) -> None:
+def test_a_written_motion_is_the_planned_motion(motion: Path) -> None:
     trajectory = Trajectory.load(motion)
     np.testing.assert_allclose(trajectory.q[-1], [0.3, 0.7], atol=1e-12)
     np.testing.assert_allclose(trajectory.v[-1], [0.5, -0.4], atol=1e-12)
@@ -292,13 +292,13 @@ run()
 
 
 def interrupted_import(module: str, *arguments: str | Path) -> Outcome:
-    """A command that gets Ctrl-C when it begins to import a module."""
+    """Run a command that gets Ctrl-C at the start of importing a module."""
     command = [sys.executable, "-c", INTERRUPTED_IMPORT, module, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     return done.returncode, done.stdout, done.stderr
 
 
-def test_an_interrupt_while_a_run_imports_keeps_the_best_so_far(tmp_path: Path) -> None:
+def test_an_interrupt_during_an_import_of_a_run_keeps_the_best_so_far(tmp_path: Path) -> None:
     free = REACH.replace("duration = 1.0", "time_weight = 3.0\nduration = [0.5, 40.0]")
     options = scene(tmp_path, free), "--intervals", "4000", "--json"
     code, out, err = interrupted_import("scipy.optimize", "plan", *options)
@@ -308,11 +308,11 @@ def test_an_interrupt_while_a_run_imports_keeps_the_best_so_far(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("module", ["typer", "numpy", "pinocchio"])
-def test_an_interrupt_while_a_command_imports_what_it_begins_with_ends_it(module: str) -> None:
+def test_an_interrupt_during_the_first_imports_ends_the_command(module: str) -> None:
     assert interrupted_import(module, "plan", "two_link_reach") == (130, "", "")
 
 
-# Looking at robots, scenes and motions
+# Describing robots and scenes, and showing motions
 
 
 def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
@@ -335,7 +335,7 @@ def test_info_takes_the_paths_that_load_robot_takes(run: Run, tmp_path: Path, na
     assert "no-such.xml" in run("info", "no-such.xml")[2]
 
 
-def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> None:
+def test_export_writes_a_table(run: Run, motion: Path, tmp_path: Path) -> None:
     target = tmp_path / "reach.csv"
     code, out, _ = run("export", motion, "--csv", target, "--rate", "100")
     assert code == 0
@@ -348,7 +348,7 @@ def test_a_motion_becomes_a_table(run: Run, motion: Path, tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     "arguments", [["--csv"], ["--format", "csv"], ["--csv", "--format", "csv"]]
 )
-def test_a_format_is_named_or_has_an_option(
+def test_an_export_format_is_given_by_name_or_option(
     arguments: list[str], run: Run, motion: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "reach.csv"
@@ -356,20 +356,20 @@ def test_a_format_is_named_or_has_an_option(
     assert target.read_text().startswith("t,q_")
 
 
-def test_a_motion_becomes_a_picture(run: Run, motion: Path, tmp_path: Path) -> None:
+def test_plot_writes_a_figure(run: Run, motion: Path, tmp_path: Path) -> None:
     code, out, _ = run("plot", motion, "--out", tmp_path)
     assert code == 0
     assert f"wrote {tmp_path / 'reach.png'}" in out
     assert (tmp_path / "reach.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_motion_becomes_a_page(run: Run, motion: Path, tmp_path: Path) -> None:
+def test_replay_writes_a_page(run: Run, motion: Path, tmp_path: Path) -> None:
     page = tmp_path / "reach.html"
     assert run("replay", motion, "--html", page)[0] == 0
     assert "<html" in page.read_text()[:1000].lower()
 
 
-def test_a_live_replay_serves_its_page_until_it_is_interrupted(motion: Path) -> None:
+def test_a_live_replay_serves_its_page_until_interrupted(motion: Path) -> None:
     command = [sys.executable, "-m", "hovi", "replay", str(motion), "--no-browser"]
     process = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -393,7 +393,7 @@ def test_a_live_replay_serves_its_page_until_it_is_interrupted(motion: Path) -> 
 # Bad input
 
 
-def refused(outcome: Outcome, *expected: str) -> None:
+def assert_refused(outcome: Outcome, *expected: str) -> None:
     code, out, err = outcome
     assert code == 2
     assert out == ""
@@ -405,7 +405,7 @@ def refused(outcome: Outcome, *expected: str) -> None:
 
 
 def chain(links: int) -> str:
-    """A URDF of many links, quickly."""
+    """The URDF of a chain of links."""
     inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
     link = '<link name="l{0}"><inertial><mass value="1"/>' + inertia + "</inertial></link>"
     joint = (
@@ -427,11 +427,11 @@ MODELS = {
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_a_bad_robot_is_refused(model: str, run: Run, tmp_path: Path) -> None:
+def test_an_invalid_robot_is_refused(model: str, run: Run, tmp_path: Path) -> None:
     urdf, expected = MODELS[model]
     path = scene(tmp_path, urdf=urdf)
-    refused(run("plan", path), "two_link.urdf", *expected)
-    refused(run("info", tmp_path / "two_link.urdf"), *expected)
+    assert_refused(run("plan", path), "two_link.urdf", *expected)
+    assert_refused(run("info", tmp_path / "two_link.urdf"), *expected)
 
 
 SCENES = {
@@ -449,10 +449,10 @@ SCENES = {
 
 
 @pytest.mark.parametrize("mistake", SCENES)
-def test_a_bad_scene_is_refused(mistake: str, run: Run, tmp_path: Path) -> None:
+def test_an_invalid_scene_is_refused(mistake: str, run: Run, tmp_path: Path) -> None:
     old, new, expected = SCENES[mistake]
     assert old in REACH
-    refused(run("plan", scene(tmp_path, REACH.replace(old, new)), "--json"), *expected)
+    assert_refused(run("plan", scene(tmp_path, REACH.replace(old, new)), "--json"), *expected)
 
 
 COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
@@ -495,30 +495,30 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
 
 
 @pytest.mark.parametrize("mistake", COMMANDS)
-def test_a_bad_command_is_refused(mistake: str, run: Run) -> None:
+def test_an_invalid_command_is_refused(mistake: str, run: Run) -> None:
     arguments, expected = COMMANDS[mistake]
-    refused(run(*arguments), *expected)
+    assert_refused(run(*arguments), *expected)
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan"])
 @pytest.mark.parametrize("command", [("export", "--csv", "--rate"), ("replay", "--speed")])
-def test_rates_and_speeds_are_positive(
+def test_rates_and_speeds_must_be_positive(
     command: tuple[str, ...], value: str, run: Run, motion: Path
 ) -> None:
-    refused(run(command[0], motion, *command[1:], value))
+    assert_refused(run(command[0], motion, *command[1:], value))
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"hello"])
-def test_a_file_that_is_no_motion_is_refused(content: bytes, run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "strange.npz"
+def test_a_file_without_a_motion_is_refused(content: bytes, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "invalid.npz"
     path.write_bytes(content)
-    refused(run("export", path, "--csv"), "strange.npz")
+    assert_refused(run("export", path, "--csv"), "invalid.npz")
 
 
 # As a process
 
 
-def test_the_version_is_printed_without_loading_a_robot_library() -> None:
+def test_the_version_is_printed_without_importing_pinocchio() -> None:
     script = (
         "import sys; from hovi.cli.application import main; main(['--version'])\n"
         "print('pinocchio' in sys.modules)"
@@ -530,19 +530,19 @@ def test_the_version_is_printed_without_loading_a_robot_library() -> None:
 
 
 def test_a_process_ends_with_the_exit_code_and_no_traceback(tmp_path: Path) -> None:
-    refused(run_process("plan", "nowhere.toml", cwd=tmp_path), "nowhere.toml")
+    assert_refused(run_process("plan", "nowhere.toml", cwd=tmp_path), "nowhere.toml")
     code, out, err = run_process("plan", "two_link_reach", "--json", cwd=tmp_path)
     assert (code, err) == (0, "")
     assert only_object(out)["success"]
 
 
-def test_help_names_every_command(run: Run) -> None:
+def test_help_lists_every_command(run: Run) -> None:
     code, out, _ = run("--help")
     assert code == 0
     for command in ("plan", "replay", "plot", "export", "info"):
         assert command in out
 
 
-def test_every_shipped_scene_is_known_by_name(run: Run) -> None:
+def test_every_bundled_scene_is_found_by_name(run: Run) -> None:
     for name in example_scenes():
         assert run("info", name)[0] == 0

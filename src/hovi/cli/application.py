@@ -1,4 +1,4 @@
-"""The command `hovi`: its subcommands put together; an error is a sentence and an exit code."""
+"""The command `hovi`: its subcommands, and errors as one sentence and an exit code."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from hovi.errors import HoviError
 from hovi.system.files import reason
 
 BAD_INPUT = 2
+"""Exit code for invalid input."""
 
 app = typer.Typer(
     help="Least-torque motions of URDF robots by higher-order variational integrators.",
@@ -31,8 +32,8 @@ app = typer.Typer(
 )
 
 
-def _print_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         from hovi.version import __version__
 
         print(f"hovi {__version__}")
@@ -65,24 +66,24 @@ app.command("info")(info_command.info)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code.
 
-    arguments: what follows `hovi` on the command line; sys.argv when not given.
+    arguments: those after `hovi` on the command line; from sys.argv by default.
     """
     try:
         code = app(args=arguments, prog_name="hovi", standalone_mode=False)
-    except HoviError as refused:
-        return _refuse(str(refused))
-    except TyperException as misuse:
-        return _refuse(misuse.format_message())
+    except HoviError as error:
+        return _report_error(str(error))
+    except TyperException as error:
+        return _report_error(error.format_message())
     except (typer.Abort, KeyboardInterrupt):
         return 130
     except MemoryError:
-        return _refuse("this takes more memory than there is: fewer intervals or starts take less.")
-    except OSError as refused:
-        return _refuse(f"the operating system refuses: {reason(refused)}.")
+        return _report_error("not enough memory; use fewer intervals or starts.")
+    except OSError as error:
+        return _report_error(f"the operating system reports: {reason(error)}.")
     return code if isinstance(code, int) else 0
 
 
-def _refuse(sentence: str) -> int:
-    if sentence:  # empty when the help has been printed instead
+def _report_error(sentence: str) -> int:
+    if sentence:  # empty when the help was printed instead
         print(f"error: {sentence}", file=sys.stderr)
     return BAD_INPUT

@@ -1,4 +1,4 @@
-"""`hovi accuracy`: what each further digit costs on a scene, on this machine."""
+"""`hovi accuracy`: the work-precision diagram of a scene on this machine."""
 
 from __future__ import annotations
 
@@ -19,43 +19,40 @@ def accuracy(
         typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
     ],
     budget: Annotated[
-        float, typer.Option(metavar="SECONDS", help="Wall time for everything.")
+        float, typer.Option(metavar="SECONDS", help="Wall time of the whole measurement.")
     ] = 60.0,
     guess: Annotated[
-        str, typer.Option(metavar="near|cubic", help="Where every solve starts.")
+        str, typer.Option(metavar="near|cubic", help="Initial guess of every solve.")
     ] = "near",
     clock: Annotated[
         str,
-        typer.Option(
-            metavar="wall|processor", help="processor on a machine that is busy with other work."
-        ),
+        typer.Option(metavar="wall|processor", help="Use processor on a machine under other load."),
     ] = "wall",
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FOLDER", help="Where the picture, the CSV and the JSON go."),
+        typer.Option(metavar="FOLDER", help="Folder for the figure, the CSV and the JSON."),
     ] = None,
     peer: Annotated[
         list[str] | None,
         typer.Option(
             metavar="NAME[=PYTHON]",
-            help="A reference tool as well, from the Python of its environment; repeat for more.",
+            help="Add a reference tool, run by the Python of its environment; repeatable.",
         ),
     ] = None,
     collocation: Annotated[
-        bool, typer.Option("--collocation", help="Collocation by CasADi and Ipopt as well.")
+        bool, typer.Option("--collocation", help="Add collocation by CasADi and Ipopt.")
     ] = False,
     crocoddyl: Annotated[
-        Path | None, typer.Option(metavar="PYTHON", help="The same as --peer crocoddyl=PYTHON.")
+        Path | None, typer.Option(metavar="PYTHON", help="Short for --peer crocoddyl=PYTHON.")
     ] = None,
     drake: Annotated[
-        Path | None, typer.Option(metavar="PYTHON", help="The same as --peer drake=PYTHON.")
+        Path | None, typer.Option(metavar="PYTHON", help="Short for --peer drake=PYTHON.")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Draw the work-precision diagram of a scene: errors against time, scheme by scheme.
+    """Measure the work-precision diagram of a scene: error against time, scheme by scheme.
 
-    Exit code 0 when it was measured, 1 when no motion was found to measure against, 2 for bad
-    input.
+    Exit code 0, 1 when no reference motion was found, or 2 for invalid input.
     """
     from hovi.accuracy import work_precision
     from hovi.accuracy.tables import as_json
@@ -67,17 +64,17 @@ def accuracy(
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {str(out)!r} is a file; name a folder.")
     task = load_task(find_scene(scene))
-    short = {"crocoddyl": crocoddyl, "drake": drake}
-    asked = [*(peer or ()), *(["collocation"] if collocation else [])]
-    asked += [f"{name}={python}" for name, python in short.items() if python is not None]
-    peers = _peers(asked)
+    shortcuts = {"crocoddyl": crocoddyl, "drake": drake}
+    names = [*(peer or ()), *(["collocation"] if collocation else [])]
+    names += [f"{name}={python}" for name, python in shortcuts.items() if python is not None]
+    peers = _peers(names)
     try:
         with progress(quiet=json) as report:
             diagram = work_precision(
                 task, guess=guess, budget=budget, clock=clock, peers=peers, progress=report
             )
-    except UnmeasurableError as nothing:
-        print(f"nothing was measured: {nothing}", file=sys.stderr)
+    except UnmeasurableError as error:
+        print(f"nothing was measured: {error}", file=sys.stderr)
         raise typer.Exit(1) from None
     written = [] if out is None else _write(diagram, out)
     if json:
@@ -88,17 +85,17 @@ def accuracy(
         print(f"wrote {path}")
 
 
-def _peers(asked: Sequence[str]) -> list[Peer]:
-    """The methods of the tools that were asked for, each as NAME or NAME=PYTHON."""
+def _peers(names: Sequence[str]) -> list[Peer]:
+    """The methods of tools given as NAME or NAME=PYTHON."""
     from hovi.accuracy.peers.tools import tool_peers
 
-    parts = [each.partition("=") for each in asked]
+    parts = [each.partition("=") for each in names]
     named = [(name, Path(python) if equals else None) for name, equals, python in parts]
     return [peer for name, python in named for peer in tool_peers(name, python)]
 
 
 def _write(diagram: Diagram, folder: Path) -> list[Path]:
-    """The picture, every run as CSV, and all of it as JSON."""
+    """Write the figure, the runs as CSV and the diagram as JSON; returns their paths."""
     from hovi.accuracy.picture import plot_work_precision
     from hovi.accuracy.tables import as_csv, as_json
     from hovi.errors import InputError
@@ -111,15 +108,15 @@ def _write(diagram: Diagram, folder: Path) -> list[Path]:
         for path, text in texts.items():
             with whole_file(path) as stream:
                 stream.write(text.encode())
-    except OSError as refused:
-        raise InputError(f"cannot write to {str(folder)!r}: {reason(refused)}.") from refused
+    except OSError as error:
+        raise InputError(f"cannot write to {str(folder)!r}: {reason(error)}.") from error
     picture = stem.with_suffix(".png")
     plot_work_precision(diagram, picture)
     return [picture, *texts]
 
 
 def _print(diagram: Diagram) -> None:
-    """The cheapest run for each error of the cost, and what to know about it."""
+    """Print the reference, the fastest run per tolerance, and notes."""
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
@@ -128,13 +125,16 @@ def _print(diagram: Diagram) -> None:
     from hovi.accuracy.tables import COLUMNS, cheapest_rows
 
     resolved = diagram.resolved
-    unsure = shown_sizes(resolved.uncertainty)
+    errors = shown_sizes(resolved.uncertainty)
     print(
-        f"{diagram.scene}: {len(diagram.runs)} runs in {diagram.seconds:.0f} s, measured against "
-        f"{resolved.scheme} on {resolved.intervals} intervals: cost {resolved.cost:.12g}, known to "
-        f"{unsure['cost']:.0e} relative, {unsure['joints']:.0e} rad, {unsure['tip']:.0e} mm."
+        f"{diagram.scene}: {len(diagram.runs)} runs in {diagram.seconds:.0f} s; reference: "
+        f"{resolved.scheme} on {resolved.intervals} intervals, cost {resolved.cost:.12g}, "
+        f"accurate to {errors['cost']:.0e} relative, {errors['joints']:.0e} rad, "
+        f"{errors['tip']:.0e} mm."
     )
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title="the cheapest run")
+    table = Table(
+        box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title="fastest run per tolerance"
+    )
     for column in COLUMNS:
         table.add_column(column, justify="left" if column == "method" else "right")
     for row in cheapest_rows(diagram):
@@ -143,4 +143,4 @@ def _print(diagram: Diagram) -> None:
     for note in diagram.notes:
         print(f"note: {note}")
     if not diagram.complete:
-        print("note: the budget ended before every scheme was as exact as rounding lets it be.")
+        print("note: the budget ended before every scheme reached rounding accuracy.")

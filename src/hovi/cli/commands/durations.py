@@ -1,4 +1,4 @@
-"""Lengths of time on the command line."""
+"""Durations on the command line."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from hovi.errors import InputError
 
 
 def positive_seconds(flag: str, text: str) -> float:
-    """What a flag says: a number of seconds, or a text such as "2 min". Raises InputError."""
+    """The value of a flag in [s], from a number or a text such as "2 min". Raises InputError."""
     from hovi.planning.problem.values import seconds
 
     try:
@@ -14,5 +14,5 @@ def positive_seconds(flag: str, text: str) -> float:
     except ValueError:
         number = seconds(text, flag)
     if not 0 < number < float("inf"):
-        raise InputError(f"{flag} must be a positive number of seconds, not {number}.")
+        raise InputError(f"{flag} must be a positive number of seconds, not {text}.")
     return number

@@ -1,4 +1,4 @@
-"""`hovi effects`: which effect matters on a scene, and what it costs."""
+"""`hovi effects`: the influence of single effects on a scene."""
 
 from __future__ import annotations
 
@@ -20,22 +20,24 @@ def effects(
     candidates: Annotated[
         str | None,
         typer.Option(
-            "--with", metavar="RICH.toml", help="A scene whose effects are tried; else stand-ins."
+            "--with",
+            metavar="RICH.toml",
+            help="A scene with candidate effects; default: typical ones.",
         ),
     ] = None,
     time_limit: Annotated[
         str | None,
-        typer.Option(metavar="SECONDS", help="Of everything; each candidate gets a share."),
+        typer.Option(metavar="SECONDS", help="For the whole study."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Where the picture goes (or .pdf, .svg).")
+        Path | None, typer.Option(metavar="PNG", help="Path of the figure (or .pdf, .svg).")
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Add each candidate effect alone to a scene, and tabulate what it changes and costs.
+    """Add each candidate effect alone to a scene, and tabulate the changes and evaluation times.
 
-    Effects that the scene names are taken away instead. Ctrl-C ends it with what was tried. Exit
-    code 0, 1 when candidates were left untried, or 2 for bad input.
+    Effects of the scene are removed instead. Ctrl-C ends the study with the trials so far. Exit
+    code 0, 1 when candidates are left untried, or 2 for invalid input.
     """
     from hovi.accuracy.effect_study.study import study_effects
     from hovi.accuracy.effect_study.tables import plot_study, study_json
@@ -48,9 +50,9 @@ def effects(
     if out is not None:
         check_output(out, ".png", ".pdf", ".svg")
     task = load_task(find_scene(scene))
-    tried = None if candidates is None else load_task(find_scene(candidates)).scene.effects
+    effects = None if candidates is None else load_task(find_scene(candidates)).scene.effects
     with progress(quiet=json) as report:
-        study = study_effects(task, tried, report, limit)
+        study = study_effects(task, effects, report, limit)
     if out is not None:
         plot_study(study, out)
     if json:

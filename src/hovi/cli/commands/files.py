@@ -1,4 +1,4 @@
-"""Files that a command is given: found, or refused before any work is done."""
+"""Input and output files of commands, checked before any computation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def find_scene(scene: str) -> Path:
-    """The scene file at a path, or the scene of that name that travels with hovi."""
+    """The scene file at a path, or the bundled scene of that name."""
     path = Path(scene)
     if path.exists():
         return path
@@ -26,22 +26,22 @@ def find_scene(scene: str) -> Path:
     )
 
 
-def check_output(path: Path, *endings: str) -> Path:
-    """The path if a file can be written there. Raises InputError otherwise."""
-    if path.suffix.lower() not in endings:
-        raise InputError(f"the output file must end in {' or '.join(endings)}, not {path.name!r}.")
+def check_output(path: Path, *suffixes: str) -> Path:
+    """The path, if its suffix is valid and it can be written; raises InputError if not."""
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f"the output file must end in {' or '.join(suffixes)}, not {path.name!r}.")
     folder = path.parent
     if not folder.is_dir():
         raise InputError(
-            f"the folder {str(folder)!r} of the output file does not exist; make it first."
+            f"the folder {str(folder)!r} of the output file does not exist; create it first."
         )
     if path.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"{str(path)!r} cannot be written; choose another place.")
+        raise InputError(f"{str(path)!r} cannot be written; choose another path.")
     return path
 
 
 def load_trajectory(path: Path) -> Trajectory:
-    """The motion that `hovi plan --out` wrote."""
+    """A motion written by `hovi plan --out`."""
     from hovi.discrete.trajectory import Trajectory
 
     return Trajectory.load(path)

@@ -1,4 +1,4 @@
-"""`hovi info`: what a robot or a scene holds."""
+"""`hovi info`: describe a robot or a scene."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def info(
         ),
     ],
     mimic: Annotated[
-        bool, typer.Option("--mimic", help="Joints of a URDF with <mimic> follow others.")
+        bool, typer.Option("--mimic", help="Apply the <mimic> tags of the URDF.")
     ] = False,
     free_flyer: Annotated[
-        bool, typer.Option("--free-flyer", help="The base of the robot floats.")
+        bool, typer.Option("--free-flyer", help="Give the robot a floating base.")
     ] = False,
 ) -> None:
-    """Describe a robot, or a scene and what it leaves out."""
+    """Describe a robot, or a scene and the effects that it leaves out."""
     from hovi.errors import InputError, nearest
     from hovi.robot.bundled_models import example_scenes
     from hovi.robot.example_robots import example_names
@@ -35,7 +35,7 @@ def info(
         print(_robot(what, mimic, free_flyer))
     else:
         raise InputError(
-            f"there is no robot and no scene called {what!r}; {nearest(what, (*robots, *scenes))} "
+            f"there is no robot or scene {what!r}; {nearest(what, (*robots, *scenes))} "
             "(A path ends in .urdf or .toml.)"
         )
 

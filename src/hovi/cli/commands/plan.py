@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 GUESSES = ("cubic", "minimum-jerk")
 LIMITS = ("urdf", "none")
-MOST_CERTIFIED = 2000
-"""Intervals of the longest motion that is certified unasked."""
+MAX_CERTIFIED_INTERVALS = 2000
+"""Largest number of intervals for which a certificate is computed."""
 
 
 def plan(
@@ -25,41 +25,39 @@ def plan(
         str,
         typer.Argument(metavar="SCENE.toml", help="A scene file, or a shipped scene's name."),
     ],
-    scheme: Annotated[str | None, typer.Option(help="Instead of the scene's.")] = None,
-    intervals: Annotated[int | None, typer.Option(help="Instead of the scene's.")] = None,
-    starts: Annotated[int | None, typer.Option(help="How many guesses are tried.")] = None,
+    scheme: Annotated[str | None, typer.Option(help="Override the scene's.")] = None,
+    intervals: Annotated[int | None, typer.Option(help="Override the scene's.")] = None,
+    starts: Annotated[int | None, typer.Option(help="Number of initial guesses.")] = None,
     limits: Annotated[
-        str | None, typer.Option(metavar="urdf|none", help="Instead of the scene's.")
+        str | None, typer.Option(metavar="urdf|none", help="Override the scene's.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the random guesses.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of the random guesses.")] = None,
     time_limit: Annotated[
-        str | None, typer.Option(metavar="SECONDS", help="Keep the best found by then.")
+        str | None, typer.Option(metavar="SECONDS", help="Return the best motion found by then.")
     ] = None,
     guess: Annotated[
-        str, typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="The first guess.")
+        str, typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="Initial guess.")
     ] = "cubic",
-    out: Annotated[
-        Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="F.npz", help="Path of the motion.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     certificate: Annotated[
-        bool, typer.Option(help="Say what is known of the plan: errors, energy, a replay.")
+        bool, typer.Option(help="Report errors, energy and a replay of the plan.")
     ] = True,
     compile: Annotated[
         bool,
-        typer.Option("--compile", help="Machine code for what CasADi evaluates; kept for later."),
+        typer.Option("--compile", help="Compile the CasADi functions; cached."),
     ] = False,
     tolerance: Annotated[
         str | None,
         typer.Option(
             metavar="1e-6|'0.1 mm'|'0.01 deg'",
-            help="Largest error: of the cost, of the tip or of the joints; chooses the scheme.",
+            help="Largest error of the cost, the tip or the joints; chooses the scheme.",
         ),
     ] = None,
 ) -> None:
     """Plan the least-torque motion of a scene.
 
-    Exit code 0 for a minimum, 1 when none was found, 2 for bad input.
+    Exit code 0 for a minimum, 1 when none was found, 2 for invalid input.
     """
     from hovi.cli.commands.files import check_output
 
@@ -70,31 +68,31 @@ def plan(
 
 
 def _options(flags: dict[str, Any]) -> dict[str, Any]:
-    """What the flags say of the options of a plan. Raises InputError."""
+    """The plan options given as flags. Raises InputError."""
     from hovi.cli.commands.durations import positive_seconds
     from hovi.errors import InputError, nearest
     from hovi.planning.search.option_fields import about
     from hovi.planning.search.options import PlanOptions
 
-    said = {name: value for name, value in flags.items() if value is not None}
-    given: dict[str, Any] = {name: said[name] for name in about(PlanOptions) if name in said}
+    values = {name: value for name, value in flags.items() if value is not None}
+    given: dict[str, Any] = {name: values[name] for name in about(PlanOptions) if name in values}
     if "time_limit" in given:
         given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
     limits = given.get("limits", "none")
     if limits not in LIMITS:
         hint = nearest(limits, LIMITS)
-        raise InputError(f"--limits {limits!r}: {hint} Others are given in the scene file.")
-    return given | {"guess": _guess(given["guess"])} | _either(given)
+        raise InputError(f"--limits {limits!r}: {hint} Give other limits in the scene file.")
+    return given | {"guess": _guess(given["guess"])} | _tolerance_override(given)
 
 
-def _either(given: dict[str, Any]) -> dict[str, Any]:
-    """A grid that is named takes the place of the scene's tolerance; both together are refused."""
+def _tolerance_override(given: dict[str, Any]) -> dict[str, Any]:
+    """A grid given as flags overrides the scene's tolerance. Raises InputError for both."""
     from hovi.errors import InputError
 
     if "scheme" not in given and "intervals" not in given:
         return {}
     if "tolerance" in given:
-        raise InputError("--tolerance chooses the scheme and the intervals: leave them out.")
+        raise InputError("--tolerance chooses the scheme and the intervals; leave them out.")
     return {"tolerance": None}
 
 
@@ -119,7 +117,7 @@ def _guess(guess: str) -> str | Trajectory:
     if guess.endswith(".npz"):
         return load_trajectory(Path(guess))
     raise InputError(
-        f"--guess {guess!r} is neither a guess nor a .npz file; {nearest(guess, GUESSES)}"
+        f"--guess {guess!r} is neither a known guess nor a .npz file; {nearest(guess, GUESSES)}"
     )
 
 
@@ -132,30 +130,30 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
 
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
-    written, refused = out if solution.trajectory is not None else None, None
+    written, save_error = out if solution.trajectory is not None else None, None
     if written is not None:
         try:
             solution.trajectory.save(written)
         except TrajectoryFileError as error:
-            written, refused = None, error  # what was found is printed all the same
+            written, save_error = None, error  # the report is printed all the same
     certificate = _certificate(solution) if certified else None
     if json:
         print(as_json(solution, task, written, certificate))
     else:
         print_report(solution, task, written, certificate)
-    if refused is not None:
-        raise refused
+    if save_error is not None:
+        raise save_error
     return 0 if solution.success else 1
 
 
 def _certificate(solution: Solution) -> Certificate | None:
-    """What can be said for a minimum in little time; None for what is none or too long."""
+    """The certificate of a minimum; None without a minimum or for too many intervals."""
     from hovi.planning.refinement.certificate import certify
 
     problem = solution.problem
-    if problem is None or not solution.success or problem.grid.intervals > MOST_CERTIFIED:
+    if problem is None or not solution.success or problem.grid.intervals > MAX_CERTIFIED_INTERVALS:
         return None
     try:
         return certify(solution, estimate=not (problem.limited or problem.constrained))
-    except KeyboardInterrupt:  # the plan is told all the same
+    except KeyboardInterrupt:  # the report is printed without it
         return None

@@ -1,4 +1,4 @@
-"""`hovi plot`: pictures of a motion."""
+"""`hovi plot`: figures of a motion."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ def plot(
         Path | None,
         typer.Option(
             metavar="DIR|PNG",
-            help="Where the picture goes (or .pdf, .svg); FILE.png when not given.",
+            help="Path of the figure (or .pdf, .svg); default: FILE.png.",
         ),
     ] = None,
 ) -> None:
-    """Draw q, v, a and tau of a motion over time; for a planar two-link arm, its sweep too."""
+    """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
     from hovi.cli.commands.files import check_output, load_trajectory
     from hovi.viewing.plotting import plot_all
 

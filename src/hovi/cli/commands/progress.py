@@ -1,4 +1,4 @@
-"""How far a plan is: a moving line on a terminal, a plain line now and then elsewhere."""
+"""Progress reports: a bar on a terminal, occasional plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-PATIENCE = 1.0  # [s] of silence before the first word
-PLAIN_PERIOD = 10.0  # [s] between plain lines
+BAR_DELAY = 1.0  # [s] before the bar appears
+LINE_PERIOD = 10.0  # [s] between plain lines
 
 Report = Callable[[str, float], None]
 
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Report | None]:
-    """What `hovi.plan` should report to; None when quiet."""
+    """The `progress` argument of `hovi.plan`; None when quiet."""
     if quiet:
         yield None
     elif sys.stderr.isatty():
-        with _moving_line() as report:
+        with _progress_bar() as report:
             yield report
     else:
         yield _plain_lines()
 
 
 @contextmanager
-def _moving_line() -> Iterator[Report]:
+def _progress_bar() -> Iterator[Report]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -36,7 +36,7 @@ def _moving_line() -> Iterator[Report]:
     began = time.monotonic()
 
     def report(text: str, fraction: float) -> None:
-        if time.monotonic() - began >= PATIENCE:
+        if time.monotonic() - began >= BAR_DELAY:
             bar.start()
         bar.update(line, description=text.replace("[", r"\["), completed=fraction)
 
@@ -51,7 +51,7 @@ def _plain_lines() -> Report:
 
     def report(text: str, fraction: float) -> None:
         nonlocal last
-        if time.monotonic() - last >= PLAIN_PERIOD:
+        if time.monotonic() - last >= LINE_PERIOD:
             last = time.monotonic()
             print(f"{100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)
 

@@ -17,11 +17,13 @@ def replay(
     loop: Annotated[bool, typer.Option("--loop", help="Play again and again.")] = False,
     html: Annotated[
         Path | None,
-        typer.Option(metavar="OUT.html", help="Write one page that plays the motion instead."),
+        typer.Option(metavar="OUT.html", help="Write an offline page instead."),
     ] = None,
-    browser: Annotated[bool, typer.Option(help="Open the page, or only print its address.")] = True,
+    browser: Annotated[
+        bool, typer.Option(help="Open the page in a browser, or only print its address.")
+    ] = True,
 ) -> None:
-    """Play a motion on a page of this machine until Ctrl-C, or write it as a page."""
+    """Serve a page that plays a motion until Ctrl-C, or write the page to a file."""
     from hovi.cli.commands.files import check_output, load_trajectory
 
     if html is None:
@@ -35,7 +37,7 @@ def replay(
 
 
 def _serve(trajectory: Trajectory, speed: float, loop: bool, browser: bool) -> None:
-    """Play, and keep the page until Ctrl-C, which is how a replay is meant to end."""
+    """Play the motion and serve the page until Ctrl-C, the regular end of a replay."""
     import contextlib
     import threading
 

@@ -10,7 +10,7 @@ import typer
 
 def schema(
     out: Annotated[
-        Path | None, typer.Option(metavar="JSON", help="Where it goes; printed when not given.")
+        Path | None, typer.Option(metavar="JSON", help="Path of the schema; default: print it.")
     ] = None,
 ) -> None:
     """Write the JSON schema of scene files, for editors that complete and check TOML."""
@@ -29,6 +29,6 @@ def schema(
     try:
         with whole_file(out) as stream:
             stream.write(text.encode() + b"\n")
-    except OSError as refused:
-        raise InputError(f"cannot write {str(out)!r}: {reason(refused)}.") from refused
+    except OSError as error:
+        raise InputError(f"cannot write {str(out)!r}: {reason(error)}.") from error
     print(f"wrote {out}")

@@ -1,4 +1,4 @@
-"""`hovi simulate`: how a scene moves by itself, or under the torques of a plan."""
+"""`hovi simulate`: the motion of a scene without torques, or under the torques of a plan."""
 
 from __future__ import annotations
 
@@ -21,29 +21,27 @@ def simulate(
     ],
     plan: Annotated[
         Path | None,
-        typer.Option(metavar="F.npz", help="A motion whose torques are played from its start."),
+        typer.Option(metavar="F.npz", help="A motion whose torques are applied."),
     ] = None,
     feedback: Annotated[
         str,
-        typer.Option(metavar="none|pd|computed-torque", help="What holds the motion to the plan."),
+        typer.Option(metavar="none|pd|computed-torque", help="Feedback towards the plan."),
     ] = "none",
     bandwidth: Annotated[float, typer.Option(help="Of the feedback, in rad/s.")] = 10.0,
     duration: Annotated[
-        str | None, typer.Option(metavar="SECONDS", help="Instead of the scene's.")
+        str | None, typer.Option(metavar="SECONDS", help="Override the scene's.")
     ] = None,
     intervals: Annotated[
         int | None,
-        typer.Option(help="Steps; when not given, 100 a second, or 400 with a plan."),
+        typer.Option(help="Steps; default: 100 per second, or 400 with a plan."),
     ] = None,
-    inner_modes: Annotated[int, typer.Option(help="R; the order is 2 (R + 1).")] = 1,
-    out: Annotated[
-        Path | None, typer.Option(metavar="F.npz", help="Where the motion is written.")
-    ] = None,
+    inner_modes: Annotated[int, typer.Option(help="R, for a scheme of order 2 (R + 1).")] = 1,
+    out: Annotated[Path | None, typer.Option(metavar="F.npz", help="Path of the motion.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
-    """Simulate a scene by a variational integrator: without torques, or playing a plan.
+    """Simulate a scene with a variational integrator, without torques or under those of a plan.
 
-    Exit code 0, or 2 for bad input.
+    Exit code 0, or 2 for invalid input.
     """
     from hovi.cli.commands.files import check_output, find_scene
     from hovi.errors import InputError
@@ -52,15 +50,17 @@ def simulate(
     if out is not None:
         check_output(out, ".npz")
     if plan is not None and duration is not None:
-        raise InputError("--duration does not go with --plan, which lasts as long as it lasts.")
+        raise InputError(
+            "--duration cannot be combined with --plan, which has its own duration; leave one out."
+        )
     if plan is None and feedback != "none":
-        raise InputError("--feedback holds a motion to a plan: name one with --plan F.npz.")
+        raise InputError("--feedback needs a plan to track; give one with --plan F.npz.")
     task = load_task(find_scene(scene))
     if plan is None:
-        motion = _free(task, duration, intervals, inner_modes)
+        motion = _simulate(task, duration, intervals, inner_modes)
         report = _report(task, motion, out)
     else:
-        tracking = _played(task, plan, feedback, bandwidth, intervals, inner_modes)
+        tracking = _track(task, plan, feedback, bandwidth, intervals, inner_modes)
         motion = tracking.simulation
         report = _report(task, motion, out) | _deviation(tracking, plan, feedback, bandwidth)
     if out is not None:
@@ -73,7 +73,9 @@ def simulate(
         _print(report, motion)
 
 
-def _free(task: Task, duration: str | None, intervals: int | None, inner_modes: int) -> Simulation:
+def _simulate(
+    task: Task, duration: str | None, intervals: int | None, inner_modes: int
+) -> Simulation:
     import math
 
     from hovi.cli.commands.durations import positive_seconds
@@ -85,7 +87,7 @@ def _free(task: Task, duration: str | None, intervals: int | None, inner_modes: 
     return simulate_motion(task.scene, task.start, T, intervals=N, inner_modes=inner_modes)
 
 
-def _played(
+def _track(
     task: Task,
     plan: Path,
     feedback: str,
@@ -107,7 +109,7 @@ def _played(
 
 
 def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
-    from hovi.cli.reports.simulation import passed_limits
+    from hovi.cli.reports.simulation import exceeded_limits
 
     energy, (driven, resisted) = motion.energy, motion.work
     balance = energy - energy[0] - driven - resisted
@@ -123,7 +125,7 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
         "work_of_torques": float(driven[-1]),
         "work_of_effects": float(resisted[-1]),
         "energy_error": float(abs(balance).max()),
-        "limits_passed": [asdict(each) for each in passed_limits(motion)],
+        "limits_passed": [asdict(each) for each in exceeded_limits(motion)],
         "out": None if out is None else str(out),
     }
 
@@ -146,7 +148,7 @@ def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) 
 def _print(report: dict[str, Any], motion: Simulation) -> None:
     from rich.console import Console
 
-    from hovi.cli.reports.simulation import end_state, end_table, limits_sentence, passed_limits
+    from hovi.cli.reports.simulation import end_state, end_table, exceeded_limits, limits_sentence
 
     drive = f"playing {report['plan']}" if "plan" in report else "no torques"
     print(f"{report['scene']}: {report['duration']:g} s in {report['intervals']} steps", end="")
@@ -157,30 +159,30 @@ def _print(report: dict[str, Any], motion: Simulation) -> None:
         f"{report['work_of_torques']:+.6g} J, effects {report['work_of_effects']:+.6g} J, "
         f"balanced to {report['energy_error']:.2g} J"
     )
-    passed = passed_limits(motion)
-    if passed:
-        print(limits_sentence(passed))
+    exceeded = exceeded_limits(motion)
+    if exceeded:
+        print(limits_sentence(exceeded))
     if "plan" in report:
         _print_deviation(report, [units.tau for units in motion.scene.robot.coordinate_units])
     if report["out"] is not None:
-        print(f"written to {report['out']}")
+        print(f"wrote {report['out']}")
 
 
 def _print_deviation(report: dict[str, Any], efforts: list[str]) -> None:
     units = report["joint_units"]
     if report["bandwidth"] is not None:
-        most = _measured(report["feedback_torque_max"], efforts)
-        print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {most}")
+        peak = _with_units(report["feedback_torque_max"], efforts)
+        print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {peak}")
     print(
         f"the tip is off by {1e3 * report['tip_deviation_end']:.4g} mm at the end, "
         f"by {1e3 * report['tip_deviation_max']:.4g} mm at most"
     )
-    print(f"joints at the end: {_measured(report['joint_deviation_end'], units)}")
-    print(f"joints at most:    {_measured(report['joint_deviation_max'], units)}")
+    print(f"joints at the end: {_with_units(report['joint_deviation_end'], units)}")
+    print(f"joints at most:    {_with_units(report['joint_deviation_max'], units)}")
 
 
-def _measured(values: list[float], units: list[str]) -> str:
-    """Values with their unit: once where all have the same."""
+def _with_units(values: list[float], units: list[str]) -> str:
+    """Values with their units; a common unit is written once."""
     if len(set(units)) == 1:
         return f"{_list(values)} {units[0]}"
     return "[" + ", ".join(f"{x:.4g} {unit}" for x, unit in zip(values, units, strict=True)) + "]"

@@ -1,1 +1,1 @@
-"""What a command prints, as text and as JSON."""
+"""The output of commands, as text and as JSON."""

@@ -1,4 +1,4 @@
-"""How accurate a plan is, for programs and for people."""
+"""The accuracy of a plan, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
 
-def scheme_in_words(task: Task, grid: Grid) -> str:
-    """The scheme of a motion: the task's, or those that a tolerance chose."""
+def scheme_text(task: Task, grid: Grid) -> str:
+    """The scheme of the task, or those chosen for its tolerance."""
     if task.options.tolerance is None:
         return task.options.scheme_name
     names = [scheme.name for scheme, _ in grid.groups]
@@ -23,20 +23,20 @@ def scheme_in_words(task: Task, grid: Grid) -> str:
 
 
 def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
-    """What was asked for, what was reached, and the grids on the way; {} without a tolerance."""
+    """The tolerance, the result and the grids on the way; {} without a tolerance."""
     accuracy = solution.accuracy
     if accuracy is None:
         return {}
     rounds = [
         {
-            "intervals": done.intervals,
-            "points": done.points,
-            "cost": done.cost,
-            "error": done.error,
-            "nit": done.nit,
-            "seconds": done.seconds,
+            "intervals": grid_round.intervals,
+            "points": grid_round.points,
+            "cost": grid_round.cost,
+            "error": grid_round.error,
+            "nit": grid_round.nit,
+            "seconds": grid_round.seconds,
         }
-        for done in accuracy.rounds
+        for grid_round in accuracy.rounds
     ]
     return {
         "tolerance": as_number_or_text(task.options.tolerance),
@@ -60,8 +60,8 @@ def errors_json(error: MotionError) -> dict[str, Any]:
     }
 
 
-def errors_in_words(error: MotionError) -> str:
-    """The same on one line."""
+def errors_text(error: MotionError) -> str:
+    """The largest errors over the whole motion, on one line."""
     parts = [f"cost {error.cost:.1e}"]
     if not error.sliding.all():
         parts.append(f"q {error.angle:.1e} rad")
@@ -72,7 +72,7 @@ def errors_in_words(error: MotionError) -> str:
     return ", ".join(parts)
 
 
-def steps_in_words(grid: Grid) -> str:
-    """The range of the intervals' lengths, where they differ; "" where they do not."""
+def steps_text(grid: Grid) -> str:
+    """The range of the interval lengths; "" on a uniform grid."""
     short, long = float(np.min(grid.steps)), float(np.max(grid.steps))
     return "" if long - short <= 1e-9 * long else f" of {short:.3g} to {long:.3g} s"

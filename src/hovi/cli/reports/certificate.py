@@ -1,4 +1,4 @@
-"""The certificate of a plan, for programs and for people."""
+"""The certificate of a plan, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from hovi.cli.reports.accuracy import errors_in_words, errors_json
+from hovi.cli.reports.accuracy import errors_json, errors_text
 from hovi.flows.dynamics_replay import DynamicsReplay
 from hovi.planning.refinement.certificate import Certificate, Peak
 
 NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
 
 
-COARSE = 0.01
-"""Relative difference of two integrals beyond which a grid is too coarse to be believed."""
-MEANINGLESS = 0.5
-"""That beyond which the cost says nothing about the motion."""
-ROUNDING = 1e-20
-"""Difference of two integrals that rounding leaves, as of a robot that stays where it is."""
+COARSE_GAP = 0.01
+"""Relative difference of action and integral beyond which a grid is reported as coarse."""
+INVALID_COST_GAP = 0.5
+"""Relative difference beyond which the cost is not that of the motion."""
+GAP_FLOOR = 1e-20
+"""Absolute difference that counts as rounding, such as for a robot at rest."""
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
-    """Every statement, null where it could not be made, and why it could not."""
+    """All statements, null where missing, and the reasons for missing ones."""
     errors, energy = certificate.errors, certificate.hamiltonian
     return {
         "action": certificate.action,
@@ -39,17 +39,17 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
-    """Labels and sentences."""
+    """Labels and their text."""
     energy, missing = certificate.hamiltonian, certificate.missing
     lines = [
-        ("errors", _or(certificate.errors, errors_in_words, missing, "errors")),
+        ("errors", _text_or_reason(certificate.errors, errors_text, missing, "errors")),
         (
             "action",
             f"discrete {certificate.action:.10g}, integral along the curve "
             f"{certificate.integral:.10g}",
         ),
     ]
-    if COARSE < _gap(certificate) <= MEANINGLESS:
+    if COARSE_GAP < _gap(certificate) <= INVALID_COST_GAP:
         lines.append(
             (
                 "! coarse",
@@ -63,13 +63,13 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     lines.append(
         ("largest", f"torque {_peak(certificate.torque)}; velocity {_peak(certificate.velocity)}")
     )
-    lines.append(("replay", _or(certificate.replay, _replay, missing, "replay")))
+    lines.append(("replay", _text_or_reason(certificate.replay, _replay, missing, "replay")))
     return lines
 
 
 def coarse_grid(certificate: Certificate | None) -> str:
-    """That the cost of a plan means nothing on its grid; "" where it means something."""
-    if certificate is None or _gap(certificate) <= MEANINGLESS:
+    """A warning if the grid is too coarse for the cost to be meaningful; "" otherwise."""
+    if certificate is None or _gap(certificate) <= INVALID_COST_GAP:
         return ""
     return (
         f"the grid is too coarse for this motion: discrete action {certificate.action:.2g}, "
@@ -78,25 +78,25 @@ def coarse_grid(certificate: Certificate | None) -> str:
 
 
 def _gap(certificate: Certificate) -> float:
-    """The relative difference of the integral along the curve and the discrete action."""
+    """The relative difference between the integral along the curve and the discrete action."""
     gap = abs(certificate.integral - certificate.action)
-    return gap / max(abs(certificate.integral), ROUNDING) if gap > ROUNDING else 0.0
+    return gap / max(abs(certificate.integral), GAP_FLOOR) if gap > GAP_FLOOR else 0.0
 
 
-def _or(statement: Any, words: Any, missing: dict[str, str], name: str) -> str:
-    return f"none: {missing[name]}" if statement is None else str(words(statement))
+def _text_or_reason(statement: Any, describe: Any, missing: dict[str, str], name: str) -> str:
+    return f"none: {missing[name]}" if statement is None else str(describe(statement))
 
 
 def _replay(replay: DynamicsReplay) -> str:
-    misses = []
+    deviations = []
     if not replay.sliding.all():
-        misses.append(f"{replay.angle:.1e} rad")
+        deviations.append(f"{replay.angle:.1e} rad")
     if replay.sliding.any():
-        misses.append(f"{1e3 * replay.slide:.1e} mm")
-    misses.append(f"{replay.frame} by {1e3 * replay.largest_tip:.1e} mm")
+        deviations.append(f"{1e3 * replay.slide:.1e} mm")
+    deviations.append(f"{replay.frame} by {1e3 * replay.largest_tip:.1e} mm")
     return (
         "DOP853 on ABA under the planned torques, started at every node, misses the next by "
-        f"{', '.join(misses)}: {NOT_OPTIMALITY}"
+        f"{', '.join(deviations)}: {NOT_OPTIMALITY}"
     )
 
 

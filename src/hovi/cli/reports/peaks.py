@@ -1,4 +1,4 @@
-"""The largest values of a motion, beside the limits that the URDF states."""
+"""The extreme values of a motion, and the limits of the URDF."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 Array = npt.NDArray[np.float64]
 
 SAMPLES_PER_INTERVAL = 20
-MOST_SAMPLES = 20_000
+MAX_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class Peaks:
-    """Extremes over time, one per velocity coordinate.
+    """Extremes over time, per velocity coordinate.
 
-    names: of the coordinates. shown: what people are told of them, see `shown_names`.
-    q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as
-        `unwrapped` gives them.
+    names: of the coordinates. shown: their display names, see `shown_names`.
+    q_low, q_high: range of q, in [rad] or [m]; angles of continuous joints and orientations as in
+        `unwrapped`.
     v, a, tau: largest |v|, |a| and |tau|.
-    lower, upper, v_limit, tau_limit: what the URDF states; infinite where it states nothing.
+    lower, upper, v_limit, tau_limit: limits of the URDF; infinite where it has none.
     """
 
     names: tuple[str, ...]
@@ -40,7 +40,7 @@ class Peaks:
     tau_limit: Array
 
     def beyond(self) -> dict[str, npt.NDArray[np.bool_]]:
-        """Which limits the motion does not keep: "q", "v" and "tau", each of shape (nv,)."""
+        """Which limits the motion exceeds: "q", "v" and "tau", shape (nv,) each."""
         above, below = _above(self.q_high, self.upper), _above(-self.q_low, -self.lower)
         return {
             "q": above | below,
@@ -52,7 +52,7 @@ class Peaks:
 def peaks(trajectory: Trajectory) -> Peaks:
     """Extremes of q, v, a and tau, from up to 20 samples per interval."""
     N = trajectory.grid.intervals
-    per_interval = max(1, min(SAMPLES_PER_INTERVAL, MOST_SAMPLES // N))
+    per_interval = max(1, min(SAMPLES_PER_INTERVAL, MAX_SAMPLES // N))
     s = np.linspace(0.0, 1.0, per_interval + 1)
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
     nv, space = motion.v.shape[1], trajectory.space
@@ -72,12 +72,12 @@ def peaks(trajectory: Trajectory) -> Peaks:
 
 
 def _stated(limit: Array) -> Array:
-    """Infinite where Pinocchio's largest double says that the URDF states nothing."""
+    """The limit, infinite where Pinocchio has the largest double for a missing one."""
     return np.where(limit < np.finfo(float).max, limit, np.inf)
 
 
 def _known(limit: Array) -> Array:
-    """A velocity or effort limit of zero says that nobody knew it."""
+    """The limit, infinite where a velocity or effort limit is zero: unknown."""
     return np.where(limit > 0, _stated(limit), np.inf)
 
 

@@ -1,4 +1,4 @@
-"""What a plan came to: one JSON object for programs, tables for people."""
+"""The result of a plan: one JSON object, or a summary with tables."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from hovi.cli.reports.accuracy import accuracy_json, scheme_in_words, steps_in_words
+from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines, coarse_grid
-from hovi.cli.reports.limit_margins import Closeness, closeness, least_distance
+from hovi.cli.reports.limit_margins import LimitMargins, least_distance, limit_margins
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.solver import Solution
@@ -28,14 +28,14 @@ def as_json(
 ) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
     trajectory = solution.trajectory
-    room = closeness(solution)
+    margins = limit_margins(solution)
     fields = {
         "success": bool(solution.success),
         "status": str(solution.status),
         "message": solution.message,
         "cost": solution.cost,
         "error_estimate": _estimate(solution, certificate),
-        "scheme": scheme_in_words(task, trajectory.grid),
+        "scheme": scheme_text(task, trajectory.grid),
         "intervals": trajectory.grid.intervals,
         "nit": solution.nit,
         "n_neg": solution.n_neg,
@@ -45,8 +45,8 @@ def as_json(
         "seed": task.options.seed,
         "minima": list(solution.minima),
         "peaks": _peaks_json(peaks(trajectory)),
-        "limits": None if room is None else room.by_kind(),
-        "excess": None if room is None else room.excess,
+        "limits": None if margins is None else margins.by_kind(),
+        "excess": None if margins is None else margins.excess,
         "least_distance": least_distance(solution),
         "out": None if out is None else str(out),
         **accuracy_json(solution, task),
@@ -58,14 +58,14 @@ def as_json(
 def print_report(
     solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
 ) -> None:
-    """A summary, the peaks of the motion, and where it was written, on stdout."""
+    """Print a summary, the peaks of the motion, the certificate and the output file."""
     for label, text in _summary(solution, task, coarse_grid(certificate)):
         print(f"{label:9s}{text}")
-    extremes, room = peaks(solution.trajectory), closeness(solution)
+    extremes, margins = peaks(solution.trajectory), limit_margins(solution)
     console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
-    if room is not None:
-        console.print(_room_table(extremes, room))
-        print(_room_note(room))
+    if margins is not None:
+        console.print(_margins_table(extremes, margins))
+        print(_margins_note(margins))
     else:
         console.print(_peaks_table(extremes))
         if any(each.any() for each in extremes.beyond().values()):
@@ -78,27 +78,27 @@ def print_report(
         for label, text in certificate_lines(certificate):
             print(f"{label:9s}{text}")
     if out is not None:
-        print(f"wrote {out}" + ("" if solution.success else ", which is no minimum"))
+        print(f"wrote {out}" + ("" if solution.success else ", which is not a minimum"))
 
 
 def _estimate(solution: Solution, certificate: Certificate | None) -> float | None:
-    """Of the cost: the solution's own, or the certificate's."""
+    """Estimated error of the cost, from the solution or from the certificate."""
     if solution.error_estimate is not None or certificate is None:
         return solution.error_estimate
     return None if certificate.errors is None else certificate.errors.cost
 
 
 def _summary(solution: Solution, task: Task, coarse: str) -> list[tuple[str, str]]:
-    """Labels and what they say. coarse: why the cost means nothing, or ""."""
+    """Labels and their text. coarse: why the cost is meaningless, or ""."""
     grid = solution.trajectory.grid
     rows = [
         ("status", str(solution.status)),
         ("message", solution.message),
-        ("cost", f"{solution.cost:.10g}{_caveat(solution)}"),
+        ("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"),
         *([("!", coarse)] if coarse else []),
         ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
-        ("scheme", f"{scheme_in_words(task, grid)} on {_intervals(solution, task)}"),
+        ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
     if len(solution.minima) > 1:
@@ -108,22 +108,22 @@ def _summary(solution: Solution, task: Task, coarse: str) -> list[tuple[str, str
     return rows
 
 
-def _caveat(solution: Solution) -> str:
-    """What the cost of an infeasible answer belongs to."""
+def _infeasible_note(solution: Solution) -> str:
+    """A note on the cost of an infeasible problem; "" otherwise."""
     unfit = solution.status == Status.INFEASIBLE
-    return " of the motion below, which is no answer" if unfit else ""
+    return " of the motion below, which violates the constraints" if unfit else ""
 
 
 def _intervals(solution: Solution, task: Task) -> str:
     taken = solution.trajectory.grid.intervals
     if task.options.tolerance is not None:
-        return f"{taken} intervals{steps_in_words(solution.trajectory.grid)}"
+        return f"{taken} intervals{steps_text(solution.trajectory.grid)}"
     asked = "" if taken == task.options.intervals else f" ({task.options.intervals} asked for)"
     return f"{taken} intervals{asked}"
 
 
-def _room_table(extremes: Peaks, room: Closeness) -> Table:
-    """The extremes of each output that is limited, each with what is left to its limit."""
+def _margins_table(extremes: Peaks, margins: LimitMargins) -> Table:
+    """The extremes of each limited output, with the margin to its limit."""
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("joint", overflow="fold")
     values = {
@@ -132,19 +132,19 @@ def _room_table(extremes: Peaks, room: Closeness) -> Table:
         "a": [_short(each) for each in extremes.a],
         "tau": [_short(each) for each in extremes.tau],
     }
-    shown = [kind for kind in values if kind != "a" or room.is_limited("a")]
+    shown = [kind for kind in values if kind != "a" or margins.is_limited("a")]
     for kind in shown:
         table.add_column(kind if kind == "q" else f"|{kind}|", justify="right")
-        table.add_column("room", justify="right")
+        table.add_column("margin", justify="right")
     for i, name in enumerate(extremes.shown):
-        cells = [(values[kind][i], room.in_words(kind, i)) for kind in shown]
+        cells = [(values[kind][i], margins.text(kind, i)) for kind in shown]
         table.add_row(name, *(cell for pair in cells for cell in pair))
     return table
 
 
-def _room_note(room: Closeness) -> str:
-    note = "room: what is left to the nearest limit, in percent of the range; * at a limit"
-    return note + (", ! beyond one." if room.exceeded else ".")
+def _margins_note(margins: LimitMargins) -> str:
+    note = "margin: distance to the nearest limit, in percent of the range; * at a limit"
+    return note + (", ! beyond one." if margins.exceeded else ".")
 
 
 def _peaks_table(extremes: Peaks) -> Table:
@@ -182,7 +182,7 @@ def _peaks_json(extremes: Peaks) -> dict[str, dict[str, Any]]:
 
 
 def _range(low: float, high: float) -> str:
-    """A range in little room; nothing where neither end is known."""
+    """A short form of a range; - where neither end is known."""
     if math.isinf(low) and math.isinf(high):
         return "-"
     if low == -high:

@@ -1,4 +1,4 @@
-"""What a simulation ends in, joint by joint, and which position limits it passes."""
+"""The final state of a simulation, and the position limits that it exceeds."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Passed:
-    """A position limit of the URDF that a motion passes, and when: limit in unit, t in [s]."""
+class ExceededLimit:
+    """A position limit of the URDF, in `unit`, and the first time t that exceeds it, in [s]."""
 
     joint: str
     limit: float
@@ -26,26 +26,26 @@ class Passed:
     t: float
 
 
-def passed_limits(motion: Simulation) -> list[Passed]:
-    """The first limit that each joint is beyond at a node by more than rounding, by time."""
+def exceeded_limits(motion: Simulation) -> list[ExceededLimit]:
+    """The first limit that each joint exceeds at a node, beyond tolerance, in order of time."""
     robot, found = motion.scene.robot, []
     limits, units = urdf_limits(robot), robot.coordinate_units
     for iq, iv in zip(*robot.space.plain, strict=True):
         low, high = limits.lower[0, iv], limits.upper[0, iv]
         q = motion.q[:, iq]
-        room = np.minimum(q - low, high - q)
-        beyond = np.flatnonzero(room < -limits.tolerance * limits.ranges[0, iv])
+        margin = np.minimum(q - low, high - q)
+        beyond = np.flatnonzero(margin < -limits.tolerance * limits.ranges[0, iv])
         if beyond.size:
             k = beyond[0]
             limit = float(low if q[k] < low else high)
             name = robot.coordinate_names[iv]
-            found.append(Passed(name, limit, units[iv].q, float(motion.t[k])))
+            found.append(ExceededLimit(name, limit, units[iv].q, float(motion.t[k])))
     return sorted(found, key=lambda each: each.t)
 
 
-def limits_sentence(passed: list[Passed]) -> str:
-    """One line about the first limit that is passed; the other joints by name."""
-    first, *others = passed
+def limits_sentence(exceeded: list[ExceededLimit]) -> str:
+    """One line on the first exceeded limit, with the names of the other joints."""
+    first, *others = exceeded
     also = f", as are those of {', '.join(each.joint for each in others)} later" if others else ""
     return (
         f"{first.joint} passes its limit of {first.limit:.4g} {first.unit} at t = {first.t:.4g} s"
@@ -54,7 +54,7 @@ def limits_sentence(passed: list[Passed]) -> str:
 
 
 def end_state(motion: Simulation) -> list[dict[str, Any]]:
-    """A row for each coordinate: joint, q, v and unit at the end, as `unwrapped` shows them."""
+    """One row per coordinate: joint, q, v and unit at the end, with q as in `unwrapped`."""
     robot = motion.scene.robot
     names = shown_names(robot.space, robot.coordinate_names)
     rows = zip(names, unwrapped(robot.space, motion.q)[-1], motion.v[-1], strict=True)
@@ -65,7 +65,7 @@ def end_state(motion: Simulation) -> list[dict[str, Any]]:
 
 
 def end_table(rows: list[dict[str, Any]]) -> Table:
-    """The end state as a table, one joint a line."""
+    """The final state as a table, one joint per line."""
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     table.add_column("at the end", overflow="fold")
     for column in ("q", "", "v", ""):

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def describe_task(task: Task) -> str:
-    """The ends, the scheme, the scene and the robot of a task."""
+    """Describe the boundary states, the scheme, the scene and the robot of a task."""
     from hovi.planning.problem.tolerance import as_number_or_text
 
     robot, options = task.scene.robot, task.options
@@ -33,7 +33,7 @@ def describe_task(task: Task) -> str:
 
 
 def _duration(task: Task) -> str:
-    """How long the motion takes, in words."""
+    """The duration, with its weight if it is free."""
     if isinstance(task.duration, tuple):
         low, high = task.duration
         return f"{low:g} to {high:g} s, {task.options.time_weight:g} per second"
@@ -41,7 +41,7 @@ def _duration(task: Task) -> str:
 
 
 def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
-    """What is asked of an end of the motion, a line each."""
+    """The conditions at one end of the motion, one per line."""
     from hovi.planning.problem.frame_goal import FrameGoal
 
     if isinstance(goal, FrameGoal):
