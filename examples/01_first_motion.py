@@ -2,15 +2,14 @@
 The first motion
 ================
 
-A two-link arm leaves its hanging rest and passes through a point one second later, with a
-given velocity and with the least torque: the integral of 1/2 |tau|^2 is as small as it can
-be nearby.
+A two-link arm starts from hanging at rest and reaches a configuration with a given velocity one
+second later, with the least torque: the integral of 1/2 |tau|^2 has a local minimum.
 
-Run it with a folder to keep the results in: ``python 01_first_motion.py results``.
+Give a folder to keep the results: ``python 01_first_motion.py results``.
 """
 
 # %%
-# A robot is a URDF. This one travels with hovi; `load_robot` takes any path.
+# A robot is loaded from a URDF. This one is bundled with hovi; `load_robot` takes any path.
 
 import sys
 import tempfile
@@ -27,13 +26,13 @@ robot = hovi.load_robot(hovi.example("two_link.urdf"))
 print(robot.describe())
 
 # %%
-# A scene says what is simulated. What it does not name does not act, and it tells so.
+# A scene lists the simulated effects. `describe` also lists those that it leaves out.
 
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
 print(scene.describe())
 
 # %%
-# The two ends, in radians and radians per second, and the time between them.
+# Start and goal, in radians and radians per second, and the duration in seconds.
 
 solution = hovi.plan(
     scene,
@@ -44,13 +43,13 @@ solution = hovi.plan(
 print(f"{solution.status}: {solution.message}")
 
 # %%
-# `n_neg` counts the directions in which the cost falls: none, so this is a minimum.
+# `n_neg` is the number of negative eigenvalues of the Hessian: zero at a minimum.
 
 assert solution.success
 assert solution.n_neg == 0
 
 # %%
-# The motion can be read at any time, between the nodes of the grid too.
+# The motion can be sampled at any time, also between the nodes of the grid.
 
 trajectory = solution.trajectory
 t = np.linspace(0.0, trajectory.duration, 6)
@@ -60,9 +59,9 @@ for time, q, tau in zip(t, motion.q, motion.tau, strict=True):
     print(f"{time:5.2f}  {q[0]:9.4f} {q[1]:9.4f}     {tau[0]:9.4f} {tau[1]:9.4f}")
 
 # %%
-# Keep it. `hovi replay motion.npz` plays it in the browser, and `hovi plot` draws it.
+# Save it. `hovi replay motion.npz` plays it in the browser, and `hovi plot motion.npz` plots it.
 
 trajectory.save(folder / "motion.npz")
-again = hovi.Trajectory.load(folder / "motion.npz")
-assert np.array_equal(again.sample(t).tau, motion.tau)
-print(f"written to {folder / 'motion.npz'}")
+loaded = hovi.Trajectory.load(folder / "motion.npz")
+assert np.array_equal(loaded.sample(t).tau, motion.tau)
+print(f"wrote {folder / 'motion.npz'}")

@@ -2,13 +2,13 @@
 A scene from a file
 ===================
 
-A scene file holds all of a task: the robot, what acts on it, the two ends and how to plan.
-``hovi plan two_link_reach`` plans it from the shell; this is the same from Python, with a
-change to the task that is then written back.
+A scene file describes a task: the robot, the effects, start and goal, and the options of the plan.
+``hovi plan two_link_reach`` plans it from the shell. This example does the same in Python, changes
+the task, and saves it to a new file.
 """
 
 # %%
-# Five scenes travel with hovi. A path to your own file works as well.
+# `example` gives the path of a bundled scene; the path of your own file works as well.
 
 import dataclasses
 import sys
@@ -17,21 +17,19 @@ from pathlib import Path
 
 import hovi
 from hovi.errors import SceneError
-from hovi.planning.task_file.reading import load_task
-from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.writing import save_task
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)
 print(hovi.example("two_link_reach").read_text())
-task = load_task(hovi.example("two_link_reach"))
+task = hovi.load_task(hovi.example("two_link_reach"))
 
 
 # %%
 # Planning a task is handing its parts to `hovi.plan`, which is what `hovi.plan_task` does.
 
 
-def plan(task: Task) -> hovi.Solution:
+def plan(task: hovi.Task) -> hovi.Solution:
     return hovi.plan(
         task.scene,
         task.start,
@@ -42,8 +40,7 @@ def plan(task: Task) -> hovi.Solution:
 
 
 # %%
-# How long may it take? Shorter motions need more torque: the cost grows like T^-3 when T is
-# short.
+# Shorter motions need more torque: for short durations T the cost grows like T^-3.
 
 for duration in (1.0, 0.5, 0.25, 0.125):
     solution = plan(dataclasses.replace(task, duration=duration))
@@ -51,19 +48,18 @@ for duration in (1.0, 0.5, 0.25, 0.125):
     assert solution.success
 
 # %%
-# A changed task becomes a file of its own, its URDF beside it, so that the folder can be
-# given away as it is.
+# Save a changed task. Its URDF is copied beside it, so the folder is self-contained.
 
 slower = dataclasses.replace(task, duration=1.5).with_options(intervals=24)
 path = save_task(slower, folder / "slower_reach.toml")
 print(path.read_text())
-assert load_task(path).duration == 1.5
+assert hovi.load_task(path).duration == 1.5
 
 # %%
-# A mistake in a file is answered by a sentence that names the place and the nearest name.
+# The error for a mistake in a file names the line and the nearest valid name.
 
 path.write_text(path.read_text().replace("intervals", "intervalls"))
 try:
-    load_task(path)
-except SceneError as mistake:
-    print(mistake)
+    hovi.load_task(path)
+except SceneError as error:
+    print(error)

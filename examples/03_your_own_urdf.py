@@ -2,13 +2,13 @@
 Your own URDF
 =============
 
-Any URDF with ordinary joints can be planned on. A cart on a rail with a pole that hangs from
-it is written here as text; a file from a CAD program or a ROS package does as well.
+hovi plans motions for any URDF. Here the URDF of a cart with a hanging pole is written as text;
+a file from a CAD program or a ROS package works as well.
 """
 
 # %%
-# A link that moves needs a mass and an inertia; hovi refuses a model without a word of doubt
-# when one is missing, negative or not a number.
+# A moving link needs a mass and an inertia; hovi raises an error when one is missing, negative or
+# not a number.
 
 import sys
 import tempfile
@@ -56,14 +56,14 @@ robot = hovi.load_robot(urdf)
 print(robot.describe())
 
 # %%
-# The URDF states a damping. Nothing is simulated that the scene does not name, so it is
-# listed among what is left out.
+# The URDF has a joint damping. The scene does not list it as an effect, so it is not simulated, and
+# `describe` lists it among the effects left out.
 
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity()])
 print(scene.describe())
 
 # %%
-# Lift the pole to upright in two seconds. Both joints are driven.
+# Swing the pole up in two seconds. Both joints are actuated.
 
 solution = hovi.plan(scene, start=hovi.State([0.0, 0.0]), goal=hovi.State([0.5, pi]), duration=2.0)
 print(solution.message)
@@ -78,10 +78,10 @@ for i, name in enumerate(robot.coordinate_names):
     print(f"{name:6s} peak effort {force:6.2f}, limit {robot.effort_limit[i]:g}")
 
 # %%
-# A damaged model is refused before it is loaded.
+# An invalid model raises an error before it is loaded.
 
 urdf.write_text(CART_POLE.replace('mass value="0.2"', 'mass value="0,2"').strip())
 try:
     hovi.load_robot(urdf)
-except ModelError as refusal:
-    print(refusal)
+except ModelError as error:
+    print(error)

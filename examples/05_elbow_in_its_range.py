@@ -2,12 +2,12 @@
 An elbow that stays in its range
 ================================
 
-Effects are what a scene simulates or asks for beyond inertia. This one is a potential that
-is added to the cost: none while the elbow is between 0 and 170 degrees, steep outside.
+Effects are forces and cost terms that a scene has beyond inertia. This one is a potential in the
+cost: zero while the elbow is between 0 and 170 degrees, steep outside.
 """
 
 # %%
-# The scene `two_link_elbow` travels with hovi; here it is built step by step.
+# This is the bundled scene `two_link_elbow`, built step by step.
 
 import sys
 import tempfile
@@ -51,8 +51,8 @@ for name, scene in (("free", free), ("kept", kept)):
     solutions[name] = solution
 
 # %%
-# Keeping the elbow in its range costs torque. The potential is soft: where the motion leans
-# on it, the elbow is a fraction of a degree outside, and only a larger slope brings it back.
+# Keeping the elbow in its range costs torque. The potential is soft: where it acts, the elbow is a
+# fraction of a degree outside, less with a larger slope.
 
 assert solutions["kept"].success
 assert solutions["kept"].cost > solutions["free"].cost

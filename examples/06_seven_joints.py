@@ -2,12 +2,12 @@
 Seven joints
 ============
 
-The machinery is the same for any robot. A Franka Panda from example-robot-data, its two
-fingers locked, moves in 1.5 seconds; the result becomes one page that plays anywhere.
+A Franka Panda from example-robot-data, with its two fingers locked, moves in 1.5 seconds. The
+result is written as one page that plays in any browser.
 """
 
 # %%
-# Robots of example-robot-data are called by their names. Locked joints leave the model.
+# Robots of example-robot-data are loaded by name. Locked joints are removed from the model.
 
 import sys
 import tempfile
@@ -23,8 +23,8 @@ robot = hovi.load_robot("panda", locked=["panda_finger_joint1", "panda_finger_jo
 print(robot.describe())
 
 # %%
-# Only ends, time and torque count. Sixteen intervals, the default, would give the cost to three
-# digits; the torque between the nodes is a second derivative and asks for more.
+# Sixteen intervals, the default, would give the cost to three digits; the torque between the nodes
+# depends on second derivatives and needs more.
 
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity()])
 solution = hovi.plan(
@@ -39,8 +39,8 @@ print(f"{solution.message} {solution.solve_seconds:.2f} s")
 assert solution.success
 
 # %%
-# The least-torque motion uses the arm's own swing and, without limits, is wild. Compare it with
-# what the URDF allows, which `plan` keeps to unless told otherwise.
+# Without limits the least-torque motion swings fast. Compare its peaks with the limits of the URDF,
+# which `plan` respects by default.
 
 trajectory = solution.trajectory
 motion = trajectory.sample(np.linspace(0.0, trajectory.duration, 641))
@@ -52,9 +52,9 @@ for i, name in enumerate(robot.coordinate_names):
     )
 
 # %%
-# Weights change what "least torque" means: here the wrist's torque counts a hundred times.
+# Weights scale the squared torques: here those of the wrist count a hundred times.
 
-careful = hovi.plan(
+weighted = hovi.plan(
     scene,
     start=[0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7],
     goal=[0.9, 0.3, -0.4, -1.2, 0.5, 2.2, -0.3],
@@ -63,11 +63,11 @@ careful = hovi.plan(
     limits="none",
     weight=[1, 1, 1, 1, 100, 100, 100],
 )
-wrist = abs(careful.trajectory.sample(np.linspace(0.0, 1.5, 641)).tau[:, 4:]).max()
+wrist = abs(weighted.trajectory.sample(np.linspace(0.0, 1.5, 641)).tau[:, 4:]).max()
 print(f"peak torque in the wrist: {abs(motion.tau[:, 4:]).max():.1f} N m, weighted {wrist:.1f} N m")
 
 # %%
-# A page that plays the motion, with nothing to install.
+# Write a self-contained page that plays the motion.
 
 hovi.replay(trajectory, html=folder / "panda.html", open_browser=False)
 print(f"open {folder / 'panda.html'}")

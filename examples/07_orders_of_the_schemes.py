@@ -2,12 +2,12 @@
 Orders of the schemes
 =====================
 
-A scheme is a table of numbers that turns a Lagrangian into a discrete one. Its order says
-how fast the error falls with the number of intervals.
+A scheme is a table of coefficients that turns a Lagrangian into a discrete Lagrangian. Its order is
+the rate at which the error decreases with the number of intervals.
 """
 
 # %%
-# One motion, smooth and short: the two-link arm reaches a point in one second.
+# A short, smooth motion: the two-link arm reaches a configuration in one second.
 
 import sys
 import tempfile
@@ -30,14 +30,14 @@ def cost(scheme: str, intervals: int) -> float:
 
 
 # %%
-# The reference: three inner modes, on a grid that is fine enough for round-off.
+# The reference: three inner modes, on a grid fine enough for rounding accuracy.
 
 exact = cost("galerkin-3", 48)
 print(f"exact cost {exact:.10f}")
 
 # %%
-# `taylor-midpoint` is the paper's. The Galerkin schemes come with any number of inner modes:
-# with R of them the nodes have order 2 (R + 2).
+# `taylor-midpoint` is the scheme of the paper. Galerkin schemes with R inner modes have order
+# 2 (R + 2) at the nodes.
 
 lines = ["scheme            order   error on 8, 16, 32, 64 intervals"]
 for name in ("taylor-midpoint", "taylor-trapezoid", "hermite-simpson", "galerkin-0", "galerkin-1"):
@@ -54,10 +54,10 @@ print("\n".join(lines))
 (folder / "orders.txt").write_text("\n".join(lines) + "\n")
 
 # %%
-# Two of the discrete Lagrangians that look natural are no methods: nothing ties q to v in
-# them. Asking for a motion with one is refused with the reason.
+# Two natural-looking discrete Lagrangians are degenerate: they do not relate q to v. Planning with
+# one raises an error with the reason.
 
 try:
     cost("mean-difference", 16)
-except hovi.HoviError as refusal:
-    print(refusal)
+except hovi.HoviError as error:
+    print(error)

@@ -2,13 +2,13 @@
 Splines
 =======
 
-For L = 1/2 |a|^2 everything in the paper has a closed form: two discrete Lagrangians, their
+For L = 1/2 |a|^2 the examples of the paper have closed forms: two discrete Lagrangians, their
 recursions, and the figure of a trajectory with its error.
 """
 
 # %%
-# The paper's discrete Lagrangian by Taylor accelerations, and the exact one, which the cubic
-# through the end data gives already.
+# The paper's discrete Lagrangian by Taylor accelerations, and the exact one, which is given by the
+# cubic through the end states.
 
 import sys
 import tempfile
@@ -39,9 +39,9 @@ for scheme in (taylor, exact):
     print(f"{scheme.name}: coefficients of q0, v0, q1, v1 at h = 1: q2 {q2}, v2 {v2}")
 
 # %%
-# The trajectory of the paper's figure: from (0, 0) with velocity (10, 10) to (10, 0) with
-# velocity (10, 20). The flow is affine here, so that one shot with every unit momentum decides
-# which momenta to start with.
+# The trajectory of the paper's figure: from (0, 0) with velocity (10, 10) to (10, 0) with velocity
+# (10, 20). The flow is affine here, so shooting once with every unit momentum determines the
+# initial momenta.
 
 start, goal = np.array([[0.0, 0.0], [10.0, 10.0]]), np.array([[10.0, 0.0], [10.0, 20.0]])
 
@@ -62,7 +62,7 @@ print(f"phi = (q1 - q0)/h - (v0 + v1)/2 is constant to {np.ptp(phi, axis=0).max(
 assert np.ptp(phi, axis=0).max() < 1e-10
 
 # %%
-# Against the cubic that solves the problem exactly, the error falls with h^2.
+# Compared with the cubic that solves the problem exactly, the error is of order h^2.
 
 steps = np.array([10, 20, 40, 80])
 errors = []
@@ -75,7 +75,7 @@ print(f"orders: position {orders[0]:.2f}, velocity {orders[1]:.2f}")
 assert np.allclose(orders, 2, atol=0.2)
 
 # %%
-# Both pictures of the paper's figure.
+# Both panels of the paper's figure.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
 left.plot(*q.T, "o", markersize=3)

@@ -2,9 +2,8 @@
 A joint without a motor
 =======================
 
-A cart swings up a pole that hangs on a hinge: the hinge carries no torque. The discrete motion
-keeps that at every quadrature point, and an integrator that knows nothing of the plan arrives at
-the same nodes.
+A cart swings up a pole on a passive hinge. The torque of the hinge vanishes at every quadrature
+point of the discrete motion, and an independent integrator arrives at the same nodes.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ scene = task.scene
 print(scene.describe())
 
 # %%
-# Plan: first the hinge is helped a little, then less and less.
+# Plan. Early iterations admit some torque at the hinge; it is then driven to zero.
 
 solution = hovi.plan(
     scene,
@@ -34,8 +33,8 @@ motion = solution.trajectory
 print(solution.message)
 
 # %%
-# Drive the cart by its planned force, the hinge by nothing, from the first node to the second,
-# from the second to the third, ...
+# Integrate from every node to the next with the planned force of the cart and no torque at the
+# hinge.
 
 model, data = scene.model, scene.model.createData()
 
@@ -51,6 +50,6 @@ for k, h in enumerate(motion.grid.steps):
     y0 = np.concatenate([motion.q[k], motion.v[k]])
     end = solve_ivp(rates, (0, h), y0, "DOP853", rtol=1e-10, atol=1e-11, args=(k, h)).y[:, -1]
     missed.append(np.abs(end[:2] - motion.q[k + 1]).max())
-print(f"largest miss of a next node: {max(missed):.1e} (m or rad)")
+print(f"largest deviation at the next node: {max(missed):.1e} (m or rad)")
 
 hovi.plot(motion, "cart_pole.png")

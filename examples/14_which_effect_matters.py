@@ -2,13 +2,12 @@
 Which effect matters?
 =====================
 
-A scene simulates what it names and nothing else. Plan simply, check richly: the torques of a plan
-are played on a scene with more effects, and what goes wrong says which of them the plan has to
-know of.
+A scene simulates only the effects that it lists. Here the torques of a simple plan are applied in a
+scene with more effects, and the deviations show which of them the plan must include.
 """
 
 # %%
-# A plan for the two-link arm that knows gravity alone.
+# A plan for the two-link arm with gravity only.
 
 import math
 import sys
@@ -18,21 +17,19 @@ from pathlib import Path
 import hovi
 from hovi.accuracy.effect_study.study import study_effects
 from hovi.accuracy.effect_study.tables import plot_study
-from hovi.discrete.state import State
 from hovi.effects import Armature, DryFriction, Gravity, Payload, ViscousFriction, Wrench
-from hovi.planning.task_file.task import Task
 
 robot = hovi.load_robot(hovi.example("two_link.urdf"))
-simple = hovi.Scene(robot, [Gravity(9.8)])
-start, goal = State([-math.pi / 2, 0.0]), State([0.3, 0.7])
-plan = hovi.plan(simple, start, goal, 1.0, limits="none")
+gravity_scene = hovi.Scene(robot, [Gravity(9.8)])
+start, goal = hovi.State([-math.pi / 2, 0.0]), hovi.State([0.3, 0.7])
+plan = hovi.plan(gravity_scene, start, goal, 1.0, limits="none")
 print(f"planned with gravity alone: cost {plan.cost:.3f}")
 
 # %%
-# The world has more in it. `describe` says what a scene simulates, what it leaves out, and what
-# each effect costs: instructions in the expression graph, and time with and without it.
+# A scene with more effects. `describe` lists the effects of a scene, those that it leaves out, and
+# what each one costs: instructions in the expression graph, and time with and without it.
 
-rich = hovi.Scene(
+full_scene = hovi.Scene(
     robot,
     [
         Gravity(9.8),
@@ -40,30 +37,32 @@ rich = hovi.Scene(
         DryFriction(0.05, width=0.1),  # N m, its sign smoothed over 0.1 rad/s
         Armature(0.01),  # kg m^2
         Payload(robot.tip_frame, 0.05),  # kg
-        Wrench(robot.tip_frame, ("0.2*sin(2*pi*t)", 0.0, 0.0)),  # N, a push that comes and goes
+        Wrench(robot.tip_frame, ("0.2*sin(2*pi*t)", 0.0, 0.0)),  # N, an oscillating force
     ],
 )
-print(rich.describe())
+print(full_scene.describe())
 
 # %%
-# Played open loop on the rich scene, the plan misses. A feedback holds it, at a price in torque;
-# computed torques believe in the plan's own scene.
+# Applied open loop in this scene, the torques of the plan miss the goal. A feedback corrects that,
+# with extra torque; computed torque uses the model of the plan's own scene.
 
 for feedback in ("none", "pd", "computed-torque"):
-    played = hovi.play(rich, plan.trajectory, feedback, bandwidth=10.0)
+    played = hovi.play(full_scene, plan.trajectory, feedback, bandwidth=10.0)
     print(
         f"feedback {feedback:15s}  tip off by {1e3 * played.tip_deviation[-1]:7.2f} mm at the end, "
         f"largest correction {abs(played.feedback_torque).max():.3f} N m"
     )
 
 # %%
-# Which effect is to blame? Each one alone: what it changes against what it costs.
+# Each effect alone: how much it changes, and how much time it costs.
 
-task = Task(simple, start, goal, 1.0, hovi.PlanOptions(limits="none"), "two_link_reach")
-study = study_effects(task, rich.effects[1:])
+task = hovi.Task(gravity_scene, start, goal, 1.0, hovi.PlanOptions(limits="none"), "two_link_reach")
+study = study_effects(task, full_scene.effects[1:])
 for trial in study.trials:
-    loose, held = 1e3 * (trial.open_loop or 0.0), 1e3 * (trial.held or 0.0)
-    print(f"{trial.name:20s} cost {100 * study.change(trial):+7.2f} %, tip off by {loose:.1f} mm")
+    open_loop, held = 1e3 * (trial.open_loop or 0.0), 1e3 * (trial.held or 0.0)
+    print(
+        f"{trial.name:20s} cost {100 * study.change(trial):+7.2f} %, tip off by {open_loop:.1f} mm"
+    )
     print(f"{'':20s} held by a feedback, by {held:.2f} mm")
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
@@ -71,10 +70,10 @@ folder.mkdir(parents=True, exist_ok=True)
 plot_study(study, folder / "effects.png")
 
 # %%
-# A plan that knows them arrives where it should, with the torques that it takes.
+# A plan with all effects reaches the goal open loop.
 
-informed = hovi.plan(rich, start, goal, 1.0, limits="none", guess=plan.trajectory)
-played = hovi.play(rich, informed.trajectory)
+informed = hovi.plan(full_scene, start, goal, 1.0, limits="none", guess=plan.trajectory)
+played = hovi.play(full_scene, informed.trajectory)
 print(f"planned with all of them: cost {informed.cost:.3f}")
 print(f"open loop, the tip ends {1e3 * played.tip_deviation[-1]:.3f} mm off")
 assert played.tip_deviation[-1] < 1e-3

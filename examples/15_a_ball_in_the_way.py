@@ -2,13 +2,12 @@
 A ball in the way
 =================
 
-The collision shapes of a robot keep a distance from obstacles all along the motion, and its links
-from each other where that is asked for.
+The collision shapes of a robot keep a distance from obstacles along the whole motion, and
+optionally from each other.
 """
 
 # %%
-# A UR5 turns about its base. The motion of least torque knows of no obstacle, and goes through
-# the ball.
+# A UR5 turns about its base. Without the obstacle, the least-torque motion passes through the ball.
 
 import sys
 import tempfile
@@ -29,15 +28,15 @@ ball = hovi.Sphere(position=[0.05, 0.35, 0.25], radius=0.1, name="ball")
 free = hovi.plan(scene, start, goal, duration=2.0, limits=limits)
 
 # %%
-# With the ball among its obstacles the plan keeps 3 cm from it. Boxes and capsules work alike, and
-# meshes count as their convex hulls.
+# With the ball as an obstacle the plan keeps 3 cm from it. Obstacles may also be boxes and
+# capsules; meshes of the robot are replaced by their convex hulls.
 
 kept = hovi.plan(scene, start, goal, 2.0, limits=limits, obstacles=[ball], margin=0.03)
 print(kept.message)
 assert kept.success
 
 # %%
-# How near does each motion come? Distances are signed: negative where shapes overlap.
+# The least distance of each motion. Distances are negative where shapes overlap.
 
 distances = Distances(robot, hovi.Clearance([ball]))
 t = np.linspace(0.0, 2.0, 2001)
@@ -49,14 +48,14 @@ assert d.min() >= 0.03
 assert kept.cost > free.cost
 
 # %%
-# The page that plays the motion shows the ball.
+# The replay page shows the ball.
 
 hovi.replay(kept.trajectory, html=folder / "kept.html")
 
 # %%
-# A goal that is too near is infeasible, which is said before any search, with the names.
+# A goal too close to an obstacle is reported as infeasible, with the names, before any search.
 
-wide = hovi.Box(size=[0.3, 0.3, 0.3], position=[-0.3, 0.55, 0.2], name="crate")
-barred = hovi.plan(scene, start, goal, 2.0, limits=limits, obstacles=[wide])
-print(f"{barred.status}: {barred.message}")
-assert not barred.success
+crate = hovi.Box(size=[0.3, 0.3, 0.3], position=[-0.3, 0.55, 0.2], name="crate")
+blocked = hovi.plan(scene, start, goal, 2.0, limits=limits, obstacles=[crate])
+print(f"{blocked.status}: {blocked.message}")
+assert not blocked.success

@@ -1,13 +1,12 @@
 """
-As accurate as asked
-====================
+Planning to a tolerance
+=======================
 
-State the accuracy that you need, in a unit that you have, and get a plan that has it, with a
-certificate.
+Give the accuracy of a plan as a tolerance, in the unit of your choice; a certificate verifies it.
 """
 
 # %%
-# A UR5 whose tool has to be where it should be to a tenth of a millimetre, at any time.
+# A UR5 whose tool position must be accurate to 0.1 mm at any time.
 
 import sys
 import tempfile
@@ -31,7 +30,7 @@ assert plan.accuracy.reached
 assert plan.accuracy.estimate.largest_tip <= 1e-4
 
 # %%
-# A bare number is relative in the cost. Each further digit costs a little more.
+# A number is a relative tolerance of the cost. Each further digit needs a few more points.
 
 for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
     plan = hovi.plan(scene, start, goal, duration=1.5, limits="none", tolerance=tolerance)
@@ -40,21 +39,19 @@ for tolerance in (1e-2, 1e-4, 1e-6, 1e-8):
     assert plan.error_estimate <= tolerance
 
 # %%
-# The certificate says what is known of the plan, each statement with its number. The replay drives
-# the arm with the planned torques by SciPy and Pinocchio: it certifies dynamics and torques, not
-# optimality.
+# The certificate lists checks of the plan. The replay integrates the arm under the planned torques
+# with SciPy and Pinocchio: it certifies dynamics and torques, not optimality.
 
 certificate = hovi.certify(plan)
 print(f"spread of Pontryagin's Hamiltonian: {certificate.hamiltonian.spread:.1e}")
 print(f"action {certificate.action:.9g}, integral {certificate.integral:.9g}")
-print(f"the driven arm misses the next node by {certificate.replay.angle:.1e} rad at most")
+print(f"the replay deviates at the next node by {certificate.replay.angle:.1e} rad at most")
 assert certificate.n_neg == 0
 assert certificate.hamiltonian.spread < 1e-6
 assert certificate.replay.angle < 1e-9
 
 # %%
-# Where a motion turns sharply its intervals become short; where it is smooth they get more inner
-# modes instead.
+# Intervals become short where a motion turns sharply, and get more inner modes where it is smooth.
 
 task = hovi.load_task(hovi.example("two_link_swing_up"))
 swing = {"duration": task.duration, "limits": "none"}

@@ -16,7 +16,7 @@ MODELS = Path(__file__).resolve().parents[1] / "models"
 
 @pytest.fixture(scope="session")
 def models() -> Path:
-    """The folder of the URDFs and scenes that travel with hovi."""
+    """The folder of the bundled URDFs and scenes."""
     return MODELS
 
 

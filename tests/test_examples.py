@@ -1,4 +1,4 @@
-"""Every example runs to its end without a screen."""
+"""Every example runs without a screen."""
 
 from __future__ import annotations
 

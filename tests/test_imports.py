@@ -1,4 +1,4 @@
-"""What importing hovi offers, and what a first plan imports: nothing that it does not use."""
+"""The public names of hovi, and the modules that `import hovi` and a first plan load."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ print(*sorted({name.partition(".")[0] for name in sys.modules}))
 
 
 def python(code: str, **environment: str) -> list[str]:
-    """The words that a program prints in a process of its own."""
+    """The words printed by a program in a separate process."""
     run = [sys.executable, "-c", code]
     done = subprocess.run(
         run, capture_output=True, text=True, check=True, env=os.environ | environment
@@ -31,7 +31,7 @@ def python(code: str, **environment: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", hovi.__all__)
-def test_a_public_name_is_there(name: str) -> None:
+def test_a_public_name_exists(name: str) -> None:
     assert getattr(hovi, name) is not None
     assert name in dir(hovi)
 
@@ -42,7 +42,7 @@ def test_a_module_does_not_hide_a_public_name() -> None:
     assert modules & set(hovi.__all__) == SUBPACKAGES
 
 
-def test_an_unknown_name_is_an_attribute_error() -> None:
+def test_an_unknown_name_raises() -> None:
     unknown = "plann"
     with pytest.raises(AttributeError, match=unknown):
         getattr(hovi, unknown)
@@ -51,11 +51,11 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
 
 
 def test_all_public_names_can_be_imported_at_once() -> None:
-    """Imports in a circle, that a first name would hide, show when all names are loaded eagerly."""
+    """Eager loading of all names reveals import cycles that lazy loading hides."""
     assert python("import hovi; print('plan' in dir(hovi))", EAGER_IMPORT="1") == ["True"]
 
 
-def test_importing_hovi_imports_no_other_module_of_it() -> None:
+def test_importing_hovi_loads_no_submodule() -> None:
     code = "import sys; before = {*sys.modules}; import hovi; print(*{*sys.modules} - before)"
     loaded = python(code)
     assert "hovi" in loaded
@@ -63,13 +63,13 @@ def test_importing_hovi_imports_no_other_module_of_it() -> None:
     assert not {"numpy", "importlib.metadata"} & set(loaded)
 
 
-def test_a_first_plan_imports_nothing_that_it_does_not_use() -> None:
+def test_a_first_plan_loads_no_unused_package() -> None:
     loaded = python(FIRST_PLAN)
     assert "pinocchio" in loaded
     assert not {"scipy", "joblib", "matplotlib", "meshcat", "typer"} & set(loaded)
 
 
-def test_a_report_in_the_terminal_draws_nothing() -> None:
+def test_a_text_report_loads_no_plotting_package() -> None:
     loaded = python("import sys, hovi.cli.reports.plan; print(*sys.modules)")
     assert "hovi.cli.reports.plan" in loaded
     assert not {"matplotlib", "meshcat", "scipy"} & set(loaded)

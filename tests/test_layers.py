@@ -1,4 +1,4 @@
-"""The packages are floors of a house: a module imports only from the floors below its own."""
+"""Packages are layers, called floors: a module imports only from the floors below its own."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ INNER_FLOOR = {
 }
 EFFORT = {("scene", name) for name in ("cost_terms", "effort_lagrangian", "squared_effort")}
 PUBLIC = {("accuracy",), ("effects",), ("schemes",)}
-MOST_LINES = 400
-MOST_FILES = 15
+MAX_LINES = 400
+MAX_FILES = 15
 FAMILIES = {("effects",)}
 """A file per member, with nothing else to read: these may be many."""
 
@@ -46,7 +46,7 @@ def test_every_package_has_a_floor() -> None:
 
 
 @pytest.mark.parametrize("package", sorted(FLOOR))
-def test_every_folder_of_a_package_has_its_place(package: str) -> None:
+def test_every_folder_of_a_package_has_a_floor(package: str) -> None:
     modules = [module for module in NAMES - PACKAGES if module[0] == package]
     ordered = set().union(*INSIDE.get(package, [{""}]))
     assert {folder(module) for module in modules} == ordered
@@ -62,7 +62,7 @@ def test_a_module_imports_only_from_lower_floors(module: Module) -> None:
     assert not above
 
 
-def test_no_modules_import_each_other_in_a_circle() -> None:
+def test_there_are_no_import_cycles() -> None:
     try:
         TopologicalSorter({module: imports(module) for module in FILES}).prepare()
     except CycleError as circle:
@@ -70,25 +70,25 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 
 @pytest.mark.parametrize("package", sorted(PACKAGES - PUBLIC), ids=dotted)
-def test_a_package_holds_its_docstring_alone(package: Module) -> None:
-    """So that what is imported is what is used, and no circle can hide behind a package."""
+def test_a_package_init_has_only_a_docstring(package: Module) -> None:
+    """So that imports name the modules they use, and no cycle is hidden by a package."""
     tree = ast.parse(FILES[package].read_text())
     assert ast.get_docstring(tree)
     assert len(tree.body) == 1
 
 
 @pytest.mark.parametrize("module", FILES, ids=dotted)
-def test_a_file_can_be_read_in_one_go(module: Module) -> None:
-    assert len(FILES[module].read_text().splitlines()) <= MOST_LINES
+def test_files_have_at_most_400_lines(module: Module) -> None:
+    assert len(FILES[module].read_text().splitlines()) <= MAX_LINES
 
 
-def test_a_folder_can_be_taken_in_at_a_glance() -> None:
+def test_folders_have_at_most_15_files() -> None:
     files = Counter(module[:-1] for module in FILES.keys() - PACKAGES)
-    assert {folder for folder, count in files.items() if count > MOST_FILES} <= FAMILIES
+    assert {folder for folder, count in files.items() if count > MAX_FILES} <= FAMILIES
 
 
 @pytest.mark.parametrize("module", FILES, ids=dotted)
-def test_the_optimiser_knows_a_lagrangian_and_no_effort(module: Module) -> None:
+def test_the_optimiser_does_not_import_the_effort(module: Module) -> None:
     if module[0] in ("discrete", "optimize", "planning"):
         assert not imports(module) & EFFORT
 

@@ -1,6 +1,6 @@
-"""Every text that names a module, a public name or a file of hovi names one that exists.
+"""Modules, public names and files mentioned in texts exist.
 
-A module that moves leaves its old name in strings, comments and pages, where nothing else fails.
+After a rename, old names may remain in strings, comments and pages, where no other test fails.
 """
 
 from __future__ import annotations
@@ -78,14 +78,14 @@ def is_path(path: str) -> bool:
 
 @pytest.mark.filterwarnings("ignore:.*:DeprecationWarning")  # old names that still resolve
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_what_a_text_names_exists(page: Path) -> None:
+def test_names_in_texts_exist(page: Path) -> None:
     text = (TOP / page).read_text()
     wrong = [each for each in names(text) if not is_name(each[0])]
     wrong += [each for each in paths(text) if not is_path(each[0])]
     assert not [f"{page}:{text.count(chr(10), 0, start) + 1}: {name}" for name, start in wrong]
 
 
-def test_ctrl_c_finds_what_it_calls() -> None:
+def test_the_ctrl_c_handler_finds_its_modules() -> None:
     """A signal handler has to find these in sys.modules: what is not there it does without."""
     assert callable(import_module(EXTENSION_MODULE).ignore_leaks)
     assert callable(import_module(INTERRUPTION_MODULE).record_interrupt)

@@ -1,4 +1,4 @@
-"""Run every benchmark, one after the other, and put what they print into the docs.
+"""Run every benchmark, one after the other, and write their output into the docs.
 
 Each script prints Markdown; it goes to docs/tables/<name>.md, from which the docs include it. The
 table of swing_up goes into the README as well, between two comments that name it.
@@ -37,11 +37,11 @@ SCRIPTS = (
 )
 
 LONG = {"hard_cases_long": ("hard_cases.py", "long")}
-"""What takes an hour and is run only where it is named, and how it is called."""
+"""Benchmarks that take an hour, run only when named: script and arguments."""
 
 
 def run(name: str) -> None:
-    """One benchmark into its table; a failure ends everything."""
+    """Run one benchmark and write its table; a failure ends the program."""
     began = time.perf_counter()
     print(f"{name} ...", file=sys.stderr, flush=True)
     script, *words = LONG.get(name, (f"{name}.py",))

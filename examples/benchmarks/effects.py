@@ -1,4 +1,4 @@
-"""Which effect matters on panda_reach and ur5_reach: tables and pictures of `hovi effects`."""
+"""The influence of effects on panda_reach and ur5_reach: tables and figures of `hovi effects`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from measuring import print_machine, print_table
 import hovi
 from hovi.accuracy.effect_study.study import study_effects
 from hovi.accuracy.effect_study.tables import COLUMNS, plot_study, study_rows
-from hovi.planning.task_file.reading import load_task
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 
@@ -18,7 +17,7 @@ IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 def main() -> None:
     for name in ("panda_reach", "ur5_reach"):
         print(name, file=sys.stderr, flush=True)
-        study = study_effects(load_task(hovi.example(name)))
+        study = study_effects(hovi.load_task(hovi.example(name)))
         print(f"**{name}**\n")
         print_table(COLUMNS, study_rows(study))
         for trial in study.trials:

@@ -14,17 +14,17 @@ from hovi.robot.example_robots import BUILT_IN_CODE, example_names
 
 INTERVALS = 4
 SIZE = 0.1
-"""Of the random displacement of every coordinate, in [rad] or [m]."""
+"""Size of the random displacement of every coordinate, in [rad] or [m]."""
 SECONDS = 60.0
-"""What the motion may take."""
+"""Time limit of the motion, in [s]."""
 
 
 def measure(name: str) -> list[object]:
-    """One row: name, nq, nv, joints, seconds to set up, what became of the motion."""
+    """One row: name, nq, nv, joints, setup time in [s], result of the motion."""
     try:
         robot = hovi.load_robot(name)
-    except hovi.HoviError as refused:
-        return [name, "", "", "", "", _cell(refused)]
+    except hovi.HoviError as error:
+        return [name, "", "", "", "", _cell(error)]
     joints = ", ".join(f"{n} {kind}" for kind, n in _kinds(robot).items())
     row: list[object] = [name, robot.nq, robot.nv, joints]
     began = time.perf_counter()
@@ -36,8 +36,8 @@ def measure(name: str) -> list[object]:
         ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
         goal = hovi.State(robot.integrate(start, d))
         problem = hovi.TrajectoryProblem(ld, hovi.State(start), goal)
-    except hovi.HoviError as refused:
-        return [*row, "", _cell(refused)]
+    except hovi.HoviError as error:
+        return [*row, "", _cell(error)]
     row.append(f"{time.perf_counter() - began:.2f}")
     solution = hovi.solve(problem, time_limit=SECONDS)
     outcome = f"{solution.status}, cost {solution.cost:.4g}, {solution.nit} steps"
@@ -45,7 +45,7 @@ def measure(name: str) -> list[object]:
 
 
 def _kinds(robot: hovi.Robot) -> Counter[str]:
-    """How many joints there are of each of Pinocchio's kinds."""
+    """Number of joints of each of Pinocchio's types."""
     short = (joint.shortname().removeprefix("JointModel") for joint in robot.model.joints[1:])
     return Counter(kind.rstrip("XYZ") if len(kind) < 5 else kind for kind in short)
 
@@ -55,7 +55,7 @@ def _cell(error: Exception) -> str:
 
 
 def main() -> None:
-    """One table of all names."""
+    """Print one table of all robots."""
     rows = []
     for name in sorted({*example_names(), *BUILT_IN_CODE}):
         print(name, file=sys.stderr, flush=True)

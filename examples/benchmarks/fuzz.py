@@ -1,9 +1,9 @@
-"""Strange URDFs, scene files and trajectory files by the thousand: none may crash, hang or slip in.
+"""Fuzzing of URDFs, scene files and trajectory files: no crash, no hang, no silent acceptance.
 
-Inputs are made by the mutators of tests/hard, each from the seed and its own number, and loaded in
-processes of their own: one that dies is a crash, one that is silent for 10 s a hang. What loads is
-held against what the file says. Every fault is printed with its number, from which
-`fuzz.py --show KIND NUMBER` makes the input again.
+Inputs are made by the mutators of tests/hard, each from the seed and its number, and loaded in
+separate processes: a process that dies is a crash, one that is silent for 10 s a hang. Objects that
+load are checked against the file. Every fault is printed with its number, from which
+`fuzz.py --show KIND NUMBER` reproduces the input.
 """
 
 from __future__ import annotations
@@ -37,31 +37,33 @@ HANG, STARTUP = 10.0, 120.0  # [s]
 FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)
 
 Result = tuple[int, Verdict, str, float]
-"""Number of the input, what became of it, why, and how long it took in [s]."""
+"""Number of the input, verdict, reason, and time in [s]."""
 
 
 def mutant(kind: str, seed: int, number: int) -> Mutant:
-    """The input of that number."""
+    """The input with this number."""
     module, _ = KINDS[kind]
-    made: Mutant = import_module(module).mutate(Random(f"{seed}:{number}"))
-    return made
+    input_: Mutant = import_module(module).mutate(Random(f"{seed}:{number}"))
+    return input_
 
 
 def work(kind: str, seed: int, numbers: range) -> None:
-    """Load inputs one after the other; a line of JSON on stdout for each."""
+    """Load inputs one after the other, and print one line of JSON for each."""
     verdict = import_module(KINDS[kind][0]).verdict
     mutant(kind, seed, 0)
     print("ready", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for number in numbers:
-            made = mutant(kind, seed, number)
+            input_ = mutant(kind, seed, number)
             began = time.perf_counter()
-            found, why = verdict(made, Path(folder))
-            print(json.dumps([number, found, why[:300], time.perf_counter() - began]), flush=True)
+            found, reason = verdict(input_, Path(folder))
+            print(
+                json.dumps([number, found, reason[:300], time.perf_counter() - began]), flush=True
+            )
 
 
 def watch(kind: str, seed: int, numbers: range) -> Iterator[Result]:
-    """The results of a share of the inputs, whatever becomes of the processes that load them."""
+    """The results of a share of the inputs, restarting the process after a crash or a hang."""
     while numbers:
         share = [kind, str(seed), str(numbers.start), str(numbers.stop), str(numbers.step)]
         command = [sys.executable, "-W", "error", __file__, "--work", *share]
@@ -78,8 +80,8 @@ def watch(kind: str, seed: int, numbers: range) -> Iterator[Result]:
                     fault = (Verdict.HANG, "") if silent else (Verdict.CRASH, died)
                     yield numbers[0], *fault, HANG
                 else:
-                    number, found, why, seconds = json.loads(line)
-                    yield number, Verdict(found), why, seconds
+                    number, found, reason, seconds = json.loads(line)
+                    yield number, Verdict(found), reason, seconds
                 numbers = numbers[1:]
                 if not line:
                     break
@@ -94,7 +96,7 @@ def _line(process: subprocess.Popen[bytes], seconds: float) -> tuple[bytes, bool
 
 
 def fuzz(kind: str, seed: int, count: int) -> list[Result]:
-    """Every input of one kind, shared by as many processes as there are processors."""
+    """The results of all inputs of one kind, loaded by one process per processor."""
     cores = len(os.sched_getaffinity(0))
     shares = [range(first, count, cores) for first in range(cores)]
     with ThreadPoolExecutor(cores) as pool:
@@ -103,7 +105,7 @@ def fuzz(kind: str, seed: int, count: int) -> list[Result]:
 
 
 def report(results: dict[str, list[Result]], seed: int) -> int:
-    """Print the table and every fault; returns how many faults there are."""
+    """Print the table and every fault; returns the number of faults."""
     total = sum(map(len, results.values()))
     print(
         f"{total:,} inputs, seed {seed}, at most {HANG:.0f} s each, warnings counted as crashes.\n"
@@ -119,8 +121,8 @@ def report(results: dict[str, list[Result]], seed: int) -> int:
     print_table(columns, table)
     faults = [(kind, *each) for kind, found in results.items() for each in found]
     faults = [fault for fault in faults if fault[2] in FAULTS]
-    for kind, number, verdict, why, _ in faults:
-        print(f"- {kind} {number}: {verdict}: {why}")
+    for kind, number, verdict, reason, _ in faults:
+        print(f"- {kind} {number}: {verdict}: {reason}")
     return len(faults)
 
 

@@ -1,8 +1,8 @@
-"""Fuzzing guided by coverage: atheris looks for bytes that reach new lines of the readers.
+"""Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
     python fuzz_coverage.py urdf|scene|trajectory SECONDS
 
-It starts from mutated inputs of tests/hard and stops at the first fault, which it leaves in a file.
+It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ HANG = 10  # [s]
 
 def main() -> None:
     kind, seconds = sys.argv[1], sys.argv[2]
-    # Only the readers: what computes is slow to trace.
+    # Only the readers, since tracing the computations is slow.
     readers = [
         "hovi.robot.urdf.check",
         "hovi.robot.urdf.rules",

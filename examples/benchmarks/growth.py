@@ -1,4 +1,4 @@
-"""How time and memory grow with the number of intervals: the two-link reach, 1e2 to 1e5.
+"""Growth of time and memory with the number of intervals, on the two-link reach from 1e2 to 1e5.
 
 Up to 1,000 intervals the nodal band matrix is factored; beyond, intervals are merged in pairs.
 """

@@ -1,9 +1,8 @@
-"""Hard cases: what a literal implementation of the paper does on each, what hovi does, and the bar.
+"""Hard cases: results of a literal implementation of the paper and of hovi, and the requirements.
 
-The cases are those of tests/hard, which are run here together with what breaks on them. With the
-word `long` those that take minutes: a million steps, 100,000 intervals, thirty links. They take an
-hour together, so that `--table FILE` writes every row as soon as it is measured and leaves the
-others as they are; `--only 3b 22b` runs some.
+The cases are those of tests/hard. With the argument `long`, the cases that take minutes: a million
+steps, 100,000 intervals, thirty links. They take an hour together, so `--table FILE` writes every
+row as soon as it is measured and keeps the others; `--only 3b 22b` selects cases.
 """
 
 from __future__ import annotations
@@ -32,27 +31,27 @@ def families() -> dict[str, list[Any]]:
         cases = getattr(importlib.import_module(f"hard.{path.stem}"), "CASES", ())
         if cases:
             found[path.stem.removeprefix("test_").replace("_", " ")] = list(cases)
-    return dict(sorted(found.items(), key=lambda item: _place(item[1][0].number)))
+    return dict(sorted(found.items(), key=lambda item: _case_number(item[1][0].number)))
 
 
 def require_tests() -> None:
-    """End with a sentence where what the tests need is not installed."""
+    """Exit with a sentence if a package that the tests need is not installed."""
     try:
         families()
     except ModuleNotFoundError as missing:
-        sys.exit(f"The cases are tests, which need {missing.name}: pip install '.[dev]' brings it.")
+        sys.exit(f"The cases are tests, which need {missing.name}; run pip install '.[dev]'.")
 
 
-def _place(number: str) -> int:
+def _case_number(number: str) -> int:
     return int("".join(c for c in number if c.isdigit()))
 
 
 def row(case: Any) -> tuple[bool, list[str]]:
-    """Whether a case is as it should be, and its row of the table."""
+    """Whether a case passes or fails as known, and its row of the table."""
     print(f"{case.number}: {case.claim}", file=sys.stderr, flush=True)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        naive = _attempted(case.naive)
+        naive = _naive_result(case.naive)
     began = time.perf_counter()
     try:
         outcome = case.run()
@@ -61,17 +60,17 @@ def row(case: Any) -> tuple[bool, list[str]]:
         traceback.print_exc()
         shown, passed = f"{type(error).__name__}: {error}", False
     seconds = time.perf_counter() - began
-    word = "pass" if passed else "**fail**"
+    verdict = "pass" if passed else "**fail**"
     if case.known_failure and not passed:
-        word = f"known failure: {case.known_failure}"
-    cells = [case.number, case.claim, naive, shown, case.bar, word, f"{seconds:.2g}"]
+        verdict = f"known failure: {case.known_failure}"
+    cells = [case.number, case.claim, naive, shown, case.requirement, verdict, f"{seconds:.2g}"]
     return passed or bool(case.known_failure), [cell.replace("|", "\\|") for cell in cells]
 
 
-def _attempted(work: Any) -> str:
-    """What a literal implementation does, which may well be an exception."""
+def _naive_result(run_naive: Any) -> str:
+    """The result of the literal implementation, which may be an exception."""
     try:
-        return str(work())
+        return str(run_naive())
     except Exception as error:
         return f"{type(error).__name__}: {error}"
 
@@ -85,8 +84,8 @@ def rows_of(path: Path | None) -> dict[str, str]:
 
 
 def table(rows: dict[str, str]) -> str:
-    """All rows that there are, by families and in their order."""
-    columns = ["case", "claim", "a literal implementation", "hovi", "the bar", "", "s"]
+    """The existing rows, by family and in order."""
+    columns = ["case", "claim", "a literal implementation", "hovi", "requirement", "", "s"]
     head = ["| " + " | ".join(columns) + " |", "|" + "---|" * (len(columns) - 1) + "---:|"]
     parts = []
     for family, cases in families().items():
@@ -100,7 +99,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("long", nargs="?", choices=["long"], help="the cases that take minutes")
     parser.add_argument("--only", nargs="+", metavar="NUMBER", help="these cases")
-    parser.add_argument("--table", type=Path, metavar="FILE", help="where rows are kept")
+    parser.add_argument("--table", type=Path, metavar="FILE", help="file of the table")
     given = parser.parse_args()
     require_tests()
     good, rows = True, rows_of(given.table)

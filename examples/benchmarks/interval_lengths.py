@@ -1,4 +1,4 @@
-"""The picture of docs/tolerance.md: which intervals a tolerance chooses along two sharp motions."""
+"""The figure of docs/tolerance.md: intervals chosen by a tolerance along two motions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One full evaluation of a point: tau, J and the Hessian of 1/2 |tau|^2.
+"""The evaluation of one point: tau, J and the Hessian of 1/2 |tau|^2.
 
 Against Pinocchio's own two calls in C++ (first and second derivatives of RNEA, without the
 products that a Hessian needs), and against CasADi's interpreter.
@@ -33,7 +33,7 @@ POINTS = 256
 
 
 def measure(robot: str, threads: int) -> dict[str, float]:
-    """Microseconds per point, the shortest of many runs over a batch."""
+    """Time per point in microseconds, the shortest of many runs over a batch."""
     name, locked = ROBOTS[robot]
     model = hovi.load_robot(name, locked=locked, free_flyer=False).model
     kernel = InverseDynamicsKernel(model)

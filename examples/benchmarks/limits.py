@@ -1,7 +1,7 @@
-"""Reaches under limits against Ipopt, and how long it takes to say that there is no motion.
+"""Reaches under limits compared with Ipopt, and the time to detect infeasible problems.
 
 Both solvers have the same discrete problem, guess and thread in one run: q, v and tau are bounded
-at the quadrature points. hovi then goes on until the limits hold between the points too. Ipopt
+at the quadrature points. hovi then continues until the limits hold between the points too. Ipopt
 has CasADi's exact Hessian, expanded to scalars; building it is not counted.
 """
 
@@ -33,7 +33,7 @@ def reach(scene: str, **changes: object) -> hovi.TrajectoryProblem:
 
 
 def held(torque: float | None) -> hovi.TrajectoryProblem:
-    """A two-link arm that is to stay horizontal within 0.05 rad, by at most this torque."""
+    """A two-link arm held horizontal within 0.05 rad, by at most this torque in [N m]."""
     scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()])
     given = {"base": "none", "q": 0.05} | ({} if torque is None else {"tau": torque})
     rest = hovi.State(np.zeros(2))
@@ -78,7 +78,7 @@ def measure(scene: str) -> list[dict[str, object]]:
 
 
 def ipopt(it: Transcription) -> tuple[ca.Function, dict[str, object]]:
-    """Ipopt for a transcription with limits, and the bounds that it is called with."""
+    """An Ipopt solver for a transcription with limits, and its bounds."""
     n, P = it.n, len(it.weights)
     x = ca.SX.sym("x", 3 * n)
     rnea = casadi_functions(it.problem.scene.model).inverse_dynamics
@@ -88,17 +88,17 @@ def ipopt(it: Transcription) -> tuple[ca.Function, dict[str, object]]:
     tau = torque.map(P)(p)
     cost = ca.dot(ca.sum1(tau**2).T, ca.DM(it.weights)) / 2
     outputs = ca.vec(ca.vertcat(p[: 2 * n, :], tau))
-    nlp = {"x": w, "f": cost, "g": ca.vertcat(ca.mtimes(it.ties, w), outputs)}
+    nlp = {"x": w, "f": cost, "g": ca.vertcat(ca.mtimes(it.defects, w), outputs)}
     solver = ca.nlpsol("S", "ipopt", nlp, {"print_time": 0, "expand": True, "ipopt": IPOPT})
-    ties, rows = np.zeros(it.ties.shape[0]), [0, 1, 3]
+    defects, rows = np.zeros(it.defects.shape[0]), [0, 1, 3]
     limits = it.problem.limits
-    lower = np.concatenate([ties, np.tile(limits.lower[rows].ravel(), P)])
-    upper = np.concatenate([ties, np.tile(limits.upper[rows].ravel(), P)])
+    lower = np.concatenate([defects, np.tile(limits.lower[rows].ravel(), P)])
+    upper = np.concatenate([defects, np.tile(limits.upper[rows].ravel(), P)])
     return solver, {"lbg": lower, "ubg": upper}
 
 
 def measure_infeasible() -> list[tuple[str, float, float, str, str]]:
-    """Of each impossible problem: its time, that of a feasible one like it, status, reason."""
+    """Per infeasible problem: its time, that of a similar feasible problem, status, reason."""
     ur5 = "ur5_reach_limited"
     feasible = reach(ur5)
     outside = np.add(feasible.start.q, [7.0, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -1,7 +1,7 @@
-"""Time per quadrature point where configurations are no vectors, beside ordinary joints.
+"""Time per quadrature point of robots on Lie groups, compared with robots of ordinary joints.
 
-Of RNEA's kernel alone, and of the discrete Lagrangian with the charts of its intervals. Each robot
-and the one beside it are timed by turns, so that what else the machine does meets both.
+Times are of RNEA's kernel alone, and of the discrete Lagrangian with the charts of its intervals.
+The two robots of a comparison are timed in turns, so that other load affects both alike.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hovi.planning.solver.solver import guess_path
 
 INTERVALS = (16, 256)
 BESIDE = {"kinova": "kinova, revolute", "free-flyer, 3 joints": "nine joints"}
-"""Robots on groups, and those of ordinary joints that they are compared with."""
+"""Robots on groups, and the robots of ordinary joints that they are compared with."""
 ROUNDS, SECONDS = 5, 0.5
 
 
@@ -81,7 +81,7 @@ def works(name: str, intervals: int) -> tuple[Callable[[], object], ...]:
 
 
 def measure(names: tuple[str, ...], intervals: int) -> list[list[list[float]]]:
-    """Microseconds per point of each work, in every round: (works, robots, rounds)."""
+    """Time per point in microseconds of each function and round: (functions, robots, rounds)."""
     by_robot = [works(name, intervals) for name in names]
     return [
         list(zip(*(by_turns(pair) for _ in range(ROUNDS)), strict=True))
@@ -90,7 +90,7 @@ def measure(names: tuple[str, ...], intervals: int) -> list[list[list[float]]]:
 
 
 def by_turns(pair: tuple[Callable[[], object], ...]) -> list[float]:
-    """The shortest processor time of each in one round, taken by turns, in [s]."""
+    """The shortest processor time of each in one round, taken in turns, in [s]."""
     times: list[list[float]] = [[] for _ in pair]
     while sum(map(sum, times)) < SECONDS or len(times[0]) < 3:
         for work, found in zip(pair, times, strict=True):
@@ -101,7 +101,7 @@ def by_turns(pair: tuple[Callable[[], object], ...]) -> list[float]:
 
 
 def rows_of(name: str, intervals: int) -> list[list[object]]:
-    """A row of the robot beside, and one of the robot with the factors between them."""
+    """A row for the robot of ordinary joints, and one for the other with the ratios of times."""
     names = BESIDE[name], name
     first: list[object] = [names[0], intervals]
     second: list[object] = [names[1], intervals]
@@ -117,7 +117,7 @@ def rows_of(name: str, intervals: int) -> list[list[object]]:
 
 
 def main() -> None:
-    """One table."""
+    """Print the table."""
     print(
         "Microseconds of processor time per quadrature point, `galerkin-2`, one thread: medians of "
         f"{ROUNDS} rounds, and how many times those of the row above, with the rounds' range.\n"

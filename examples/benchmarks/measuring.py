@@ -1,4 +1,4 @@
-"""What the benchmarks share: a process per measurement, the best of several runs, a table."""
+"""Shared by the benchmarks: measurements in separate processes, best times, Markdown tables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 
 
 def alone(function: Callable[..., Any], *arguments: Any, threads: int = 1) -> Any:
-    """function(*arguments) in a fresh process, so that nothing is warm and its memory is its own.
+    """function(*arguments) in a fresh process, with cold caches and separate memory.
 
     threads: of BLAS and of the kernel, which both follow OMP_NUM_THREADS.
     """
@@ -34,7 +34,7 @@ def _limited(threads: int, function: Callable[..., Any], arguments: tuple[Any, .
 
 
 def best_time(work: Callable[[], Any], seconds: float = 0.5, least: int = 3) -> float:
-    """The shortest of many runs, in [s]: what the machine does when nobody else uses it."""
+    """The shortest of many runs, in [s], which depends least on other load."""
     times: list[float] = []
     while len(times) < least or sum(times) < seconds:
         began = time.perf_counter()
@@ -44,9 +44,9 @@ def best_time(work: Callable[[], Any], seconds: float = 0.5, least: int = 3) -> 
 
 
 def peak_memory() -> float:
-    """The most memory that this process has held, in [MB].
+    """Peak memory of this process, in [MB].
 
-    From /proc, since the ru_maxrss of a child starts at what its parent held.
+    From /proc, since the ru_maxrss of a child starts at the peak of its parent.
     """
     status = Path("/proc/self/status").read_text()
     line = next(line for line in status.splitlines() if line.startswith("VmHWM"))
@@ -59,7 +59,7 @@ def exponent(sizes: Sequence[float], values: Sequence[float]) -> float:
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """A Markdown table on stdout; the first column is text, the others are numbers."""
+    """Print a Markdown table; the first column is text, the others are numbers."""
     print("| " + " | ".join(columns) + " |")
     print("|---|" + "---:|" * (len(columns) - 1))
     for row in rows:
@@ -68,12 +68,12 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 
 def print_machine(threads: int | None = None) -> None:
-    """One line on what the numbers above were measured with."""
+    """Print the line of `machine`."""
     print(f"{machine(threads)}\n")
 
 
 def machine(threads: int | None = None) -> str:
-    """That line: processor, threads, and the packages that count."""
+    """One line with the processor, threads and package versions."""
     processor = platform.processor() or platform.machine()
     cpu = Path("/proc/cpuinfo")
     if cpu.exists():
@@ -81,5 +81,5 @@ def machine(threads: int | None = None) -> str:
         processor = names[0].split(":")[1].strip() if names else processor
     cores = len(os.sched_getaffinity(0))
     packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "pin", "casadi"))
-    said = "" if threads is None else f", {threads} thread{'s' if threads > 1 else ''}"
-    return f"*{processor}, {cores} cores{said}; Python {platform.python_version()}, {packages}.*"
+    used = "" if threads is None else f", {threads} thread{'s' if threads > 1 else ''}"
+    return f"*{processor}, {cores} cores{used}; Python {platform.python_version()}, {packages}.*"

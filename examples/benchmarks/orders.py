@@ -1,4 +1,4 @@
-"""Observed orders: how fast errors fall with the step, by least squares, on the two-link reach."""
+"""Observed orders: least-squares slopes of errors against the step, on the two-link reach."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GRIDS = {
     "galerkin-2": COMMON[:-1],
     "galerkin-3": (12, 16, 24, 32),
 }
-"""Numbers of intervals that divide the reference's, so that nodes meet, above round-off."""
+"""Numbers of intervals that divide the reference's, with errors above round-off."""
 BETWEEN = np.array([0.2, 0.37, 0.5, 0.71, 0.9])
 
 
@@ -47,7 +47,7 @@ def errors(solution: hovi.Solution, exact: hovi.Solution) -> dict[str, float]:
 
 
 def print_slopes(slopes: dict[str, dict[str, str]], keys: tuple[str, ...]) -> None:
-    """Observed orders of some of the quantities."""
+    """Print observed orders of some quantities."""
     rows = [
         [f"`{name}`", by_name(name).order, f"{sizes[0]} to {sizes[-1]}"]
         + [slopes[name][key] for key in keys]

@@ -1,7 +1,7 @@
 """hovi against CasADi and Ipopt: the same discrete problem, guess and thread, in one run.
 
 Compiling and building are not counted. From the same guess different solvers may end in
-different minima, so their costs are printed; from hovi's motion Ipopt must stay where it is.
+different minima, so their costs are printed; started at hovi's motion, Ipopt must not move.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SCHEME, INTERVALS = "galerkin-2", 16
 
 
 def measure(scene: str) -> list[dict[str, object]]:
-    """hovi, then both peers: steps, seconds when warm, cost, seconds to build."""
+    """hovi, then both peers: steps, time of a warm solve, cost, setup time."""
     task = hovi.load_task(hovi.example(scene))
     began = time.perf_counter()
     grid = hovi.Grid.uniform(task.duration, INTERVALS, hovi.schemes.by_name(SCHEME))

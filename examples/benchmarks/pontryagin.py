@@ -1,6 +1,6 @@
 """Pontryagin's equations of least torque by SciPy's solve_bvp, with Pinocchio's RNEA and ABA.
 
-No discrete Lagrangian and no kernel of hovi has a part in it: an oracle for resolved motions.
+It uses neither hovi's discrete Lagrangians nor its kernel: an oracle for resolved motions.
 H = p.v + p~.a - 1/2 |tau|^2, with tau = M^-1 p~, a = ABA(q, v, tau), p' = dL/dq and
 p~' = dL/dv - p.
 """
@@ -14,20 +14,20 @@ from scipy.integrate import solve_bvp
 import hovi
 
 TOLERANCES = 1e-5, 1e-4, 1e-3
-MOST_NODES = 20_000
-SMALLEST = 1e-9
-"""Size below which a component is not scaled up."""
+MAX_NODES = 20_000
+MIN_SCALE = 1e-9
+"""Components smaller than this are not scaled."""
 
 
 def extremal_cost(trajectory: hovi.Trajectory) -> float | None:
-    """Least 1/2 integral |tau|^2 near a motion of a scene with gravity; None where SciPy fails."""
+    """Minimum of 1/2 integral |tau|^2 near a motion with gravity; None if SciPy fails."""
     scene = trajectory.scene
     assert scene is not None
     rates, n, T = _Rates(scene.model), scene.model.nv, trajectory.duration
     p, pt = np.moveaxis(trajectory.momenta, 1, 0)
     cost = trajectory.t[:, None]  # any increasing guess
     y = np.concatenate([trajectory.q, trajectory.v, p, pt, cost], axis=1).T
-    size = np.maximum(np.abs(y).max(axis=1, keepdims=True), SMALLEST)
+    size = np.maximum(np.abs(y).max(axis=1, keepdims=True), MIN_SCALE)
     ends = trajectory.q[[0, -1]] / size[:n, 0], trajectory.v[[0, -1]] / size[n : 2 * n, 0]
 
     def rhs(s: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -39,14 +39,14 @@ def extremal_cost(trajectory: hovi.Trajectory) -> float | None:
 
     for tolerance in TOLERANCES:
         s = trajectory.t / T
-        found = solve_bvp(rhs, boundary, s, y / size, tol=tolerance, max_nodes=MOST_NODES)
+        found = solve_bvp(rhs, boundary, s, y / size, tol=tolerance, max_nodes=MAX_NODES)
         if found.success:
             return float(found.y[-1, -1] * size[-1, 0])
     return None
 
 
 class _Rates:
-    """(q, v, p, p~)' and the density of the cost, (4 n + 1, M) for y of shape (4 n, M)."""
+    """(q, v, p, p~)' and the integrand of the cost, (4 n + 1, M) for y of shape (4 n, M)."""
 
     def __init__(self, model: pin.Model) -> None:
         self.model, self.data = model, model.createData()

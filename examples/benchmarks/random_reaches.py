@@ -1,9 +1,9 @@
 """Rest-to-rest reaches between random configurations, within every limit of the URDF.
 
-Twenty pairs are drawn evenly within the position limits of each robot, a turn at most, among those
-that the motors can hold with some torque to spare. The time is three times what the slowest joint
-needs at its velocity limit, one second at least. What does not end in a minimum directly goes on
-by continuation, and what does not end in one then is tried again from four guesses.
+Twenty pairs are drawn uniformly within the position limits of each robot, at most one turn, among
+those that can be held with less than the torque limits. The duration is three times that of the
+slowest joint at its velocity limit, at least one second. Where the direct solve finds no minimum,
+`plan` tries continuation; reaches that still fail are planned again from four guesses.
 
     python random_reaches.py [ROBOT ...]
 """
@@ -26,8 +26,8 @@ ROBOTS = {
 }
 PAIRS, SEED, STARTS = 20, 0, 4
 SCHEME, INTERVALS = "galerkin-2", 16
-HOLDING = 0.9
-"""Share of the torque limits that holding an end may take."""
+HOLDING_SHARE = 0.9
+"""Fraction of the torque limits allowed for holding start and goal."""
 TIME_LIMIT = 600.0  # [s], of one call of plan
 
 
@@ -40,7 +40,7 @@ def pairs(scene: hovi.Scene) -> list[tuple[np.ndarray, np.ndarray, float]]:
     random, found = np.random.default_rng(SEED), []
     while len(found) < PAIRS:
         q = random.uniform(lower, upper, (2, robot.nv))
-        held = np.abs(scene.inverse_dynamics(q, 0 * q, 0 * q)) <= HOLDING * robot.effort_limit
+        held = np.abs(scene.inverse_dynamics(q, 0 * q, 0 * q)) <= HOLDING_SHARE * robot.effort_limit
         if held.all():
             T = 3 * np.max(np.abs(q[1] - q[0]) / robot.velocity_limit)
             found.append((q[0], q[1], max(float(T), 1.0)))
@@ -48,17 +48,17 @@ def pairs(scene: hovi.Scene) -> list[tuple[np.ndarray, np.ndarray, float]]:
 
 
 def measure(name: str) -> list[dict[str, object]]:
-    """What every reach of a robot ends in, and again from more guesses where it fails."""
+    """The result of every reach of a robot, and from more guesses where it fails."""
     scene = hovi.Scene(hovi.load_robot(name, locked=ROBOTS[name]), [hovi.effects.Gravity()])
     rows: list[dict[str, object]] = []
     for number, (start, goal, duration) in enumerate(pairs(scene)):
         settings = {"scheme": SCHEME, "intervals": INTERVALS, "limits": "urdf"}
         settings |= {"processes": 1, "time_limit": TIME_LIMIT}
         first = hovi.plan(scene, start, goal, duration, **settings)
-        row = {"number": number, "solution": _said(first), "again": None}
+        row = {"number": number, "solution": _result(first), "again": None}
         if not first.success:
             more = hovi.plan(scene, start, goal, duration, starts=STARTS, **settings)
-            row["again"] = _said(more)
+            row["again"] = _result(more)
         rows.append(row)
         print(
             f"{name} {number}: {first.status} after {first.nit} steps", file=sys.stderr, flush=True
@@ -66,7 +66,7 @@ def measure(name: str) -> list[dict[str, object]]:
     return rows
 
 
-def _said(solution: hovi.Solution) -> dict[str, object]:
+def _result(solution: hovi.Solution) -> dict[str, object]:
     return {
         "success": solution.success,
         "status": str(solution.status),

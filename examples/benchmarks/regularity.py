@@ -1,4 +1,4 @@
-"""Which tables define a motion: the matrix W_d of every scheme, for L = 1/2 |a|^2 and h = 1."""
+"""Regularity of the schemes: the matrix W_d of every table, for L = 1/2 |a|^2 and h = 1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planning again in a loop: the UR5's goal moves, and the last motion is the guess."""
+"""Replanning in a loop: the goal moves, and the last motion is the guess."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LAPS = 40
 
 
 def solved(scene: str) -> tuple[hovi.Solution, Array]:
-    """The scene's own motion and its goal's configuration."""
+    """The motion of a scene and the configuration of its goal."""
     task = hovi.load_task(hovi.example(scene))
     grid = hovi.Grid.uniform(
         task.duration, task.options.intervals, hovi.schemes.by_name(task.options.scheme)
@@ -33,7 +33,7 @@ def measure(scene: str, move: float) -> list[float]:
     random = np.random.default_rng(0)
     goal, steps, times = home, [], []
     for _ in range(LAPS):
-        # a step of this length in a random direction, pulled back to where it began
+        # a step of this length in a random direction, biased towards the original goal
         direction = random.standard_normal(len(home)) + 2 * (home - goal) / move
         goal = goal + move * direction / np.linalg.norm(direction)
         began = time.perf_counter()
@@ -46,7 +46,7 @@ def measure(scene: str, move: float) -> list[float]:
 
 
 def measure_joints(scene: str, move: float) -> list[list[float]]:
-    """Joint, steps and how far the motion goes [rad], for each joint forwards and backwards."""
+    """Joint, steps and change of the motion in [rad], for each joint forwards and backwards."""
     solution, home = solved(scene)
     rows = []
     for joint in range(len(home)):

@@ -1,8 +1,8 @@
-"""Where the time of a call goes, by hovi's own functions, without slowing them down.
+"""A sampling profiler of hovi's own functions.
 
-A timer interrupts the work every millisecond, and the innermost frame that belongs to hovi is
-charged with it, so that NumPy, LAPACK and the kernel count for the function that called them.
-Python hears of an interrupt when such a call returns: it is then charged with all that were due.
+A timer interrupts the program every millisecond and charges the innermost frame that belongs to
+hovi, so that NumPy, LAPACK and the kernel count for the function that called them. Python handles
+an interrupt when such a call returns; the call is then charged with all missed periods.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ PARTS = {
     "factorisation": ("optimize/banded_model", "optimize/merge_tree"),
 }
 """Modules of each part; the rest is Python."""
-ASSEMBLING = {"assemble", "scatter", "gather"}
-"""Functions of the factorising modules that only move numbers."""
+ASSEMBLY_FUNCTIONS = {"assemble", "scatter", "gather"}
+"""Functions of the factorisation modules that only copy numbers."""
 
 
 def shares(work: Callable[[], Any], seconds: float = 2.0) -> dict[str, float]:
-    """Share of each part in the time of many runs of `work`: they sum to 1."""
+    """Fraction of each part in the time of many runs of `work`; they sum to 1."""
     charged: Counter[str] = Counter()
-    began, heard = time.perf_counter(), 0
+    began, handled = time.perf_counter(), 0
 
     def tick(number: int, frame: FrameType | None) -> None:
-        nonlocal heard
+        nonlocal handled
         due = int((time.perf_counter() - began) / PERIOD)
-        charged[_part(frame)] += due - heard
-        heard = due
+        charged[_part(frame)] += due - handled
+        handled = due
 
     before = signal.signal(signal.SIGALRM, tick)
     signal.setitimer(signal.ITIMER_REAL, PERIOD, PERIOD)
@@ -64,6 +64,6 @@ def _part(frame: FrameType | None) -> str:
     if frame is None:
         return "Python"
     module = frame.f_code.co_filename.removeprefix(f"{PACKAGE}/").removesuffix(".py")
-    if frame.f_code.co_name in ASSEMBLING:
+    if frame.f_code.co_name in ASSEMBLY_FUNCTIONS:
         return "assembly"
     return next((part for part, names in PARTS.items() if module.startswith(names)), "Python")

@@ -1,4 +1,4 @@
-"""Where the time goes on the scenes of models/: set-up, and each part of a Newton step."""
+"""Time of set-up and of each part of a Newton step, on the scenes of models/."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SCENES = (
 
 
 def measure(scene: str) -> dict[str, float]:
-    """The scene's own grid, solved from the cubic guess, the first time and when warm."""
+    """Times of the first and of a warm solve on the scene's own grid, from the cubic guess."""
     began = time.perf_counter()
     task = hovi.load_task(hovi.example(scene))
     read = time.perf_counter()

@@ -1,4 +1,4 @@
-"""The picture of the replay page in the README: a Panda's motion in a headless Chromium."""
+"""The screenshot of the replay page in the README: a Panda's motion in a headless Chromium."""
 
 from __future__ import annotations
 

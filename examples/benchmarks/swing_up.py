@@ -1,4 +1,4 @@
-"""The paper's motions: solved as their scenes say, checked, and drawn for the README."""
+"""The motions of the paper: solved as in their scenes, checked, and plotted for the README."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Array = npt.NDArray[np.float64]
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 EXACT = ("galerkin-4", 400)
-"""Where a minimum is converged to round-off."""
+"""Scheme and intervals on which a minimum is converged to round-off."""
 BETWEEN = np.array([0.2, 0.37, 0.5, 0.71, 0.9])
 
 
 def solve(name: str, scheme: str = "", intervals: int = 0) -> tuple[hovi.Solution, float]:
-    """The scene's own solution, or with another scheme and grid; and the seconds it took."""
+    """The solution of a scene, optionally with another scheme and grid, and its time in [s]."""
     task = hovi.load_task(hovi.example(name))
     began = time.perf_counter()
     solution = hovi.plan_task(
@@ -36,7 +36,7 @@ def solve(name: str, scheme: str = "", intervals: int = 0) -> tuple[hovi.Solutio
 
 
 def on_grid(motion: hovi.Solution, scheme: str, intervals: int) -> hovi.Solution:
-    """The minimum that a motion approximates, on another grid."""
+    """The minimum approximated by a motion, on another grid."""
     scene, t = motion.trajectory.scene, motion.trajectory
     ends = hovi.State(t.q[0], t.v[0]), hovi.State(t.q[-1], t.v[-1])
     grid = hovi.Grid.uniform(t.duration, intervals, by_name(scheme))
@@ -47,7 +47,7 @@ def on_grid(motion: hovi.Solution, scheme: str, intervals: int) -> hovi.Solution
 
 
 def errors(motion: hovi.Solution, exact: hovi.Solution) -> list[float]:
-    """Cost (relative), q and v at the nodes, then q, v and tau at five places of each interval."""
+    """Errors of the cost (relative), of q and v at the nodes, of q, v and tau between them."""
     mine, true = motion.trajectory, exact.trajectory
     at_nodes = true.sample(mine.t)
     t = (mine.t[:-1, None] + mine.grid.steps[:, None] * BETWEEN).ravel()
@@ -67,9 +67,9 @@ def effort(trajectory: hovi.Trajectory) -> float:
 
 
 def replay_error(trajectory: hovi.Trajectory) -> float:
-    """How far from its next node the arm is when SciPy drives it from each node with tau(t).
+    """Largest deviation at the next node after integration by SciPy under tau(t), in [rad].
 
-    The motion is unstable, so the integration starts again at every node. In [rad].
+    The integration restarts at every node, since the motion is unstable.
     """
     model = trajectory.scene.model
     data, n = model.createData(), model.nv
@@ -88,7 +88,7 @@ def replay_error(trajectory: hovi.Trajectory) -> float:
 
 
 def draw(swing_up: hovi.Trajectory, resolved: hovi.Trajectory, elbow: hovi.Trajectory) -> None:
-    """The paper's two figures, the torque, and the elbow's angles within their range."""
+    """Plot the paper's two figures, the torque, and the elbow's angle within its range."""
     IMAGES.mkdir(exist_ok=True)
     plot_angles(swing_up, IMAGES / "swing_up_angles.png")
     plot_swept_surface(swing_up, IMAGES / "swing_up_surface.png", window=(3.0, 6.0))
@@ -100,7 +100,7 @@ def draw(swing_up: hovi.Trajectory, resolved: hovi.Trajectory, elbow: hovi.Traje
 
 
 def print_solutions(runs: dict[str, tuple[hovi.Solution, float]]) -> None:
-    """What was found."""
+    """Print the solutions."""
     columns = ["motion", "scheme", "intervals", "cost", "n_neg", "minima found", "steps", "seconds"]
     rows = []
     for name, (solution, seconds) in runs.items():
@@ -113,7 +113,7 @@ def print_solutions(runs: dict[str, tuple[hovi.Solution, float]]) -> None:
 
 
 def print_accuracy(solutions: list[hovi.Solution]) -> None:
-    """Against the same minimum, resolved; one column per solution."""
+    """Print errors against the resolved minimum; one column per solution."""
     found = []
     for solution in solutions:
         motion = solution.trajectory

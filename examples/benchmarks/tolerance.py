@@ -1,10 +1,10 @@
-"""Plans to a tolerance: estimated and true errors, and what the choice costs.
+"""Plans to a tolerance: estimated and true errors, and computing time.
 
-The true error is the distance from a solution with half the steps and six inner modes more; that
-one's cost is held against SciPy's solve_bvp on Pontryagin's equations. The cheapest fixed run is
-the quickest of Galerkin schemes with 0 to 8 inner modes on 4 to 64 intervals, from the same guess,
-of those that end in the same minimum within the tolerance; no error is estimated for them. It and
-the choice are then timed in turn, in CPU time of one thread, and the best of each counts.
+The true error is the distance from a solution with half the steps and six more inner modes, whose
+cost is compared with SciPy's solve_bvp on Pontryagin's equations. The cheapest fixed run is the
+fastest Galerkin scheme with 0 to 8 inner modes on 4 to 64 intervals, from the same guess, that ends
+in the same minimum within the tolerance, without an error estimate. This run and the plan to the
+tolerance are timed in turns, in CPU time of one thread; the best time of each counts.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ SCENES = ("two_link_reach", "ur5_reach", "panda_reach", "z1", "chain of 4")
 TOLERANCES = [10.0**-k for k in range(2, 10)]
 DEGREES, INTERVALS = (0, 1, 2, 3, 4, 6, 8), (4, 6, 8, 12, 16, 24, 32, 64)
 REPEATS = 7
-SAME = 0.05
-"""Relative difference in cost from the resolved motion beyond which a run is of another minimum
-or of none."""
+MAX_COST_DIFFERENCE = 0.05
+"""Relative difference of the cost from the reference beyond which a run found another minimum, or
+none."""
 
 
 def task(name: str) -> tuple[hovi.Scene, hovi.State, hovi.State, float]:
@@ -49,13 +49,13 @@ def task(name: str) -> tuple[hovi.Scene, hovi.State, hovi.State, float]:
 
 
 def measure(name: str) -> tuple[list[list[str]], str]:
-    """Rows of the table, and what SciPy says of the reference."""
+    """Rows of the table, and the comparison of the reference with SciPy."""
     scene, start, goal, duration = task(name)
 
     def plan(**options: object) -> hovi.Solution:
         return hovi.plan(scene, start, goal, duration, limits="none", **options)
 
-    plan(tolerance=1e-6)  # what is imported and cached here is not timed below
+    plan(tolerance=1e-6)  # warm up imports and caches
     fixed = [_Fixed.of(plan, r, N) for r in DEGREES for N in INTERVALS]
     rows = []
     for tolerance in TOLERANCES:
@@ -81,15 +81,15 @@ def measure(name: str) -> tuple[list[list[str]], str]:
             ]
         )
     exact = extremal_cost(reference.trajectory)
-    said = "SciPy found no solution"
+    text = "SciPy found no solution"
     if exact is not None:
-        said = f"{abs(exact / reference.cost - 1):.0e}"
-    return rows, said
+        text = f"{abs(exact / reference.cost - 1):.0e}"
+    return rows, text
 
 
 @dataclass(frozen=True)
 class _Fixed:
-    """A run on a grid that was given."""
+    """A run on a fixed grid."""
 
     r: int
     N: int
@@ -98,7 +98,7 @@ class _Fixed:
 
     @classmethod
     def of(cls, plan: Callable[..., hovi.Solution], r: int, N: int) -> _Fixed:
-        """The better of two runs; no cost where it ends in no minimum."""
+        """The faster of two runs; infinite cost if it ends in no minimum."""
         times = []
         for _ in range(2):
             began = time.process_time()
@@ -107,13 +107,13 @@ class _Fixed:
         return cls(r, N, min(times), solution.cost if solution.success else np.inf)
 
     def error(self, cost: float) -> float:
-        """Relative; infinite where the run ended in another minimum."""
+        """Relative error of the cost; infinite if the run ended in another minimum."""
         error = abs(self.cost / cost - 1)
-        return error if error < SAME else np.inf
+        return error if error < MAX_COST_DIFFERENCE else np.inf
 
 
 def _times(plan: Callable[..., hovi.Solution], tolerance: float, best: _Fixed | None) -> list[str]:
-    """Times of the choice and of the cheapest fixed run, run in turn, and their ratio."""
+    """Times of the plan to the tolerance and of the cheapest fixed run, and their ratio."""
     chosen, fixed = [], []
     for _ in range(REPEATS):
         began = time.process_time()
@@ -143,9 +143,9 @@ def main() -> None:
     columns += ["tip [mm]", "CPU [ms]", "fixed [ms]", "which", "ratio"]
     rows, oracle = [], []
     for name in SCENES:
-        more, said = alone(measure, name)
+        more, text = alone(measure, name)
         rows += more
-        oracle.append(f"{name}: {said}")
+        oracle.append(f"{name}: {text}")
     print_table(columns, rows)
     ratios = [float(row[-1]) for row in rows if row[-1] != "-"]
     print(

@@ -1,9 +1,9 @@
-"""hovi's discrete problem as a nonlinear program for Ipopt, as an expert would write it.
+"""hovi's discrete problem as an efficient nonlinear program for Ipopt.
 
 The accelerations at the quadrature points are the controls; q and v there follow from them by the
-scheme's own table; two linear equations per joint tie an interval to the next node; RNEA stands
-in the cost. The exact Hessian is generated and interpreted by CasADi, expanded to scalars, or put
-together from a point kernel that gcc has compiled.
+scheme's own table; two linear defects per joint connect an interval to the next node; the cost
+contains RNEA. The exact Hessian is generated and interpreted by CasADi, expanded to scalars, or
+assembled from a point kernel compiled by gcc.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ COMPILE = ("gcc", "-O2", "-march=native", "-shared", "-fPIC")
 class Transcription:
     """A problem on a uniform grid over w = (q_0, v_0, a_01 .. a_0Q, q_1, v_1, ...).
 
-    points: (3 n P, W), q, v and a of every quadrature point. ties: (2 n N, W), zero on a motion.
-    weights: what L counts at each point, shape (P,).
+    points: (3 n P, W), q, v and a of every quadrature point. defects: (2 n N, W), zero on a motion.
+    weights: quadrature weight of each point, shape (P,).
     """
 
     def __init__(self, problem: hovi.TrajectoryProblem) -> None:
@@ -53,15 +53,15 @@ class Transcription:
         point[:, :, 1] = h * scheme.table[:, :, 0]
         point[:, :, 2:-2] = scheme.table[:, :, 1:] @ free
         point /= h ** np.arange(3.0)[:, None]
-        tie = np.zeros((2, Q + 4))
-        tie[:, 2:-2] = free[:2]
-        tie[0, [0, 1, -2]] = 1.0, h, -1.0  # Z0 = q1 - q0 - h v0
-        tie[1, [1, -1]] = h, -h  # Z1 = h v1 - h v0
+        defect = np.zeros((2, Q + 4))
+        defect[:, 2:-2] = free[:2]
+        defect[0, [0, 1, -2]] = 1.0, h, -1.0  # Z0 = q1 - q0 - h v0
+        defect[1, [1, -1]] = h, -h  # Z1 = h v1 - h v0
         self.weights = np.tile(h * scheme.weights, N)
-        self.points = self._placed(point.reshape(3 * Q, -1), N)
-        self.ties = self._placed(tie, N)
+        self.points = self._along_motion(point.reshape(3 * Q, -1), N)
+        self.defects = self._along_motion(defect, N)
 
-    def _placed(self, rows: Array, intervals: int) -> ca.DM:
+    def _along_motion(self, rows: Array, intervals: int) -> ca.DM:
         """The rows of one interval, repeated along the motion and for every joint."""
         width = intervals * self.stride + 2
         blocks = [
@@ -80,7 +80,7 @@ class Transcription:
         return ca.DM(pattern, matrix.data)
 
     def arguments(self, guess: object) -> dict[str, object]:
-        """Start and bounds for the solver: both ends are held, all else is free."""
+        """Initial guess and bounds for the solver: both end states are fixed, all else is free."""
         path, grid = guess_path(self.problem, guess), self.problem.grid
         w = np.zeros((grid.intervals * self.stride + 2, self.n))
         w[0 :: self.stride], w[1 :: self.stride] = path.q, path.v
@@ -96,7 +96,7 @@ class Transcription:
         """Ipopt with all derivatives generated and interpreted by CasADi."""
         w, p = self._variables()
         L = self._point_functions()[0]
-        nlp = {"x": w, "f": self._cost(L, p), "g": ca.mtimes(self.ties, w)}
+        nlp = {"x": w, "f": self._cost(L, p), "g": ca.mtimes(self.defects, w)}
         return ca.nlpsol("S", "ipopt", nlp, {"print_time": 0, "expand": True, "ipopt": IPOPT})
 
     def compiled(self, folder: Path) -> ca.Function:
@@ -110,7 +110,7 @@ class Transcription:
         subprocess.check_call([*COMPILE, "-o", library, str(folder / "kernels.c"), "-lm"])
         L, gradient, hessian = (ca.external(kernel.name(), library) for kernel in kernels)
         w, p = self._variables()
-        g = ca.mtimes(self.ties, w)
+        g = ca.mtimes(self.defects, w)
         options = {"print_time": 0, "ipopt": IPOPT, "no_nlp_grad": True}
         options |= self._derivatives(w, p, g, gradient, hessian)
         return ca.nlpsol("S", "ipopt", {"x": w, "f": self._cost(L, p), "g": g}, options)
@@ -139,7 +139,7 @@ class Transcription:
     def _derivatives(
         self, w: ca.MX, p: ca.MX, g: ca.MX, gradient: ca.Function, hessian: ca.Function
     ) -> dict[str, ca.Function]:
-        """The functions that nlpsol would otherwise generate."""
+        """The derivative functions that nlpsol would otherwise generate."""
         P, m = len(self.weights), 3 * self.n
         W = ca.DM(self.weights)
         nothing, lf, lg = ca.MX.sym("par", 0, 1), ca.MX.sym("lf"), ca.MX.sym("lg", g.shape[0])
@@ -154,7 +154,7 @@ class Transcription:
         weighted = hessian.map(P)(p) * ca.repmat(ca.DM(np.repeat(self.weights, m)).T, m, 1)
         H = ca.mtimes(ca.mtimes(self.points.T, ca.MX(blocks, lf * ca.vec(weighted))), self.points)
         fgrad = [ca.dot(value.T, W), slope]
-        jacobian = [g, ca.MX(self.ties)]
+        jacobian = [g, ca.MX(self.defects)]
         return {
             "grad_f": ca.Function("nlp_grad_f", [w, nothing], fgrad, ["x", "p"], ["f", "grad:f:x"]),
             "jac_g": ca.Function("nlp_jac_g", [w, nothing], jacobian, ["x", "p"], ["g", "jac:g:x"]),

@@ -1,8 +1,8 @@
-"""Swing-ups with a passive joint: hovi's orders, and the same motions by collocation with Ipopt.
+"""Swing-ups with a passive joint: orders of hovi, and the same problems solved by Ipopt.
 
-The peer is given the same discrete problem, which is collocation at the Gauss points: the
-accelerations there are its controls, RNEA's passive row is an equality at every point, and the
-exact Hessian is CasADi's, expanded to scalars. Both start from the cubic guess.
+Ipopt solves the same discrete problem, which is collocation at the Gauss points: accelerations are
+controls, the passive row of RNEA is an equality at every point, and the exact Hessian is CasADi's,
+expanded to scalars. Both start from the cubic guess.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def problem_on(scene: str, intervals: int, modes: int) -> hovi.TrajectoryProblem
 
 
 def collocation(problem: hovi.TrajectoryProblem) -> ca.Function:
-    """Ipopt on the same discrete problem."""
+    """An Ipopt solver for the same discrete problem."""
     it = Transcription(problem)
     n, passive = it.n, [int(i) for i in problem.passive]
     active = [i for i in range(n) if i not in passive]
@@ -41,13 +41,13 @@ def collocation(problem: hovi.TrajectoryProblem) -> ca.Function:
     p = ca.reshape(ca.mtimes(it.points, w), 3 * n, P)
     tau = rnea.map(P)(*ca.vertsplit(p, n))  # (n, P)
     cost = ca.dot(ca.sum1(tau[active, :] ** 2).T, ca.DM(it.weights)) / 2
-    g = ca.vertcat(ca.mtimes(it.ties, w), ca.vec(tau[passive, :]))
+    g = ca.vertcat(ca.mtimes(it.defects, w), ca.vec(tau[passive, :]))
     options = {"print_time": 0, "expand": True, "ipopt": IPOPT | {"jac_c_constant": "no"}}
     return ca.nlpsol("S", "ipopt", {"x": w, "f": cost, "g": g}, options)
 
 
 def compare(scene: str) -> list[list[object]]:
-    """One row for hovi and one for the peer."""
+    """One row for hovi and one for Ipopt."""
     problem = problem_on(scene, INTERVALS, MODES)
     ours = hovi.solve(problem)
     residuals = ActionObjective(problem).residuals(ours.trajectory.path)

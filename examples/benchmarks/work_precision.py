@@ -1,13 +1,13 @@
-"""What accuracy costs: hovi and the reference tools on the same scenes, in one run.
+"""Work-precision diagrams of hovi and the reference tools on the same scenes, in one run.
 
-Prints the table of time ratios and draws the diagrams of the docs. Crocoddyl and Drake live in
-environments of their own, whose Pythons are named by options or by HOVI_CROCODDYL_PYTHON and
+It prints the table of time ratios and plots the diagrams of the docs. Crocoddyl and Drake run in
+environments of their own, whose Pythons are given by options or by HOVI_CROCODDYL_PYTHON and
 HOVI_DRAKE_PYTHON:
 
     python -m venv crocoddyl && crocoddyl/bin/pip install crocoddyl==3.2.1 pin==4.0.0
     python -m venv drake && drake/bin/pip install drake
 
-(Crocoddyl 3.2.1 beside pin 4.1.0 loses gravity without a word; its worker checks for that.)
+(Crocoddyl 3.2.1 with pin 4.1.0 silently ignores gravity; its worker checks for that.)
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from hovi.accuracy.picture import plot_work_precision
 from hovi.accuracy.tables import as_json
 
 SCENES = ("two_link_reach", "ur5_reach", "panda_reach")
-SHARES = {"two_link_reach": 0.4}
+BUDGET_FACTORS = {"two_link_reach": 0.4}
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
 REPEATS = 4
-ENOUGH = Thresholds(cost=1e-11, joints=1e-6, tip=1e-5)
+SUFFICIENT_ERRORS = Thresholds(cost=1e-11, joints=1e-6, tip=1e-5)
 INTERPRETED = ("hermite-simpson", "lg-3", "lg-5", "lgr-5")
 INTRODUCTION = """\
 Every solve starts near the motion (nine tenths of it, one tenth of the cubic). *Warm* is the
@@ -43,7 +43,7 @@ cost stays below it on all finer grids too; - where none of its grids within the
 def measure(
     scene: str, budget: float, crocoddyl: str | None, drake: str | None, kernels: str | None
 ) -> Diagram:
-    """All methods on one scene; the picture goes to the docs."""
+    """The diagram of all methods on one scene; its figure is written to the docs."""
     folder = None if kernels is None else Path(kernels)
     peers = [*ipopt_peers(compiled=True, folder=folder)]
     peers += [*ipopt_peers(compiled=False, schemes=INTERPRETED)]
@@ -54,7 +54,12 @@ def measure(
         print(f"{scene} {100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)
 
     task = hovi.load_task(hovi.example(scene))
-    options = {"budget": budget, "clock": "processor", "repeats": REPEATS, "enough": ENOUGH}
+    options = {
+        "budget": budget,
+        "clock": "processor",
+        "repeats": REPEATS,
+        "enough": SUFFICIENT_ERRORS,
+    }
     diagram = work_precision(task, peers=peers, progress=progress, **options)
     plot_work_precision(diagram, IMAGES / f"work_precision_{scene}.png", fastest=True)
     return diagram
@@ -81,7 +86,7 @@ def milliseconds(seconds: float) -> str:
 
 
 def print_ours(diagram: Diagram) -> None:
-    """hovi's cheapest runs and what a tolerance chooses."""
+    """Print the fastest runs of hovi and the choices of `plan(tolerance=)`."""
     rows = []
     choices = {choice.tolerance: choice for choice in diagram.choices}
     runs = zip(cheapest(diagram, of_hovi, warm), cheapest(diagram, of_hovi, cold), strict=True)
@@ -102,7 +107,7 @@ def print_ours(diagram: Diagram) -> None:
 
 
 def ratios(diagram: Diagram, method: str) -> list[float | None]:
-    """Times of a method over hovi's, warm at each tolerance and then cold."""
+    """Times of a method relative to hovi's, warm at each tolerance and then cold."""
     found = []
     for time in (warm, cold):
         ours = cheapest(diagram, of_hovi, time)
@@ -113,7 +118,7 @@ def ratios(diagram: Diagram, method: str) -> list[float | None]:
 
 
 def print_ratios(diagram: Diagram) -> None:
-    """A row per method of a reference tool."""
+    """Print one row per method of a reference tool."""
     others = [m for m in diagram.methods if not of_hovi(diagram.of(m)[0])]
     table = {method: ratios(diagram, method) for method in others}
     columns = ["time / hovi's"]
@@ -124,8 +129,8 @@ def print_ratios(diagram: Diagram) -> None:
         for method, row in table.items()
     ]
     print_table(columns, rows)
-    for place, tolerance in enumerate(TOLERANCES):
-        known = [(row[place], method) for method, row in table.items() if row[place] is not None]
+    for column, tolerance in enumerate(TOLERANCES):
+        known = [(row[column], method) for method, row in table.items() if row[column] is not None]
         if known:
             ratio, method = min(known)
             print(f"- Closest at {tolerance:.0e}, warm: {method}, {ratio:.2g} times hovi's time.")
@@ -146,22 +151,22 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=400.0, help="seconds for each arm")
     parser.add_argument("--crocoddyl", default=os.environ.get("HOVI_CROCODDYL_PYTHON"))
     parser.add_argument("--drake", default=os.environ.get("HOVI_DRAKE_PYTHON"))
-    parser.add_argument("--kernels", default=os.environ.get("HOVI_KERNELS"), help="kept here")
+    parser.add_argument("--kernels", default=os.environ.get("HOVI_KERNELS"), help="cache folder")
     parser.add_argument("--out", help="folder for all runs as JSON")
     parser.add_argument("scenes", nargs="*", default=SCENES)
-    asked = parser.parse_args()
+    given = parser.parse_args()
     print(f"{INTRODUCTION}\n")
-    for scene in asked.scenes:
-        budget = asked.budget * SHARES.get(scene, 1.0)
-        diagram = alone(measure, scene, budget, asked.crocoddyl, asked.drake, asked.kernels)
+    for scene in given.scenes:
+        budget = given.budget * BUDGET_FACTORS.get(scene, 1.0)
+        diagram = alone(measure, scene, budget, given.crocoddyl, given.drake, given.kernels)
         resolved = diagram.resolved
         print(
             f"**{scene}**: against {resolved.scheme} on {resolved.intervals} intervals, known to "
             f"{resolved.uncertainty.cost:.0e}; {len(diagram.runs)} runs in {diagram.seconds:.0f} "
             "s.\n"
         )
-        if asked.out:
-            (Path(asked.out) / f"{scene}.json").write_text(as_json(diagram))
+        if given.out:
+            (Path(given.out) / f"{scene}.json").write_text(as_json(diagram))
         print_ours(diagram)
         print_ratios(diagram)
         for note in diagram.notes:

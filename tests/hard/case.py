@@ -1,7 +1,7 @@
-"""A hard case: what breaks a literal implementation, what hovi does on it, and the bar.
+"""Hard cases: a claim, a requirement, and the results of a literal implementation and of hovi.
 
-Each family of cases is a file of this folder that holds a tuple CASES; a test runs every one of
-them, and so can a script that prints a table.
+Each family of cases is a file of this folder with a tuple CASES. A test runs them all;
+examples/benchmarks/hard_cases.py prints them as a table.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import pytest
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case.
+    """The result of a case.
 
     shown: the result in a few words or digits, for the table.
-    passed: whether it is within the bar.
+    passed: whether it meets the requirement.
     """
 
     shown: str
@@ -29,12 +29,12 @@ class Outcome:
 class Case:
     """One hard case.
 
-    number: in the list of hard cases: "8", or "26a" where a number has several parts.
-    claim: what holds, as a sentence without a full stop; the test's name.
-    naive: measures what a literal implementation does, and says it in a few words.
-    run: what hovi does.
-    bar: what is asked for, in words: "at most 1e-12", "refused by name".
-    known_failure: why the bar is not met; "" where it is.
+    number: "8", or "26a" where a number has several parts.
+    claim: a sentence without a full stop; the test's name.
+    naive: runs a literal implementation; returns its result in a few words.
+    run: runs hovi.
+    requirement: in words, such as "at most 1e-12".
+    known_failure: why the requirement is not met; "" if it is.
     long: whether it takes minutes.
     """
 
@@ -42,18 +42,18 @@ class Case:
     claim: str
     naive: Callable[[], str]
     run: Callable[[], Outcome]
-    bar: str
+    requirement: str
     known_failure: str = ""
     long: bool = False
 
 
-def at_most(value: float, bar: float) -> Outcome:
-    """The outcome of a number that has to be at most `bar` (and not NaN)."""
-    return Outcome(f"{value:.2g}", value <= bar)
+def at_most(value: float, requirement: float) -> Outcome:
+    """The outcome of a number that must be at most `requirement`, and not NaN."""
+    return Outcome(f"{value:.2g}", value <= requirement)
 
 
 def parameters(cases: Iterable[Case]) -> list[Any]:
-    """The cases for `pytest.mark.parametrize`, each by its number and claim."""
+    """The cases for `pytest.mark.parametrize`, with number and claim as ids."""
     return [
         pytest.param(case, id=f"{case.number}: {case.claim}", marks=_marks(case)) for case in cases
     ]

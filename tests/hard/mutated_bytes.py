@@ -1,4 +1,4 @@
-"""Changes to a text that know nothing of what it means."""
+"""Random changes of bytes, independent of the file format."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from random import Random
 
 
 def mutated_bytes(content: bytes, random: Random, tokens: Sequence[bytes]) -> bytes:
-    """One to four changes: bits flipped, parts cut, doubled or moved, tokens put in.
+    """Apply one to four changes: flip bits, cut, truncate or duplicate parts, insert tokens.
 
-    tokens: what is worth putting in.
+    tokens: byte strings to insert.
     """
     changed = bytearray(content)
     for _ in range(random.randint(1, 4)):
@@ -24,8 +24,8 @@ def _flip(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
 
 
 def _cut(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
-    begin, end = _part(data, random)
-    del data[begin:end]
+    start, end = _part(data, random)
+    del data[start:end]
 
 
 def _truncate(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
@@ -33,24 +33,24 @@ def _truncate(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
 
 
 def _double(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
-    begin, end = _part(data, random)
-    place = random.randint(0, len(data))
-    data[place:place] = data[begin:end]
+    start, end = _part(data, random)
+    position = random.randint(0, len(data))
+    data[position:position] = data[start:end]
 
 
 def _insert(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
-    place = random.randint(0, len(data))
-    data[place:place] = random.choice(tokens)
+    position = random.randint(0, len(data))
+    data[position:position] = random.choice(tokens)
 
 
 def _overwrite(data: bytearray, random: Random, tokens: Sequence[bytes]) -> None:
-    begin, end = _part(data, random)
-    data[begin:end] = random.choice(tokens)
+    start, end = _part(data, random)
+    data[start:end] = random.choice(tokens)
 
 
 def _part(data: bytearray, random: Random) -> tuple[int, int]:
-    begin = random.randint(0, len(data))
-    return begin, min(len(data), begin + random.choice((1, 4, 20, 200)))
+    start = random.randint(0, len(data))
+    return start, min(len(data), start + random.choice((1, 4, 20, 200)))
 
 
 _CHANGES: tuple[Callable[[bytearray, Random, Sequence[bytes]], None], ...] = (

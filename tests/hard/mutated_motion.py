@@ -1,7 +1,7 @@
-"""Strange trajectory files, and what must hold for those that load.
+"""Mutated trajectory files, and the properties of those that load.
 
-A motion that loads must be sampled to finite numbers, move from node to node as it says, and come
-back the same when it is saved and loaded again.
+A motion that loads must have finite samples, be continuous at its nodes, and be unchanged by saving
+and loading it again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.robot.bundled_models import example
 
 TOKENS = (b"PK\x03\x04", b"PK\x01\x02", b"PK\x05\x06", b"\x93NUMPY", b"\0" * 8, b"\xff" * 8, b"nan")
-STRANGE_VALUES: tuple[Any, ...] = (
+UNUSUAL_VALUES: tuple[Any, ...] = (
     *(
         None,
         True,
@@ -56,13 +56,13 @@ STRANGE_VALUES: tuple[Any, ...] = (
 )
 
 Entries = dict[str, bytes]
-"""What the members of the file hold: "header" is JSON, the others are npy arrays."""
+"""The members of the file: "header" is JSON, the others are npy arrays."""
 Change = Callable[[Entries, Random], None]
 
 
 @cache
 def original() -> bytes:
-    """A motion of the two-link arm, as it is saved."""
+    """The file of a motion of the two-link arm."""
     robot = hovi.load_robot(example("two_link.urdf"))
     scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
     solution = hovi.plan(scene, [0.0, 0.0], [0.3, 0.7], 1.0, intervals=4, processes=1)
@@ -73,7 +73,7 @@ def original() -> bytes:
 
 
 def mutate(random: Random) -> Mutant:
-    """A changed file: in its bytes, in its entries, or with something that must be refused."""
+    """A changed file: in its bytes, in its entries, or with an invalidating change."""
     kind = random.random()
     if kind < 0.4:
         return Mutant(mutated_bytes(original(), random, TOKENS))
@@ -84,20 +84,20 @@ def mutate(random: Random) -> Mutant:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(entries, random)
         return Mutant(_packed(entries, random))
-    poison = random.choice(_POISONS)
-    poison(entries, random)
-    return Mutant(_packed(entries, random), (poison.__doc__ or "").split("\n")[0])
+    change = random.choice(_INVALIDATING_CHANGES)
+    change(entries, random)
+    return Mutant(_packed(entries, random), (change.__doc__ or "").split("\n")[0])
 
 
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
-    """Load it as a user does, from a file in `folder`."""
+    """Load it from a file in `folder`."""
     path = folder / "motion.npz"
     path.write_bytes(mutant.content)
-    return judge(lambda: Trajectory.load(path), lambda m: objection(m, folder), mutant.poison)
+    return judge(lambda: Trajectory.load(path), lambda m: error_in(m, folder), mutant.reason)
 
 
-def objection(motion: Trajectory, folder: Path) -> str:
-    """What is wrong with a motion that was loaded; "" where nothing is."""
+def error_in(motion: Trajectory, folder: Path) -> str:
+    """The error in a loaded motion; "" if there is none."""
     sample = motion.sample(np.linspace(0.0, motion.duration, 7))
     if not all(np.isfinite(part).all() for part in sample):
         return "its samples are not finite"
@@ -105,10 +105,10 @@ def objection(motion: Trajectory, folder: Path) -> str:
     before = motion.sample_intervals(inner, np.ones(inner.size))
     if np.abs(before.q - motion.q[1:-1]).max(initial=0.0) > 1e-5 * (1 + np.abs(motion.q).max()):
         return "it jumps at a node"
-    again = folder / "again.npz"
-    motion.save(again)
+    copy = folder / "copy.npz"
+    motion.save(copy)
     for name in ("q", "v", "t"):
-        if not np.array_equal(getattr(Trajectory.load(again), name), getattr(motion, name)):
+        if not np.array_equal(getattr(Trajectory.load(copy), name), getattr(motion, name)):
             return f"it changes its {name} when it is saved"
     return ""
 
@@ -142,19 +142,19 @@ def _edit(entries: Entries, change: Callable[[dict[str, Any]], object]) -> None:
         header = json.loads(entries["header"])
         change(header)
     except (ValueError, AttributeError, LookupError, TypeError, RecursionError):
-        return  # an earlier change has left nothing to change
+        return  # an earlier change has removed it
     entries["header"] = json.dumps(header).encode()
 
 
-def _sealed(header: dict[str, Any]) -> None:
-    """The hashes that belong to what the header holds: a stranger can compute them too."""
+def _update_hashes(header: dict[str, Any]) -> None:
+    """Recompute the hashes of the header, as an attacker can."""
     robot = header["scene"]["robot"]
     robot["sha256"] = hashlib.sha256(robot["urdf"].encode()).hexdigest()
     text = json.dumps(header["scene"], sort_keys=True)
     header["scene_sha256"] = hashlib.sha256(text.encode()).hexdigest()
 
 
-# Changes that may or may not be allowed
+# Changes after which the file may or may not be valid
 
 
 def _header_value(entries: Entries, random: Random) -> None:
@@ -168,17 +168,17 @@ def _header_value(entries: Entries, random: Random) -> None:
         if random.random() < 0.2:
             del table[key]
         else:
-            table[key] = random.choice(STRANGE_VALUES)
+            table[key] = random.choice(UNUSUAL_VALUES)
 
     _edit(entries, change)
     if random.random() < 0.7:
-        _edit(entries, _sealed)
+        _edit(entries, _update_hashes)
 
 
 def _robot(entries: Entries, random: Random) -> None:
     urdf = mutated_urdf.mutate(random).content.decode(errors="replace")
     _edit(entries, lambda header: header["scene"]["robot"].update(urdf=urdf))
-    _edit(entries, _sealed)
+    _edit(entries, _update_hashes)
 
 
 def _header_bytes(entries: Entries, random: Random) -> None:
@@ -216,7 +216,7 @@ _CHANGES: tuple[Change, ...] = (
     ),
 )
 
-# Changes that must be refused; the docstring says why
+# Changes that make the file invalid; the docstring is the reason
 
 
 def _not_finite(entries: Entries, random: Random) -> None:
@@ -280,6 +280,6 @@ def _number(entries: Entries, random: Random) -> None:
     _edit(entries, lambda header: header["metadata"].update(cost=value))
 
 
-_POISONS: tuple[Change, ...] = (
+_INVALIDATING_CHANGES: tuple[Change, ...] = (
     *(_not_finite, _steps, _jump, _type, _pickle, _bomb, _scene, _number),
 )

@@ -1,7 +1,7 @@
-"""Strange scene files, and what must hold for those that load.
+"""Mutated scene files, and the properties of those that load.
 
-A scene that loads must be a task with finite numbers, and planning it for two steps must end in a
-solution or in a sentence.
+A scene that loads must be a task with finite numbers, and planning it for two iterations must end
+in a solution or an error message.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example, example_scenes
 
-MOST_INTERVALS = 64  # of a plan that is tried
+MAX_PLANNED_INTERVALS = 64  # larger scenes are loaded only
 TOKENS = (
     *(
         b"nan",
@@ -42,7 +42,7 @@ TOKENS = (
     *(b" " * 5000, b"1979-05-27T07:32:00Z", b"12:00", b'"\\u0000"', b'"\\ud800"', b"\n", b"]]"),
 )
 NOT_NUMBERS = (float("nan"), float("inf"), -float("inf"), "1", "", True, [], {})
-STRANGE_VALUES = (
+UNUSUAL_VALUES = (
     *(*NOT_NUMBERS, 0, -1, 1, 2, 3, 10**6, 10**9, 10**30, -0.0, 1e308, -1e308, 1e-308, 5e-324),
     *([0.0], [0.0, 0.0], [[0.0, 0.0]], [0.0, "x"], {"elbow": 1.0}, {"elbow": [0.0, 1.0]}, "none"),
     *(
@@ -59,7 +59,7 @@ STRANGE_VALUES = (
     *("galerkin-9", "galerkin-99999999", "mean-difference", "a" * 10_000, "a\nb", "\x9b", 0.3, 2.5),
 )
 
-Place = tuple[dict[str, Any] | list[Any], Any]
+Entry = tuple[dict[str, Any] | list[Any], Any]
 Change = Callable[[dict[str, Any], Random], None]
 
 
@@ -69,7 +69,7 @@ def _originals() -> tuple[str, ...]:
 
 
 def mutate(random: Random) -> Mutant:
-    """A changed scene: in its bytes, in its values, or with something that must be refused."""
+    """A changed scene: in its bytes, in its values, or with an invalidating change."""
     text = random.choice(_originals())
     kind = random.random()
     if kind < 0.35:
@@ -79,24 +79,24 @@ def mutate(random: Random) -> Mutant:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(scene, random)
         return Mutant(_written(scene))
-    poison = random.choice(_POISONS)
-    poison(scene, random)
-    return Mutant(_written(scene), (poison.__doc__ or "").split("\n")[0])
+    change = random.choice(_INVALIDATING_CHANGES)
+    change(scene, random)
+    return Mutant(_written(scene), (change.__doc__ or "").split("\n")[0])
 
 
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
-    """Load it as a user does, from a file in `folder`, and plan a little."""
+    """Load it from a file in `folder`, and plan for two iterations."""
     for urdf in example("two_link.urdf").parent.glob("*.urdf"):
         copy = folder / urdf.name
         if not copy.exists():
             copy.write_text(urdf.read_text())
     path = folder / "scene.toml"
     path.write_bytes(mutant.content)
-    return judge(lambda: load_task(path), objection, mutant.poison)
+    return judge(lambda: load_task(path), error_in, mutant.reason)
 
 
-def objection(task: Task) -> str:
-    """What is wrong with a task that was loaded; "" where nothing is."""
+def error_in(task: Task) -> str:
+    """The error in a loaded task; "" if there is none."""
     robot = task.scene.robot
     ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
     if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
@@ -105,7 +105,7 @@ def objection(task: Task) -> str:
     if not (np.min(task.duration) > 0 and 1 <= intervals <= 10**6 and starts >= 1):
         return "its duration, intervals or starts are not positive"
     task.scene.describe()
-    if intervals > MOST_INTERVALS:
+    if intervals > MAX_PLANNED_INTERVALS:
         return ""
     once = task.with_options(starts=1, tolerance=None)
     solution = plan_task(once, max_iterations=2, time_limit=2.0, processes=1)
@@ -117,46 +117,46 @@ def objection(task: Task) -> str:
 def _written(scene: dict[str, Any]) -> bytes:
     try:
         return tomlkit.dumps(scene).encode("utf-8", "surrogatepass")
-    except (ValueError, TypeError):  # what TOML cannot hold
+    except (ValueError, TypeError):  # not representable in TOML
         return repr(scene).encode("utf-8", "surrogatepass")
 
 
-def _places(table: dict[str, Any] | list[Any]) -> Iterator[Place]:
+def _entries(table: dict[str, Any] | list[Any]) -> Iterator[Entry]:
     """Every (container, key) below a table."""
     keys = list(table) if isinstance(table, dict) else range(len(table))
     for key in keys:
         yield table, key
         if isinstance(table[key], dict | list):  # type: ignore[index]
-            yield from _places(table[key])  # type: ignore[index]
+            yield from _entries(table[key])  # type: ignore[index]
 
 
-def _place(scene: dict[str, Any], random: Random) -> Place:
-    return random.choice([*_places(scene)] or [(scene, "robot")])
+def _random_entry(scene: dict[str, Any], random: Random) -> Entry:
+    return random.choice([*_entries(scene)] or [(scene, "robot")])
 
 
-# Changes that may or may not be allowed
+# Changes after which the file may or may not be valid
 
 
 def _value(scene: dict[str, Any], random: Random) -> None:
-    owner, key = _place(scene, random)
-    owner[key] = random.choice(STRANGE_VALUES)
+    owner, key = _random_entry(scene, random)
+    owner[key] = random.choice(UNUSUAL_VALUES)
 
 
 def _remove(scene: dict[str, Any], random: Random) -> None:
-    owner, key = _place(scene, random)
+    owner, key = _random_entry(scene, random)
     if len(owner) > 1 or owner is not scene:
         owner.pop(key) if isinstance(owner, list) else owner.pop(key, None)
 
 
 def _rename(scene: dict[str, Any], random: Random) -> None:
-    owner, key = _place(scene, random)
+    owner, key = _random_entry(scene, random)
     if isinstance(owner, dict):
         name = random.choice((f"{key}s", "", "q", "v", "elbow", "a" * 1_000, "gravity", "\n"))
         owner[name] = owner.pop(key, 0)
 
 
 def _swap(scene: dict[str, Any], random: Random) -> None:
-    (one, i), (other, j) = _place(scene, random), _place(scene, random)
+    (one, i), (other, j) = _random_entry(scene, random), _random_entry(scene, random)
     one[i] = other[j] if not isinstance(other[j], dict | list) else 1
 
 
@@ -183,7 +183,7 @@ def _passed(scene: dict[str, Any], random: Random) -> None:
 
 _CHANGES: tuple[Change, ...] = (_value, _value, _remove, _rename, _swap, _settings, _passed)
 
-# Changes that must be refused; the docstring says why
+# Changes that make the file invalid; the docstring is the reason
 
 
 def _duration(scene: dict[str, Any], random: Random) -> None:
@@ -231,4 +231,11 @@ def _lacking(scene: dict[str, Any], random: Random) -> None:
     scene.pop(random.choice(("robot", "duration", "start", "goal")))
 
 
-_POISONS: tuple[Change, ...] = (_duration, _intervals, _end, _unknown, _gravity, _lacking)
+_INVALIDATING_CHANGES: tuple[Change, ...] = (
+    _duration,
+    _intervals,
+    _end,
+    _unknown,
+    _gravity,
+    _lacking,
+)

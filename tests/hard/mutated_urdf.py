@@ -1,12 +1,13 @@
-"""Strange URDFs, and what must hold for those that load.
+"""Mutated URDFs, and the properties of those that load.
 
-A URDF that loads has to be the robot that its text describes, read here a second time with
-nothing but an XML parser and `float`; and if a motion can be planned on it, its mass matrix, from
-RNEA and not from the routine that the check uses, has to be positive definite.
+The loaded robot must agree with the text, which is read here independently by an XML parser and
+`float`. If a motion can be planned on it, its mass matrix, computed by RNEA rather than by the
+routine of the check, must be positive definite.
 """
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -26,7 +27,7 @@ from hovi.robot.example_robots import example_robot
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 
-STRANGE_NUMBERS = (
+UNUSUAL_NUMBERS = (
     *("NaN", "-nan", "inf", "-inf", "1,5", "1abc", "0x10", "1_0", "1e308", "-1e308", "1e999"),
     *("1e-320", "1e-400", "-1", "0", "-0", "", " ", " 2 ", "\t3", "1 2", "1e", "--1", "٣", "1."),
     *(".5", "+.5", "1e12", "1e13", "1E-9", "9" * 400, "0." + "0" * 400 + "1", "1e+1", "1d0"),
@@ -49,7 +50,7 @@ def _originals() -> tuple[str, ...]:
 
 
 def mutate(random: Random) -> Mutant:
-    """A changed URDF: in its bytes, in its tree, or with something that must be refused."""
+    """A changed URDF: in its bytes, in its tree, or with an invalidating change."""
     text = random.choice(_originals())
     kind = random.random()
     if kind < 0.3:
@@ -59,27 +60,27 @@ def mutate(random: Random) -> Mutant:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(robot, random)
         return Mutant(ElementTree.tostring(robot))
-    poison = random.choice(_POISONS)
-    poison(robot, random)
-    return Mutant(ElementTree.tostring(robot), (poison.__doc__ or "").split("\n")[0])
+    change = random.choice(_INVALIDATING_CHANGES)
+    change(robot, random)
+    return Mutant(ElementTree.tostring(robot), (change.__doc__ or "").split("\n")[0])
 
 
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
-    """Load it as a user does, from a file in `folder`."""
+    """Load it from a file in `folder`."""
     path = folder / "robot.urdf"
     path.write_bytes(mutant.content)
-    return judge(lambda: load_robot(path), objection, mutant.poison)
+    return judge(lambda: load_robot(path), error_in, mutant.reason)
 
 
-def objection(robot: Robot) -> str:
-    """What is wrong with a robot that was loaded; "" where nothing is."""
+def error_in(robot: Robot) -> str:
+    """The error in a loaded robot; "" if there is none."""
     assert robot.source.urdf is not None
     robot.describe()
     text = ElementTree.fromstring(robot.source.urdf)
-    return _numbers_objection(robot, text) or _mass_matrix_objection(robot)
+    return _number_error(robot, text) or _mass_matrix_error(robot)
 
 
-def _numbers_objection(robot: Robot, text: Element) -> str:
+def _number_error(robot: Robot, text: Element) -> str:
     model = robot.model
     masses = {
         link.get("name"): float(link.find("inertial/mass").get("value"))  # type: ignore[union-attr, arg-type]
@@ -104,12 +105,12 @@ def _numbers_objection(robot: Robot, text: Element) -> str:
     return "" if np.isfinite(numbers).all() else "it holds numbers that are not finite"
 
 
-def _mass_matrix_objection(robot: Robot) -> str:
-    """M from the columns of RNEA, at configurations that the check does not use."""
+def _mass_matrix_error(robot: Robot) -> str:
+    """Check M from columns of RNEA, at configurations that the library's check does not use."""
     try:
         robot.check_mass_matrix()
     except HoviError:
-        return ""  # nothing can be planned on it
+        return ""  # no motion can be planned on it
     model, data = robot.model, robot.model.createData()
     model = model.copy()
     model.gravity = pin.Motion.Zero()
@@ -125,20 +126,20 @@ def _mass_matrix_objection(robot: Robot) -> str:
     return ""
 
 
-# Changes that may or may not be allowed
+# Changes after which the file may or may not be valid
 
 
 def _number(robot: Element, random: Random) -> None:
     holders = [e for e in robot.iter() if e.attrib]
     element = random.choice(holders)
-    element.set(random.choice(list(element.attrib)), random.choice(STRANGE_NUMBERS))
+    element.set(random.choice(list(element.attrib)), random.choice(UNUSUAL_NUMBERS))
 
 
 def _component(robot: Element, random: Random) -> None:
     vectors = [(e, k) for e in robot.iter() for k in ("xyz", "rpy", "size") if e.get(k, "").split()]
     element, key = random.choice(vectors)
     words = element.get(key, "").split()
-    words[random.randrange(len(words))] = random.choice(STRANGE_NUMBERS)
+    words[random.randrange(len(words))] = random.choice(UNUSUAL_NUMBERS)
     element.set(key, random.choice((" ", "  ", "\t", "\n", ",")).join(words))
 
 
@@ -161,8 +162,8 @@ def _rename(robot: Element, random: Random) -> None:
     names = [e for e in robot.iter() if e.get("name") or e.get("link")]
     element, other = random.choices(names, k=2)
     key = "name" if element.get("name") else "link"
-    strange = ("", " ", "universe", "a" * 300, "\x85", "ä", "root_joint", "x\ny")
-    element.set(key, random.choice((other.get("name") or other.get("link") or "", *strange)))
+    unusual = ("", " ", "universe", "a" * 300, "\x85", "ä", "root_joint", "x\ny")
+    element.set(key, random.choice((other.get("name") or other.get("link") or "", *unusual)))
 
 
 def _retype(robot: Element, random: Random) -> None:
@@ -175,7 +176,8 @@ def _scale(robot: Element, random: Random) -> None:
     factor = 10.0 ** random.randint(-30, 14)
     for element in robot.iter():
         if element.get(key) and element.tag in ("mass", "inertia"):
-            element.set(key, repr(float(element.get(key, "0")) * factor))
+            with contextlib.suppress(ValueError):  # an earlier change has put in no number
+                element.set(key, repr(float(element.get(key, "0")) * factor))
 
 
 def _lengthen(robot: Element, random: Random) -> None:
@@ -194,7 +196,7 @@ _CHANGES: tuple[Change, ...] = (
     *(_number, _number, _component, _remove, _repeat, _move, _rename, _retype, _scale, _lengthen),
 )
 
-# Changes that must be refused; the docstring says why
+# Changes that make the file invalid; the docstring is the reason
 
 
 def _mass(robot: Element, random: Random) -> None:
@@ -256,6 +258,6 @@ def _many(robot: Element, random: Random) -> None:
         ElementTree.SubElement(robot, "link", name=f"more{i}")
 
 
-_POISONS: tuple[Change, ...] = (
+_INVALIDATING_CHANGES: tuple[Change, ...] = (
     *(_mass, _mass, _inertia, _axis, _limits, _mimic, _cycle, _twice, _mesh, _many),
 )

@@ -1,8 +1,8 @@
-"""The paper, word for word: its Taylor scheme on the two-link arm, full Newton, the cubic guess.
+"""A literal implementation of the paper: its Taylor scheme, full Newton steps, the cubic guess.
 
-What such an implementation does on the hard cases. Its Lagrangian comes from paper_arm.py, its
-derivatives from CasADi, its linear algebra from SciPy's sparse LU: no part of hovi is in it but in
-`full_newton`, which takes the same steps for any robot on hovi's equations.
+It shows what happens on the hard cases without hovi's methods. The Lagrangian comes from
+paper_arm.py, derivatives from CasADi, linear algebra from SciPy's sparse LU; only `full_newton`
+uses hovi's equations, to take the same steps for any robot.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ NODE = 4
 
 @dataclass(frozen=True)
 class Cost:
-    """What is minimised: 1/2 |u|^2 and what is added to it.
+    """The integrand 1/2 |u|^2 plus penalties.
 
-    gravity: whether there is any.
-    elbow: slope of a potential outside 0 to 170 degrees, piecewise linear as in the paper.
-    penalty: rho of rho/2 times the squared excess of |u| over `most`, in [N m].
+    gravity: whether to include gravity.
+    elbow: slope of the paper's piecewise linear potential outside 0 to 170 degrees.
+    penalty: rho of the penalty rho/2 times the squared excess of |u| over `max_torque`.
+    max_torque: in [N m].
     """
 
     gravity: bool = True
     elbow: float = 0.0
     penalty: float = 0.0
-    most: float = 2.0
+    max_torque: float = 2.0
 
     def of(self, q: ca.SX, u: ca.SX) -> ca.SX:
         """The integrand."""
         outside = ca.fmax(0, -q[1]) + ca.fmax(0, q[1] - np.radians(170))
-        excess = ca.fmax(0, ca.fabs(u) - self.most)
+        excess = ca.fmax(0, ca.fabs(u) - self.max_torque)
         return ca.sumsqr(u) / 2 + self.elbow * outside + self.penalty / 2 * ca.sumsqr(excess)
 
 
@@ -121,8 +122,8 @@ class Problem:
     def assembled(blocks: Array) -> sp.csc_matrix:
         """The Hessian of the action, over the inner nodes."""
         N = len(blocks)
-        place = NODE * np.arange(N)[:, None] + np.arange(2 * NODE)
-        rows, columns = np.broadcast_arrays(place[:, :, None], place[:, None, :])
+        index = NODE * np.arange(N)[:, None] + np.arange(2 * NODE)
+        rows, columns = np.broadcast_arrays(index[:, :, None], index[:, None, :])
         full = sp.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel()))).tocsc()
         return full[NODE:-NODE, NODE:-NODE]
 
@@ -148,7 +149,7 @@ class Problem:
 
 @dataclass
 class Run:
-    """What Newton's method came to."""
+    """The result of Newton's method."""
 
     problem: Problem
     steps: int
@@ -157,34 +158,34 @@ class Run:
     residual: float
 
     @property
-    def said(self) -> str:
-        """In a few words."""
+    def summary(self) -> str:
+        """The result in a few words."""
         if self.stopped == "not finite":
             return f"NaN after {self.steps} steps"
         return f"{self.stopped} after {self.steps} steps, J = {self.cost:.6g}"
 
 
-def solve(problem: Problem, tolerance: float = 1e-10, most: int = 50) -> Run:
+def solve(problem: Problem, tolerance: float = 1e-10, max_steps: int = 50) -> Run:
     """Newton steps until the largest residual is below an absolute tolerance."""
     with np.errstate(all="ignore"):
-        for steps in range(most + 1):
+        for steps in range(max_steps + 1):
             cost, residual, blocks = problem.expansion
             size = float(np.abs(residual).max(initial=0.0))
             if not np.isfinite(size):
                 return Run(problem, steps, "not finite", cost, size)
             if size <= tolerance:
                 return Run(problem, steps, "converged", cost, size)
-            if steps < most:
+            if steps < max_steps:
                 problem.newton(residual, blocks)
-    return Run(problem, most, "still running", cost, size)
+    return Run(problem, max_steps, "still running", cost, size)
 
 
-def full_newton(problem: TrajectoryProblem, most: int = 60) -> str:
+def full_newton(problem: TrajectoryProblem, max_steps: int = 60) -> str:
     """Undamped Newton steps from the cubic guess, until one changes q and v by less than 1e-9."""
     action = ActionObjective(problem, "tree")
     path = guess_path(problem, "cubic")
     with np.errstate(all="ignore"):
-        for steps in range(most):
+        for steps in range(max_steps):
             model = action.model_with(path, None, None)
             size = len(model.gradient)
             G = np.stack([model.gather(e) for e in np.eye(size)], axis=-1)  # (N, m, n, size)
@@ -199,4 +200,4 @@ def full_newton(problem: TrajectoryProblem, most: int = 60) -> str:
                 return f"converged after {steps} steps, J = {cost:.4g}, n_neg = {n_neg}"
             path = action.retract(path, step, model)
     largest = np.abs(path.q).max()
-    return f"still running after {most} steps, J = {cost:.2g}, |q| up to {largest:.2g}"
+    return f"still running after {max_steps} steps, J = {cost:.2g}, |q| up to {largest:.2g}"

@@ -1,4 +1,4 @@
-"""The scenes and problems that the hard cases share."""
+"""Scenes and problems shared by the hard cases."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def arm(gravity: bool = True) -> Scene:
 
 @cache
 def links(count: int) -> Scene:
-    """A uniform chain."""
+    """A chain of equal links."""
     with tempfile.TemporaryDirectory() as folder:
         robot = load_robot(write_chain(Path(folder) / "chain.urdf", count))
     return Scene(robot, [Gravity(9.8)])
@@ -48,14 +48,14 @@ def links(count: int) -> Scene:
 
 @cache
 def uneven(masses: tuple[float, ...]) -> Scene:
-    """Rods of one metre with given masses."""
+    """A chain of one-metre rods with given masses."""
     with tempfile.TemporaryDirectory() as folder:
         robot = uneven_chain(masses, Path(folder) / "chain.urdf")
     return Scene(robot, [Gravity(9.8)])
 
 
 def hanging(scene: Scene) -> Array:
-    """Straight down."""
+    """The configuration hanging straight down."""
     q = np.zeros(scene.robot.nv)
     q[0] = -np.pi / 2
     return q
@@ -74,7 +74,7 @@ def problem(
     return TrajectoryProblem(DiscreteLagrangian(scene.effort_lagrangian(), grid), start, goal)
 
 
-def said(solutions: Sequence[Solution]) -> str:
+def summary(solutions: Sequence[Solution]) -> str:
     """Costs, inertias and steps in a few words."""
     parts = [f"{s.status}, J = {s.cost:.6g}, n_neg = {s.n_neg}, {s.nit} steps" for s in solutions]
     return "; ".join(parts)

@@ -1,4 +1,4 @@
-"""What the cases of strange models and files are made of."""
+"""Helpers for the cases of invalid models and files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CHAIN_LINK = (
 
 
 def loaded(text: str) -> Robot:
-    """A robot from a file with that text, as a user loads it."""
+    """The robot loaded from a file with this text."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot.urdf"
         path.write_text(text)
@@ -36,13 +36,13 @@ def loaded(text: str) -> Robot:
 
 
 def long_chain(links: int) -> str:
-    """A URDF of that many links, one after the other."""
+    """The URDF of a serial chain."""
     parts = (CHAIN_LINK.format(i=i, p=f"l{i - 1}" if i else "base") for i in range(links))
     return '<robot name="chain"><link name="base"/>' + "".join(parts) + "</robot>"
 
 
 def by_pinocchio(text: str) -> str:
-    """What Pinocchio alone makes of a URDF: the mass of the first link, or its complaint."""
+    """The result of Pinocchio's own parser: the mass of the first link, or its error."""
     with _quiet():
         try:
             model = pin.buildModelFromXML(text)
@@ -52,24 +52,24 @@ def by_pinocchio(text: str) -> str:
     return f"loads, {model.nv} joints{arm}"
 
 
-def refusals(works: Mapping[str, tuple[Callable[[], object], str]]) -> Outcome:
-    """Whether each of them is refused by a sentence that holds its word."""
-    for name, (work, word) in works.items():
+def refusals(calls: Mapping[str, tuple[Callable[[], object], str]]) -> Outcome:
+    """Whether each call raises one sentence that contains its fragment."""
+    for name, (call, fragment) in calls.items():
         try:
-            work()
-        except HoviError as refused:
-            sentence = str(refused)
-            if word not in sentence or "\n" in sentence:
+            call()
+        except HoviError as error:
+            sentence = str(error)
+            if fragment not in sentence or "\n" in sentence:
                 return Outcome(f"{name}: {sentence}", False)
         else:
             return Outcome(f"{name}: accepted", False)
-    return Outcome(f"{len(works)} of {len(works)} refused, such as: {sentence[:110]}", True)
+    return Outcome(f"{len(calls)} of {len(calls)} refused, such as: {sentence[:110]}", True)
 
 
-def alone(code: str, text: str = "", memory: int | None = None) -> tuple[int, str]:
+def run_process(code: str, text: str = "", memory: int | None = None) -> tuple[int, str]:
     """Exit code and last word of a process that runs `code` with `text` on its input.
 
-    memory: what it may take, in bytes.
+    memory: limit in bytes.
     """
     if memory is not None:
         code = f"import resource; resource.setrlimit(resource.RLIMIT_AS, ({memory},) * 2)\n{code}"
@@ -82,7 +82,7 @@ def alone(code: str, text: str = "", memory: int | None = None) -> tuple[int, st
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Without what C++ prints on stderr."""
+    """Suppress what C++ prints on stderr."""
     kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)
     try:

@@ -1,4 +1,4 @@
-"""Hard case 25: the same input gives the same bytes, whatever computes beside it."""
+"""Hard case 25: the same input gives the same bytes for any number of threads and processes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Settings = tuple[str, int, int, Mapping[str, str]]
 
 
 def digest(settings: Settings) -> str:
-    """SHA-256 of the motion that a process of its own writes, in hexadecimal."""
+    """SHA-256 of the motion file written by a separate process, in hexadecimal."""
     robot, processes, starts, environment = settings
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "motion.npz"
@@ -67,16 +67,16 @@ def same(*settings: Settings) -> Callable[[], Outcome]:
 def naive_product() -> str:
     rng = np.random.default_rng(0)
     a, b = rng.normal(size=(2, 400_003))
-    sums = {float(np.sum([part @ other for part, other in halves(a, b, n)])) for n in (1, 2, 4)}
+    sums = {float(np.sum([part @ other for part, other in split(a, b, n)])) for n in (1, 2, 4)}
     return f"a scalar product shared by 1, 2 and 4 threads has {len(sums)} values"
 
 
-def halves(a: np.ndarray, b: np.ndarray, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
+def split(a: np.ndarray, b: np.ndarray, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
     return list(zip(np.array_split(a, count), np.array_split(b, count), strict=True))
 
 
 def naive_guesses() -> str:
-    """Guesses from one stream of random numbers per process."""
+    """Draw guesses from one random stream per process."""
     drawn = set()
     for processes in (1, 2):
         streams = np.random.SeedSequence(4).spawn(processes)
@@ -113,15 +113,15 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_determinism(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"
 
 
 def blas_threads() -> set[int]:
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
 
-def test_blas_has_one_thread_while_hovi_computes_and_its_own_number_afterwards() -> None:
-    one_blas_thread(blas_threads)()  # by now every BLAS is loaded
+def test_blas_has_one_thread_during_a_call_and_its_own_number_afterwards() -> None:
+    one_blas_thread(blas_threads)()  # loads every BLAS
     with threadpool_limits(2, user_api="blas"):
         before = blas_threads()
         inside = one_blas_thread(blas_threads)()
@@ -129,7 +129,7 @@ def test_blas_has_one_thread_while_hovi_computes_and_its_own_number_afterwards()
     assert inside == {1}
 
 
-def test_blas_gets_its_threads_back_after_an_error() -> None:
+def test_blas_threads_are_restored_after_an_error() -> None:
     before = blas_threads()
     with pytest.raises(AttributeError):
         solve(None)  # type: ignore[arg-type]

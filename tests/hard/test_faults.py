@@ -1,6 +1,6 @@
-"""What goes wrong around a program: kills, full disks, closed pipes, Ctrl-C, no home, no browser.
+"""Environment faults: kills, full disks, closed pipes, Ctrl-C, no home, no browser.
 
-Real processes throughout: a sentence on stderr, an exit code, and no half of a file.
+Real processes throughout; each ends with a sentence on stderr, an exit code and no partial file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import TrajectoryFileError
 from hovi.system.files import whole_file
 
-KILLER = """
+KILL_SCRIPT = """
 import os, random, signal, sys, time
 from pathlib import Path
 from hovi.system.files import whole_file
@@ -41,10 +41,10 @@ for trial in range(int(sys.argv[2])):
     time.sleep(random.uniform(0.0, 0.02))
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    assert target.read_bytes() in (old, new), "a half-written file has the name"
+    assert target.read_bytes() in (old, new), "a partial file has the name"
     rest = [path for path in folder.iterdir() if path != target]
-    # Between the two last calls a whole copy may still bear its other name.
-    assert all(path.read_bytes() == new for path in rest), "half a file is left"
+    # Between the last two calls a complete copy may still have its temporary name.
+    assert all(path.read_bytes() == new for path in rest), "a partial file is left"
     for path in rest:
         path.unlink()
 print("kills", trial + 1)
@@ -61,10 +61,10 @@ def motion(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def start(
     *arguments: str | Path, file_size: int | None = None, **environment: str
 ) -> subprocess.Popen[str]:
-    """One command as a person starts it; files may grow to `file_size` bytes."""
+    """Start a command as from a shell, with files limited to `file_size` bytes."""
 
     def limit() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell's background jobs do not hear it
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # ignored in background jobs of a shell
         if file_size is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (file_size, file_size))
 
@@ -81,21 +81,24 @@ def start(
 
 
 def one_sentence(stderr: str) -> str:
-    """What a person reads."""
+    """The error message, checked to be one sentence."""
     assert "Traceback" not in stderr
     assert stderr.startswith("error: ")
     assert stderr.count("\n") == 1
     return stderr
 
 
-def test_a_process_killed_at_any_moment_leaves_no_half_file(tmp_path: Path) -> None:
+def test_a_killed_process_leaves_no_partial_file(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", KILLER, tmp_path, "100"], capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", KILL_SCRIPT, tmp_path, "100"],
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     assert done.stdout == "kills 100\n", done.stderr
 
 
-def test_a_file_has_no_name_until_it_is_whole(tmp_path: Path) -> None:
+def test_a_file_gets_its_name_when_it_is_complete(tmp_path: Path) -> None:
     with whole_file(tmp_path / "file") as stream:
         stream.write(b"half")
         stream.flush()
@@ -103,7 +106,7 @@ def test_a_file_has_no_name_until_it_is_whole(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_a_file_system_without_nameless_files_is_written_to_as_well(
+def test_a_file_system_without_unnamed_files_gets_a_temporary_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("hovi.system.files._DESCRIPTORS", tmp_path / "no proc")
@@ -118,7 +121,7 @@ def test_a_file_system_without_nameless_files_is_written_to_as_well(
     assert len(list(tmp_path.iterdir())) == 1
 
 
-FULL: dict[str, Sequence[str]] = {
+WRITING_COMMANDS: dict[str, Sequence[str]] = {
     "plan": ("plan", "two_link_reach", "--out", "{folder}/motion.npz"),
     "simulate": ("simulate", "two_link_reach", "--out", "{folder}/motion.npz"),
     "plot": ("plot", "{motion}", "--out", "{folder}/picture.png"),
@@ -127,20 +130,20 @@ FULL: dict[str, Sequence[str]] = {
 }
 
 
-@pytest.mark.parametrize("command", FULL)
-def test_a_full_disk_is_one_sentence_and_no_file(
+@pytest.mark.parametrize("command", WRITING_COMMANDS)
+def test_a_full_disk_gives_one_sentence_and_no_file(
     command: str, motion: Path, tmp_path: Path
 ) -> None:
-    words = [word.format(motion=motion, folder=tmp_path) for word in FULL[command]]
+    words = [word.format(motion=motion, folder=tmp_path) for word in WRITING_COMMANDS[command]]
     process = start(*words, file_size=3_000)
     out, err = process.communicate(timeout=120)
     assert "File too large" in one_sentence(err)
     assert process.returncode == 2
     assert list(tmp_path.iterdir()) == []
-    assert ("cost" in out) == (command == "plan")  # what was found is not lost
+    assert ("cost" in out) == (command == "plan")  # the result is printed nevertheless
 
 
-def test_a_disk_that_is_really_full_leaves_the_old_motion(motion: Path, tmp_path: Path) -> None:
+def test_a_full_file_system_keeps_the_old_motion(motion: Path, tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)]
@@ -160,7 +163,7 @@ def test_a_disk_that_is_really_full_leaves_the_old_motion(motion: Path, tmp_path
 
 
 @pytest.mark.parametrize("arguments", [("info", "two_link_reach"), ("plan", "two_link_reach")])
-def test_an_output_that_is_full_is_one_sentence(arguments: Sequence[str]) -> None:
+def test_a_full_output_device_gives_one_sentence(arguments: Sequence[str]) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-m", "hovi", *arguments],
@@ -173,7 +176,7 @@ def test_an_output_that_is_full_is_one_sentence(arguments: Sequence[str]) -> Non
     assert done.returncode in (1, 2)
 
 
-def test_a_reader_that_stops_reading_is_no_error() -> None:
+def test_a_closed_pipe_is_silent() -> None:
     with start("info", "two_link_reach") as process:
         assert process.stdout is not None
         process.stdout.close()
@@ -182,7 +185,7 @@ def test_a_reader_that_stops_reading_is_no_error() -> None:
     assert process.returncode == 1
 
 
-WORKING: dict[str, Sequence[str]] = {
+LONG_COMMANDS: dict[str, Sequence[str]] = {
     "plan": ("plan", "two_link_swing_up", "--starts", "400"),
     "plan --json": ("plan", "two_link_swing_up", "--starts", "400", "--json"),
     "simulate": ("simulate", "two_link_reach", "--duration", "3000", "--out", "{folder}/m.npz"),
@@ -193,14 +196,14 @@ WORKING: dict[str, Sequence[str]] = {
 }
 
 
-@pytest.mark.parametrize("command", WORKING)
+@pytest.mark.parametrize("command", LONG_COMMANDS)
 @pytest.mark.parametrize(
     "seconds", [1.0, *(pytest.param(each, marks=pytest.mark.long) for each in (0.3, 0.6, 2.0, 4.0))]
 )
-def test_ctrl_c_ends_every_command_without_noise(
+def test_ctrl_c_ends_every_command_without_a_traceback(
     command: str, seconds: float, motion: Path, tmp_path: Path
 ) -> None:
-    words = [word.format(motion=motion, folder=tmp_path) for word in WORKING[command]]
+    words = [word.format(motion=motion, folder=tmp_path) for word in LONG_COMMANDS[command]]
     process = start(*words)
     time.sleep(seconds)
     if process.poll() is None:
@@ -212,13 +215,13 @@ def test_ctrl_c_ends_every_command_without_noise(
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
-BETWEEN_SOLVES: dict[str, Sequence[str]] = {
+SEVERAL_SOLVES: dict[str, Sequence[str]] = {
     "rounds among obstacles": ("plan", "{scene}"),
     "grids to a tolerance": (
         *("plan", "two_link_elbow_limited", "--starts", "1", "--tolerance", "0.1 mm"),
     ),
 }
-ROUND_THE_BALL = """
+BALL_AT_GOAL = """
 robot = "ur5"
 duration = 2.0
 limits = "none"
@@ -237,16 +240,16 @@ time = 1.0
 frame = "tool0"
 position = [0.45, 0.25, 0.6]
 """
-"""The goal lies where the hand is in the ball: one solve after the other looks for a way."""
+"""At the goal the hand is inside the ball, so the search tries one solve after another."""
 
 
-@pytest.mark.parametrize("command", BETWEEN_SOLVES)
+@pytest.mark.parametrize("command", SEVERAL_SOLVES)
 def test_one_ctrl_c_ends_a_plan_of_many_solves(command: str, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
-    scene.write_text(ROUND_THE_BALL)
-    words = [word.format(scene=scene) for word in BETWEEN_SOLVES[command]]
+    scene.write_text(BALL_AT_GOAL)
+    words = [word.format(scene=scene) for word in SEVERAL_SOLVES[command]]
     process = start(*words)
-    while _processor_seconds(process.pid) < 2.5:  # imports are over, however busy the machine is
+    while _processor_seconds(process.pid) < 2.5:  # imports are over, at any load of the machine
         assert process.poll() is None
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGINT)
@@ -261,12 +264,12 @@ def test_one_ctrl_c_ends_a_plan_of_many_solves(command: str, tmp_path: Path) -> 
 
 
 def _processor_seconds(pid: int) -> float:
-    """What a process has taken so far of a processor."""
+    """Processor time of a process so far, in [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def test_a_home_that_cannot_be_written_to_does_no_harm(motion: Path, tmp_path: Path) -> None:
+def test_an_unwritable_home_is_tolerated(motion: Path, tmp_path: Path) -> None:
     process = start(
         *("plot", motion, "--out", tmp_path / "picture.png"),
         HOME="/proc/nowhere",
@@ -289,8 +292,8 @@ def test_without_a_browser_the_address_is_printed(motion: Path) -> None:
     assert (process.returncode, err) == (0, "")
 
 
-def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
-    """Raised while a class names its cached properties it arrives as a RuntimeError."""
+def test_an_interrupt_wrapped_in_a_runtime_error_is_recognized() -> None:
+    """Python 3.11 wraps exceptions of __set_name__ in a RuntimeError."""
     program = (
         "import hovi.cli.application\n"
         "class Naming:\n"
@@ -305,8 +308,8 @@ def test_an_interrupt_that_python_wraps_is_an_interrupt() -> None:
     assert b"Traceback" not in done.stderr
 
 
-def test_an_interrupt_that_a_module_swallows_as_it_is_imported_is_one(tmp_path: Path) -> None:
-    (tmp_path / "deaf").with_suffix(".py").write_text(
+def test_an_interrupt_swallowed_by_an_imported_module_is_raised_again(tmp_path: Path) -> None:
+    (tmp_path / "swallows").with_suffix(".py").write_text(
         "import os, signal\n"
         "try: os.kill(os.getpid(), signal.SIGINT)\n"
         "except KeyboardInterrupt: pass\n"
@@ -316,7 +319,7 @@ def test_an_interrupt_that_a_module_swallows_as_it_is_imported_is_one(tmp_path: 
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "import hovi.cli.application\n"
-        "def main(): print('begun'); import deaf\n"
+        "def main(): print('begun'); import swallows\n"
         "hovi.cli.application.main = main\n"
         "from hovi.__main__ import run\n"
         "run()\n"

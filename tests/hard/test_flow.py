@@ -1,4 +1,4 @@
-"""Hard cases 17 to 21: the flow from momenta, its own instability, and long runs."""
+"""Hard cases 17 to 21: the flow from momenta, its instability, and long runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COUNTS = 80, 160, 320
 
 @cache
 def exact_motion() -> Flow:
-    """One second of the arm's effort, right to round-off."""
+    """One second of the arm's optimal control flow, accurate to round-off."""
     L = arm().effort_lagrangian()
     return flow(SchemeLagrangian(L, galerkin(4), 1 / 320), *legendre(L, *JET), 320, force=True)
 
@@ -42,31 +42,31 @@ def taylor(N: int) -> SchemeLagrangian:
     return SchemeLagrangian(arm().effort_lagrangian(), by_name("taylor-midpoint"), 1.0 / N)
 
 
-def off(motion: Flow) -> float:
+def end_error(motion: Flow) -> float:
     """The error of q at the end."""
     return float(np.abs(motion.q[-1] - exact_motion().q[-1]).max())
 
 
 def naive_start() -> str:
-    said = []
+    parts = []
     for N in COUNTS:
         ld, x = taylor(N), exact_motion().x[:: 320 // N]
         x1, p1 = legendre_plus(ld, x[None, 0], x[None, 1])
-        error = off(flow(ld, x1[0], p1[0], N - 1, force=True))
-        said.append(f"off by {error:.2g} after {N} steps")
-    return "; ".join(said)
+        error = end_error(flow(ld, x1[0], p1[0], N - 1, force=True))
+        parts.append(f"off by {error:.2g} after {N} steps")
+    return "; ".join(parts)
 
 
 def legendre_start() -> Outcome:
     exact = exact_motion()
-    errors = [off(flow(taylor(N), exact.x[0], exact.p[0], N, force=True)) for N in COUNTS]
+    errors = [end_error(flow(taylor(N), exact.x[0], exact.p[0], N, force=True)) for N in COUNTS]
     slopes = np.log2(np.array(errors[:-1]) / errors[1:])
     shown = ", ".join(f"off by {e:.2g}" for e in errors) + f"; order {slopes[-1]:.2f}"
     return Outcome(shown, bool((np.abs(slopes - 2) < 0.3).all()))
 
 
 def upright() -> tuple[SchemeLagrangian, Array, Array]:
-    """Held upright, where the exponents of the flow are +-3.75 per second."""
+    """The upright equilibrium, where the exponents of the flow are +-3.75 per second."""
     L = arm().effort_lagrangian()
     x, p = legendre(L, [np.pi / 2, 0], *np.zeros((3, 2)))
     return SchemeLagrangian(L, galerkin(1), 0.05), x, p
@@ -78,7 +78,7 @@ def naive_horizon() -> str:
     gone = np.abs(flow(ld, x, p, 240, force=True).q - x[0]).max(axis=1)
     lost = np.flatnonzero(gone > 0.1)
     when = f"{0.05 * lost[0]:.1f} s" if len(lost) else "later than 12 s"
-    return f"1e-14 rad off, it is lost by 0.1 rad after {when}, without a word"
+    return f"perturbed by 1e-14 rad, it deviates by 0.1 rad after {when}, silently"
 
 
 def refused_horizon() -> Outcome:
@@ -108,7 +108,7 @@ def naive_energy() -> str:
 
 
 def _jet(y: Array) -> list[Array]:
-    """(q, v, a) with a = p~, as the quartic's cost has it."""
+    """(q, v, a) with a = p~, as for the quartic oscillator."""
     return [y[0, :1], y[0, 1:], y[1, 1:]]
 
 
@@ -187,7 +187,7 @@ START = np.array([[[0.3], [0.1]]]), np.array([[[0.2], [0.5]]])
 
 def naive_conjugate() -> str:
     late = SchemeLagrangian(oscillator(), galerkin(8), 6.4).from_start(*START)
-    return f"a step of 6.4 s to q = {late.x1[0, 0, 0]:.3g}, a saddle, without a word"
+    return f"a step of 6.4 s to q = {late.x1[0, 0, 0]:.3g}, a saddle, silently"
 
 
 def refused_step() -> Outcome:
@@ -209,7 +209,7 @@ CASES = (
     ),
     Case(
         "18",
-        "a horizon beyond the flow's own instability is refused",
+        "a horizon beyond the flow's instability is refused",
         naive_horizon,
         refused_horizon,
         "refused after 3 to 8 s of holding upright, growth 3.75/s; forced on request",
@@ -223,7 +223,7 @@ CASES = (
     ),
     Case(
         "19b",
-        "and over 100,000",
+        "the energy of the quartic oscillator is bounded over 100,000 steps",
         naive_energy,
         bounded_energy(100_000),
         "last quarter at most 1.2 times the first",
@@ -231,7 +231,7 @@ CASES = (
     ),
     Case(
         "19c",
-        "so is that of the falling arm over 100,000, by three schemes",
+        "the energy of the falling arm is bounded over 100,000 steps, by three schemes",
         naive_energy,
         falling_arm,
         "last quarter at most 1.2 times the first",
@@ -239,14 +239,14 @@ CASES = (
     ),
     Case(
         "20a",
-        "motions that cost nothing stay so over 1,500 steps",
+        "motions of zero cost keep it over 1,500 steps",
         naive_costless,
         stays_costless(1500),
         "|p| at most 1e-5",
     ),
     Case(
         "20b",
-        "and over 50,000",
+        "motions of zero cost keep it over 50,000 steps",
         naive_costless,
         stays_costless(50_000),
         "|p| at most 1e-5",
@@ -257,7 +257,7 @@ CASES = (
         "a step beyond a conjugate point is refused",
         naive_conjugate,
         refused_step,
-        "h = 6.2 accepted, h = 6.4 refused by name",
+        "h = 6.2 accepted, h = 6.4 refused with the conjugate point",
     ),
 )
 
@@ -265,4 +265,4 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_flow(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"

@@ -1,4 +1,4 @@
-"""Strange inputs by the hundred: each is refused in a sentence, or is what it says."""
+"""Fuzzing: every mutated file is refused with one sentence or loads correctly."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 
 
 def fuzz(module: ModuleType, random: Random) -> None:
-    """One input, with a verdict that says what is wrong."""
+    """Load one mutated file; fails with the reason if the verdict is a fault."""
     mutant = module.mutate(random)
     with tempfile.TemporaryDirectory() as folder:
-        verdict, why = module.verdict(mutant, Path(folder))
-    assert verdict in GOOD, why
+        verdict, reason = module.verdict(mutant, Path(folder))
+    assert verdict in GOOD, reason
 
 
 SETTINGS = settings(
@@ -37,9 +37,7 @@ SETTINGS = settings(
 @pytest.mark.parametrize("module", MUTATED, ids=lambda module: module.__name__)
 @settings(SETTINGS, max_examples=60)
 @given(random=st.randoms(use_true_random=False))
-def test_whatever_hypothesis_makes_is_refused_or_is_what_it_says(
-    module: ModuleType, random: Random
-) -> None:
+def test_mutated_files_are_refused_or_load_correctly(module: ModuleType, random: Random) -> None:
     fuzz(module, random)
 
 
@@ -47,7 +45,7 @@ def test_whatever_hypothesis_makes_is_refused_or_is_what_it_says(
 @pytest.mark.parametrize("module", MUTATED, ids=lambda module: module.__name__)
 @settings(SETTINGS, max_examples=5_000)
 @given(random=st.randoms(use_true_random=False))
-def test_whatever_hypothesis_makes_in_minutes_is_refused_as_well(
+def test_many_mutated_files_are_refused_or_load_correctly(
     module: ModuleType, random: Random
 ) -> None:
     fuzz(module, random)

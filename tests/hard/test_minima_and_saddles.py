@@ -1,4 +1,4 @@
-"""Hard cases 8 to 16: saddles, far guesses, long times, long chains, and what cannot be."""
+"""Hard cases 8 to 16: saddles, distant guesses, long durations, long chains, infeasibility."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from hard.scenes import (
     hanging,
     links,
     problem,
-    said,
+    summary,
     uneven,
 )
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -47,28 +47,28 @@ LEVEL = np.zeros(4)
 
 
 def minima(solutions: Sequence[Solution], *most: float) -> Outcome:
-    """All are minima, and cost no more than they may."""
+    """Whether all are minima with costs of at most `most`."""
     good = all(s.status is Status.MINIMUM and s.n_neg == 0 for s in solutions)
     cheap = all(s.cost <= cost for s, cost in zip(solutions, most, strict=False))
-    return Outcome(said(solutions), good and cheap)
+    return Outcome(summary(solutions), good and cheap)
 
 
 def planned(scene: Scene, goal: Any, duration: float, **options: Any) -> Solution:
-    """From hanging, without limits, on one processor."""
+    """Plan from hanging, without limits, in one process."""
     start = hanging(scene)
     return plan(scene, start, goal, duration, **({"limits": "none", "processes": 1} | options))
 
 
 def naive_runs(goal: np.ndarray, cases: Sequence[tuple[float, int]]) -> Callable[[], str]:
-    """The paper's scheme from hanging, for times and numbers of intervals."""
+    """The literal implementation from hanging, for pairs of duration and intervals."""
 
     def run() -> str:
-        said = []
+        parts = []
         for T, N in cases:
             found = naive.solve(naive.Problem.cubic(HANG_JET, goal, T, N), 1e-6)
             inertia = f", n_neg = {found.problem.n_neg}" if found.stopped == "converged" else ""
-            said.append(f"T = {T:g}: {found.said}{inertia}")
-        return "; ".join(said)
+            parts.append(f"T = {T:g}: {found.summary}{inertia}")
+        return "; ".join(parts)
 
     return run
 
@@ -89,7 +89,7 @@ def reaches() -> Outcome:
 
 def naive_hold() -> str:
     found = naive.solve(naive.Problem.cubic(LEVEL, LEVEL, 10.0, 32), 1e-6)
-    return f"{found.said}, n_neg = {found.problem.n_neg}"
+    return f"{found.summary}, n_neg = {found.problem.n_neg}"
 
 
 def hold() -> Outcome:
@@ -98,7 +98,7 @@ def hold() -> Outcome:
     left = solve(problem(arm(), level, level, 10.0, 32))
     known = held.status is Status.SADDLE and held.n_neg == 25 and abs(held.cost - 300.59) < 0.01
     good = left.status is Status.MINIMUM and left.n_neg == 0 and left.cost < 100
-    return Outcome(said([held, left]), known and good)
+    return Outcome(summary([held, left]), known and good)
 
 
 def swing_ups() -> Outcome:
@@ -106,7 +106,7 @@ def swing_ups() -> Outcome:
     return minima(found, 67.3475, 3.3505)
 
 
-def the_papers_swing_up() -> Outcome:
+def paper_swing_up() -> Outcome:
     return minima([planned(arm(), UP, 10.0, intervals=60, starts=48)], 0.7341)
 
 
@@ -131,11 +131,13 @@ def turns(*counts: int, starts: int, most: Sequence[float]) -> Callable[[], Outc
 
 
 def naive_turns() -> str:
-    said = []
+    parts = []
     for k in (1, 5, 20):
         goal = UP_JET + np.array([2 * np.pi * k, 0, 0, 0])
-        said.append(f"k = {k}: {naive.solve(naive.Problem.cubic(HANG_JET, goal, 10.0, 200)).said}")
-    return "; ".join(said)
+        parts.append(
+            f"k = {k}: {naive.solve(naive.Problem.cubic(HANG_JET, goal, 10.0, 200)).summary}"
+        )
+    return "; ".join(parts)
 
 
 def long_times() -> Outcome:
@@ -143,12 +145,12 @@ def long_times() -> Outcome:
 
 
 def resolved_long_time() -> Outcome:
-    """Coarse minima move away on a grid that resolves the swings: many steps follow a valley."""
+    """On a grid that resolves the swings, many iterations follow a curved valley."""
     return minima([planned(arm(), UP, 100.0, intervals=800)])
 
 
 def chains(*counts: int) -> Callable[[], Outcome]:
-    """Bent, in two seconds; and upright, in three."""
+    """Reach a bent configuration in two seconds, and upright in three."""
 
     def run() -> Outcome:
         found = []
@@ -178,22 +180,22 @@ def extreme_masses() -> Outcome:
 
 
 def direct(*scenes: Callable[[], Scene]) -> Callable[[], str]:
-    """Swing-ups in three seconds by full Newton steps from the cubic guess."""
+    """Swing-ups in three seconds, by full Newton steps from the cubic guess."""
 
     def run() -> str:
-        said = []
+        parts = []
         for make in scenes:
             scene = make()
             ends = State(hanging(scene)), State(-hanging(scene))
-            said.append(naive.full_newton(problem(scene, *ends, 3.0, 16, "taylor-midpoint")))
-        return "; ".join(said)
+            parts.append(naive.full_newton(problem(scene, *ends, 3.0, 16, "taylor-midpoint")))
+        return "; ".join(parts)
 
     return run
 
 
 def naive_elbow() -> str:
     cost = naive.Cost(elbow=1000.0)
-    return naive.solve(naive.Problem.cubic(HANG_JET, UP_JET, 10.0, 200, cost)).said
+    return naive.solve(naive.Problem.cubic(HANG_JET, UP_JET, 10.0, 200, cost)).summary
 
 
 def elbow() -> Outcome:
@@ -203,21 +205,21 @@ def elbow() -> Outcome:
                  intervals=grid.intervals, processes=1)  # fmt: skip
     angle = np.degrees(found.trajectory.sample(np.linspace(0, task.duration, 5001)).q[:, 1])
     within = angle.min() >= -0.5 and angle.max() <= 170.5
-    shown = f"{said([found])}, elbow in {angle.min():.2f} to {angle.max():.2f} degrees"
+    shown = f"{summary([found])}, elbow in {angle.min():.2f} to {angle.max():.2f} degrees"
     return Outcome(shown, minima([found], 3.66).passed and bool(within))
 
 
 def naive_penalty() -> str:
-    said = []
+    parts = []
     for rho in (1e2, 1e4, 1e6):
         cost = naive.Cost(penalty=rho)
         run = naive.solve(naive.Problem.cubic(LEVEL, LEVEL, 2.0, 32, cost), 1e-4)
-        said.append(f"rho = {rho:g}: {run.stopped} after {run.steps} steps, {torque(run):.3f} N m")
-    return "; ".join(said)
+        parts.append(f"rho = {rho:g}: {run.stopped} after {run.steps} steps, {torque(run):.3f} N m")
+    return "; ".join(parts)
 
 
 def torque(run: naive.Run) -> float:
-    """The shoulder's torque that the first interval asks for."""
+    """The shoulder's torque in the first interval, in [N m]."""
     x, h = run.problem.x, run.problem.h
     (q0, v0), (q1, v1) = np.split(x[0], 2), np.split(x[1], 2)
     a = 2 / h**2 * (q1 - q0 - h * v0)
@@ -234,11 +236,11 @@ def weak_motor() -> Outcome:
 
 
 CONJUGATE = {6.2: 0, 6.4: 1, 9.1: 2, 12.7: 3}
-"""Horizons, and the conjugate points that 2 - 2 cos T = T sin T has before them."""
+"""Horizons T and the numbers of roots of 2 - 2 cos T = T sin T below them: conjugate points."""
 
 
 def oscillator(T: float, coordinates: Coordinates = "nodal") -> tuple[ActionStructure, IntervalSum]:
-    """The action of a^2/2 - v^2/2 over T on 64 intervals, to second order."""
+    """The expansion of the action of a^2/2 - v^2/2 over T on 64 intervals."""
     q, v, a = (ca.SX.sym(c, 1) for c in "qva")
     L = CasadiLagrangian([q, v, a], (ca.sumsqr(a) - ca.sumsqr(v)) / 2)
     grid = Grid.uniform(T, 64, galerkin(2))
@@ -256,7 +258,7 @@ def inertia(T: float) -> int:
 
 
 def naive_conjugate() -> str:
-    said = []
+    parts = []
     for T in CONJUGATE:
         structure, intervals = oscillator(T)
         lower = structure.layout.assemble(intervals.hessian)
@@ -264,8 +266,8 @@ def naive_conjugate() -> str:
         H = H + np.tril(H, -1).T
         b = np.random.default_rng(0).normal(size=len(H))
         residual = np.abs(H @ np.linalg.solve(H, b) - b).max() / np.abs(b).max()
-        said.append(f"residual {residual:.0e} at T = {T}")
-    return "; ".join(said) + ": converged after one step each"
+        parts.append(f"residual {residual:.0e} at T = {T}")
+    return "; ".join(parts) + ": converged after one step each"
 
 
 def conjugate_points() -> Outcome:
@@ -283,7 +285,7 @@ CASES = (
     ),
     Case(
         "9",
-        "holding the arm horizontal is known as a saddle and left",
+        "holding the arm horizontal is recognized as a saddle and left",
         naive_hold,
         hold,
         "a saddle of J = 300.59 with n_neg = 25, and a minimum below 100",
@@ -299,12 +301,12 @@ CASES = (
         "11a",
         "the paper's swing-up is found from many starts",
         naive_runs(UP_JET, [(10.0, 1000)]),
-        the_papers_swing_up,
+        paper_swing_up,
         "n_neg = 0, J at most 0.7341",
     ),
     Case(
         "11b",
-        "the cheap reach of the UR5 is found from many starts",
+        "the cheapest reach of the UR5 is found from many starts",
         naive_ur5,
         ur5_reach,
         "n_neg = 0, J at most 56.15",
@@ -318,7 +320,7 @@ CASES = (
     ),
     Case(
         "12b",
-        "so is one of 20 turns from one start",
+        "a motion of 20 turns is found from one start",
         naive_turns,
         turns(20, starts=1, most=()),
         "n_neg = 0",
@@ -354,7 +356,7 @@ CASES = (
     ),
     Case(
         "13e",
-        "so do links of a million million to one",
+        "links of a million million to one reach and swing up",
         direct(lambda: uneven((1e6, 1e-6))),
         extreme_masses,
         "n_neg = 0",
@@ -362,7 +364,7 @@ CASES = (
     ),
     Case(
         "13f",
-        "a swing-up in 100 seconds is a minimum on 800 intervals, too",
+        "a swing-up in 100 seconds is a minimum on 800 intervals",
         naive_runs(UP_JET, [(100.0, 800)]),
         resolved_long_time,
         "n_neg = 0",
@@ -377,7 +379,7 @@ CASES = (
     ),
     Case(
         "15",
-        "a hold that a motor is too weak for is infeasible",
+        "a hold beyond the motor's torque is infeasible",
         naive_penalty,
         weak_motor,
         "infeasible, with the joint and the time",
@@ -395,4 +397,4 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_minima_and_saddles(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"

@@ -1,4 +1,4 @@
-"""Hard cases 26 to 30: models and files from strangers."""
+"""Hard cases 26 to 30: untrusted models and files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import pytest
 
 from hard import mutated_motion, mutated_scene, mutated_urdf
 from hard.case import Case, Outcome, parameters
-from hard.strange_files import ARM, MASS, alone, by_pinocchio, loaded, long_chain, refusals
+from hard.strange_files import ARM, MASS, by_pinocchio, loaded, long_chain, refusals, run_process
 from hard.verdict import Verdict
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
@@ -61,11 +61,11 @@ def naive_texts(texts: dict[str, tuple[str, str, str]]) -> Callable[[], str]:
 
 
 def refused_texts(texts: dict[str, tuple[str, str, str]]) -> Callable[[], Outcome]:
-    works: dict[str, tuple[Callable[[], object], str]] = {
-        name: ((lambda old=old, new=new: loaded(changed(old, new))), word)
-        for name, (old, new, word) in texts.items()
+    calls: dict[str, tuple[Callable[[], object], str]] = {
+        name: ((lambda old=old, new=new: loaded(changed(old, new))), fragment)
+        for name, (old, new, fragment) in texts.items()
     }
-    return lambda: refusals(works)
+    return lambda: refusals(calls)
 
 
 def masses(*values: str) -> dict[str, tuple[str, str, str]]:
@@ -82,11 +82,13 @@ def read_masses() -> Outcome:
 
 def naive_chains() -> str:
     build = "import sys, pinocchio as pin\nm = pin.buildModelFromXML(sys.stdin.read())"
-    said = []
+    parts = []
     for links in (3_000, 20_000):
-        code, word = alone(f"{build}\nm.createData()", long_chain(links), memory=4 * 2**30)
-        said.append(f"{links}: exit code {code} {word}")
-    return "; ".join(said) + " (with 4 GB of memory)"
+        code, fragment = run_process(
+            f"{build}\nm.createData()", long_chain(links), memory=4 * 2**30
+        )
+        parts.append(f"{links}: exit code {code} {fragment}")
+    return "; ".join(parts) + " (with 4 GB of memory)"
 
 
 def refused_chains() -> Outcome:
@@ -103,7 +105,7 @@ def refused_chains() -> Outcome:
 
 
 def with_mesh(folder: Path, name: str) -> Path:
-    """A URDF in folder/inside whose mesh bears that name, and a mesh in folder/outside."""
+    """A URDF in folder/inside with a mesh of that name, and a mesh in folder/outside."""
     for each in ("inside", "outside"):
         (folder / each).mkdir(exist_ok=True)
     (folder / "outside" / "secret.stl").write_text(TRIANGLE)
@@ -152,8 +154,8 @@ import random, sys, tempfile, pinocchio as pin
 model, name = pin.buildSampleModelManipulator(), tempfile.mktemp()
 model.saveToBinary(name)
 data = bytearray(open(name, "rb").read())
-place = random.Random(int(sys.stdin.read())).randrange(len(data))
-data[place] ^= 0x55
+position = random.Random(int(sys.stdin.read())).randrange(len(data))
+data[position] ^= 0x55
 open(name, "wb").write(data)
 other = pin.Model()
 other.loadFromBinary(name)
@@ -164,8 +166,8 @@ print("same" if other == model else "silent")
 def naive_flips() -> str:
     found = Counter[str]()
     for seed in range(8):
-        code, word = alone(FLIPS, str(seed), memory=2**32)
-        found[word if code == 0 else "crash" if code < 0 else "exception"] += 1
+        code, fragment = run_process(FLIPS, str(seed), memory=2**32)
+        found[fragment if code == 0 else "crash" if code < 0 else "exception"] += 1
     return "Boost archives: " + ", ".join(f"{count} x {what}" for what, count in found.items())
 
 
@@ -177,20 +179,20 @@ def refused_flips() -> Outcome:
         path = Path(name) / "motion.npz"
         path.write_bytes(whole)
         q = Trajectory.load(path).q
-        for place in places:
+        for position in places:
             flipped = bytearray(whole)
-            flipped[place] ^= 0x55
+            flipped[position] ^= 0x55
             path.write_bytes(flipped)
             try:
                 harmless += np.array_equal(Trajectory.load(path).q, q)
             except Exception as error:
                 refused += "motion.npz" in str(error)
-    shown = f"{refused} refused, {harmless} in bytes that mean nothing"
+    shown = f"{refused} refused, {harmless} without effect"
     return Outcome(shown, refused + harmless == 300)
 
 
 class _Bomb:
-    """Unpickling it makes a file."""
+    """An object whose unpickling creates a file."""
 
     def __init__(self, target: Path) -> None:
         self.target = target
@@ -200,46 +202,46 @@ class _Bomb:
 
 
 def with_pickle(load: Callable[[Path], object]) -> bool:
-    """Whether loading a trajectory file with a pickle in it runs what the pickle says."""
+    """Whether loading a trajectory file with a pickle executes the pickle."""
     with tempfile.TemporaryDirectory() as name:
         path, target = Path(name) / "motion.npz", Path(name) / "ran"
         names = ("header", "steps", "q", "v", "z", "inner", "momenta")
         bombs = {each: np.array([_Bomb(target)], dtype=object) for each in names}
         np.savez(path, **bombs)  # type: ignore[arg-type]
-        with contextlib.suppress(Exception):  # what counts is what has been run
+        with contextlib.suppress(Exception):  # only whether code was executed matters
             load(path)
         return target.exists()
 
 
 def naive_pickle() -> str:
     ran = with_pickle(lambda path: dict(np.load(path, allow_pickle=True)))
-    return "runs the code" if ran else "runs nothing"
+    return "executes the code" if ran else "executes nothing"
 
 
 def unopened_pickle() -> Outcome:
     ran = with_pickle(Trajectory.load)
-    return Outcome("runs the code" if ran else "refused, nothing is run", not ran)
+    return Outcome("executes the code" if ran else "refused, nothing is executed", not ran)
 
 
-PLANTED = (
+MALICIOUS_CODE = (
     '#include <stdio.h>\n__attribute__((constructor)) static void f(void) {{ fopen("{}", "w"); }}'
 )
 
 
-def planted(folder: Path) -> Path:
-    """A library that makes the file folder/ran when it is loaded."""
-    source, library = folder / "planted.c", folder / "planted.so"
-    source.write_text(PLANTED.format(folder / "ran"))
+def malicious_library(folder: Path) -> Path:
+    """A library that creates the file folder/ran when loaded."""
+    source, library = folder / "malicious_library.c", folder / "malicious_library.so"
+    source.write_text(MALICIOUS_CODE.format(folder / "ran"))
     subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
     return library
 
 
 def naive_library() -> str:
     with tempfile.TemporaryDirectory() as name:
-        library = planted(Path(name))
-        with contextlib.suppress(RuntimeError):  # it has no function f, but by then it is loaded
+        library = malicious_library(Path(name))
+        with contextlib.suppress(RuntimeError):  # it has no function f, but it has been loaded
             ca.external("f", str(library))
-        return "runs its code" if (Path(name) / "ran").exists() else "runs nothing"
+        return "executes its code" if (Path(name) / "ran").exists() else "executes nothing"
 
 
 def refused_library() -> Outcome:
@@ -249,24 +251,23 @@ def refused_library() -> Outcome:
         function = ca.Function("square", [x], [x * x])
         compiled(function)
         (library,) = library_folder().glob("*.so")
-        library.write_bytes(planted(Path(name)).read_bytes())
+        library.write_bytes(malicious_library(Path(name)).read_bytes())
         right = float(compiled(function)(3.0)) == 9.0
         ran = (Path(name) / "ran").exists()
         mode = library_folder().stat().st_mode & 0o777
-    shown = (
-        f"built again, folder of mode {mode:o}, {'its code is run' if ran else 'nothing is run'}"
-    )
+    executed = "its code is executed" if ran else "nothing is executed"
+    shown = f"built again, folder of mode {mode:o}, {executed}"
     return Outcome(shown, right and not ran and mode == 0o700)
 
 
-def naive_door() -> str:
+def naive_inputs() -> str:
     h, q0, q1, v0 = 0.0, 0.0, float("nan"), 0.0
     with np.errstate(all="ignore"):
         a = np.float64(2.0) / np.float64(h) ** 2 * (q1 - q0 - h * v0)
-    return f"a = {a} at h = 0 from a NaN, without a word"
+    return f"a = {a} at h = 0 from a NaN, silently"
 
 
-def refused_door() -> Outcome:
+def refused_inputs() -> Outcome:
     scene = Scene(loaded(ARM), effects=[Gravity(9.8)])
     rest, nan, inf = [0.0, 0.0], float("nan"), float("inf")
 
@@ -300,7 +301,7 @@ MUTATED = (mutated_urdf, mutated_scene, mutated_motion)
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 
 
-def strange(count: int) -> Callable[[], Outcome]:
+def fuzzed(count: int) -> Callable[[], Outcome]:
     def run() -> Outcome:
         found = Counter[Verdict]()
         with tempfile.TemporaryDirectory() as folder:
@@ -314,11 +315,11 @@ def strange(count: int) -> Callable[[], Outcome]:
     return run
 
 
-NAMED = "refused in one sentence that names the culprit"
+NAMED = "refused with one sentence that names the cause"
 CASES = (
     Case(
         "26a",
-        "a mass that is no number is refused",
+        "a mass that is not a number is refused",
         naive_texts(masses("NaN", "inf", "1,5", "1abc", "1e999", "")),
         refused_texts(masses("NaN", "inf", "1,5", "1abc", "1e999", "")),
         NAMED,
@@ -332,14 +333,14 @@ CASES = (
     ),
     Case(
         "26c",
-        "links that form no tree are refused",
+        "links that do not form a tree are refused",
         naive_texts(TREES),
         refused_texts(TREES),
         NAMED,
     ),
     Case(
         "26d",
-        "a mass with blanks around it is read",
+        "a mass with surrounding blanks is read",
         naive_texts(masses(" 0.375 ", "0.375\t", "\t.375")),
         read_masses,
         "0.375 kg",
@@ -354,31 +355,31 @@ CASES = (
     ),
     Case(
         "29a",
-        "a flipped byte is refused or means nothing",
+        "a file with a flipped byte is refused or unchanged",
         naive_flips,
         refused_flips,
         "300 of 300",
     ),
-    Case("29b", "a pickle is not opened", naive_pickle, unopened_pickle, "nothing is run"),
+    Case("29b", "a pickle is not executed", naive_pickle, unopened_pickle, "nothing is executed"),
     Case(
         "29c",
         "a planted library is not loaded",
         naive_library,
         refused_library,
-        "nothing is run, a folder of mode 700",
+        "nothing is executed, a folder of mode 700",
     ),
     Case(
         "30a",
-        "times, grids and states that make no problem are refused",
-        naive_door,
-        refused_door,
-        "refused at the door, by name",
+        "invalid times, grids and states are refused",
+        naive_inputs,
+        refused_inputs,
+        "refused with the name of the argument",
     ),
     Case(
         "30b",
-        "strange URDFs, scenes and trajectory files are refused or are what they say",
+        "mutated URDFs, scenes and trajectory files are refused or load correctly",
         lambda: "see 26 to 30a",
-        strange(100),
+        fuzzed(100),
         "no crash, no silent acceptance",
     ),
 )
@@ -387,4 +388,4 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_models_and_files(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"

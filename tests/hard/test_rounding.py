@@ -1,4 +1,4 @@
-"""Hard cases 1 to 7: what rounding does to small steps and many of them."""
+"""Hard cases 1 to 7: rounding with small steps and with many steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from hard import naive
 from hard.case import Case, Outcome, at_most, parameters
-from hard.scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, said
+from hard.scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, summary
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
 from hovi.planning.solver.solver import Solution, solve
@@ -32,7 +32,7 @@ def naive_acceleration() -> str:
     return ", ".join(f"{found[i]:.1g} at h = {STEPS[i]:g}" for i in (2, 4, 7))
 
 
-def carried_acceleration() -> Outcome:
+def propagated_acceleration() -> Outcome:
     errors = []
     for h in STEPS:
         ld = SchemeLagrangian(spline(1), galerkin(0), h)
@@ -46,12 +46,12 @@ def newton_reach(intervals: int) -> naive.Problem:
 
 
 def naive_floor() -> str:
-    runs = {N: naive.solve(newton_reach(N), most=12) for N in (100, 1000, 5000)}
+    runs = {N: naive.solve(newton_reach(N), max_steps=12) for N in (100, 1000, 5000)}
     return "; ".join(f"residual {run.residual:.1g} at N = {N}" for N, run in runs.items())
 
 
 def reference() -> Solution:
-    """The reach on 200 intervals, right to round-off."""
+    """The reach on 200 intervals, accurate to round-off."""
     return solve(problem(arm(), START, REACH, 1.0, 200, "galerkin-3"))
 
 
@@ -71,7 +71,7 @@ def fine_reach(intervals: int) -> Callable[[], Outcome]:
 
 
 def naive_recursion() -> str:
-    said = []
+    parts = []
     for N in (10_000, 1_000_000):
         h = 1.0 / N
         exact = np.array([[Q + V * t + A * t**2 / 2 + J * t**3 / 6, V + A * t + J * t**2 / 2]
@@ -79,8 +79,8 @@ def naive_recursion() -> str:
         x, y, R = exact[0], exact[1], exact_recursion(h)
         for _ in range(N - 1):
             x, y = y, R @ np.concatenate([x, y])
-        said.append(f"off by {abs(y[0] - exact[2, 0]):.1g} after {N:.0e} steps")
-    return "; ".join(said)
+        parts.append(f"off by {abs(y[0] - exact[2, 0]):.1g} after {N:.0e} steps")
+    return "; ".join(parts)
 
 
 def long_spline(steps: int) -> Callable[[], Outcome]:
@@ -107,7 +107,7 @@ def bounded_swing_up() -> Outcome:
     found = solve(problem(arm(), START, UP, 10.0, 100))
     largest = np.abs(found.trajectory.q).max()
     good = found.status is Status.MINIMUM and largest < 100 and np.isfinite(found.cost)
-    return Outcome(f"{said([found])}, |q| <= {largest:.2g}", bool(good))
+    return Outcome(f"{summary([found])}, |q| <= {largest:.2g}", bool(good))
 
 
 TIMES = {1e-3: 3.1359672e10, 1e-2: 3.12936e7, 1e-1: 3.0494e4}
@@ -115,14 +115,14 @@ TIMES = {1e-3: 3.1359672e10, 1e-2: 3.12936e7, 1e-1: 3.0494e4}
 
 def naive_short() -> str:
     runs = [naive.solve(naive.Problem.cubic(HANG_JET, REACH_JET, T, 100)) for T in TIMES]
-    return "; ".join(f"{run.said}, residual {run.residual:.1g}" for run in runs)
+    return "; ".join(f"{run.summary}, residual {run.residual:.1g}" for run in runs)
 
 
 def short_times() -> Outcome:
     found = [solve(problem(arm(), START, REACH, T, 32)) for T in TIMES]
     good = all(s.status is Status.MINIMUM and s.nit <= 15 for s in found)
     close = [abs(s.cost / cost - 1) <= 2e-5 for s, cost in zip(found, TIMES.values(), strict=True)]
-    return Outcome(said(found), good and all(close))
+    return Outcome(summary(found), good and all(close))
 
 
 def naive_rest() -> str:
@@ -137,31 +137,31 @@ def naive_rest() -> str:
 def rest() -> Outcome:
     found = solve(problem(arm(), START, START, 3.0, 32))
     good = found.success and found.nit <= 1 and abs(found.cost) < 1e-25
-    return Outcome(said([found]), good)
+    return Outcome(summary([found]), good)
 
 
 def naive_noether() -> str:
-    said = []
+    parts = []
     for N in (200, 10_000):
         best = solve(problem(arm(False), START, REACH, 1.0, N, "taylor-midpoint")).trajectory
         nodes = naive.Problem(np.hstack([best.q, best.v]), 1.0 / N, naive.Cost(gravity=False))
         p = nodes.momenta[:, 0]
-        said.append(f"spread {np.ptp(p) / np.abs(p).max():.1g} at N = {N}")
-    return "; ".join(said)
+        parts.append(f"spread {np.ptp(p) / np.abs(p).max():.1g} at N = {N}")
+    return "; ".join(parts)
 
 
 def noether_of_the_flow(steps: int) -> Callable[[], Outcome]:
     def run() -> Outcome:
-        carried, minus, plus = noether_errors(arm(False), steps)
-        again = max(minus, plus) / steps
-        shown = f"carried {carried:.1g}; evaluated again {again:.1g}/h"
-        return Outcome(shown, carried <= 1e-12 and again <= 1e-13)
+        propagated, minus, plus = noether_errors(arm(False), steps)
+        reevaluated = max(minus, plus) / steps
+        shown = f"propagated {propagated:.1g}; re-evaluated {reevaluated:.1g}/h"
+        return Outcome(shown, propagated <= 1e-12 and reevaluated <= 1e-13)
 
     return run
 
 
 def noether_of_the_reach(intervals: int) -> Callable[[], Outcome]:
-    """The same along a planned motion, whose momenta come from the boundary value problem."""
+    """Noether's momentum along a planned motion, with momenta from the boundary value problem."""
 
     def run() -> Outcome:
         posed = problem(arm(False), START, REACH, 1.0, intervals)
@@ -169,11 +169,11 @@ def noether_of_the_reach(intervals: int) -> Callable[[], Outcome]:
         p, size = motion.momenta, np.abs(motion.momenta).max(axis=(0, 2))[:, None]
         D = posed.ld.derivatives(motion.path)
         spread = np.ptp(p[:, 0, 0]) / np.abs(p[:, 0, 0]).max()
-        again = max(
+        reevaluated = max(
             np.abs((D[:, 2:] - p[1:]) / size).max(), np.abs((D[:, :2] + p[:-1]) / size).max()
         )
-        shown = f"carried {spread:.1g}; evaluated again {again / intervals:.1g}/h"
-        return Outcome(shown, bool(spread <= 1e-12 and again <= 1e-13 * intervals))
+        shown = f"propagated {spread:.1g}; re-evaluated {reevaluated / intervals:.1g}/h"
+        return Outcome(shown, bool(spread <= 1e-12 and reevaluated <= 1e-13 * intervals))
 
     return run
 
@@ -183,19 +183,19 @@ CASES = (
         "1",
         "the acceleration of an interval keeps its digits at every step length",
         naive_acceleration,
-        carried_acceleration,
+        propagated_acceleration,
         "relative error at most 1e-15 from h = 0.1 to 1e-8",
     ),
     Case(
         "2a",
-        "a reach on 2,000 intervals stops by itself at a motion that is right",
+        "a reach on 2,000 intervals converges to the accurate motion",
         naive_floor,
         fine_reach(2000),
         "at most 15 steps, q and v right to 1e-10",
     ),
     Case(
         "2b",
-        "so does one on 100,000 intervals",
+        "a reach on 100,000 intervals converges to the accurate motion",
         naive_floor,
         fine_reach(100_000),
         "at most 15 steps, q and v right to 1e-10",
@@ -203,14 +203,14 @@ CASES = (
     ),
     Case(
         "3a",
-        "a spline is followed over three thousand short steps",
+        "a spline stays accurate over 3,000 short steps",
         naive_recursion,
         long_spline(3_000),
         "off by at most 1e-11",
     ),
     Case(
         "3b",
-        "and over a million",
+        "a spline stays accurate over a million short steps",
         naive_recursion,
         long_spline(1_000_000),
         "off by at most 1e-11",
@@ -218,7 +218,7 @@ CASES = (
     ),
     Case(
         "4",
-        "nothing that diverges is called converged",
+        "a diverging motion is not reported as converged",
         naive_step_test,
         bounded_swing_up,
         "a minimum of finite cost, |q| < 100",
@@ -232,7 +232,7 @@ CASES = (
     ),
     Case(
         "6",
-        "staying at rest is a success in one step",
+        "staying at rest converges in one step",
         naive_rest,
         rest,
         "a minimum of cost below 1e-25 in at most one step",
@@ -242,29 +242,29 @@ CASES = (
         "without gravity the shoulder's momentum is constant along a flow of 1,000 steps",
         naive_noether,
         noether_of_the_flow(1000),
-        "carried 1e-12; evaluated again from the stored z 1e-13/h",
+        "propagated 1e-12; re-evaluated from the stored z 1e-13/h",
     ),
     Case(
         "7b",
-        "and along one of 10,000",
+        "without gravity the shoulder's momentum is constant along a flow of 10,000 steps",
         naive_noether,
         noether_of_the_flow(10_000),
-        "carried 1e-12; evaluated again from the stored z 1e-13/h",
+        "propagated 1e-12; re-evaluated from the stored z 1e-13/h",
         long=True,
     ),
     Case(
         "7c",
-        "and along a planned motion on 2,000 intervals",
+        "without gravity it is constant along a planned motion on 2,000 intervals",
         naive_noether,
         noether_of_the_reach(2000),
-        "carried 1e-12; evaluated again from the stored z 1e-13/h",
+        "propagated 1e-12; re-evaluated from the stored z 1e-13/h",
     ),
     Case(
         "7d",
-        "and along one on 100,000 intervals",
+        "without gravity it is constant along a planned motion on 100,000 intervals",
         naive_noether,
         noether_of_the_reach(100_000),
-        "carried 1e-12; evaluated again from the stored z 1e-13/h",
+        "propagated 1e-12; re-evaluated from the stored z 1e-13/h",
         long=True,
     ),
 )
@@ -273,9 +273,9 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_rounding(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"
 
 
-def test_the_reference_of_the_fine_reaches_is_the_minimum_that_is_known() -> None:
+def test_the_reference_of_the_fine_reaches_is_the_known_minimum() -> None:
     assert reference().cost == pytest.approx(REACH_COST, rel=1e-10)
     np.testing.assert_array_equal(reference().trajectory.q[0], HANG)

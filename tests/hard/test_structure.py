@@ -1,4 +1,4 @@
-"""Hard cases 22 to 25: ill-conditioned masses, norms that are off, and the same bytes again."""
+"""Hard cases 22 to 25: ill-conditioned mass matrices, wrong quaternion norms, equal bytes."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ def mass_matrix(robot: Robot, q: Array) -> Array:
 
 
 def naive_square() -> str:
-    said = []
+    parts = []
     for count in (10, 30, 100):
         robot = links(count).robot
         M = mass_matrix(robot, np.random.default_rng(0).uniform(-1, 1, count))
         x = np.ones(count)
         W = M.T @ M
         error = np.abs(np.linalg.solve(W, M.T @ (M @ x)) - x).max()
-        said.append(
+        parts.append(
             f"{count} links: cond(W) = {np.linalg.cond(M) ** 2:.0e}, W^-1 off by {error:.0e}"
         )
-    return "; ".join(said)
+    return "; ".join(parts)
 
 
 def digits_of_a_chain(count: int) -> Callable[[], Outcome]:
-    """A minimum, its inertia by two algebras, and what the other algebra makes of it."""
+    """A minimum, its inertia by two factorisations, and its change by the second one."""
 
     def run() -> Outcome:
         scene = links(count)
@@ -60,14 +60,14 @@ def digits_of_a_chain(count: int) -> Callable[[], Outcome]:
         options = {"limits": "none", "processes": 1}
         found = plan(scene, hanging(scene), bent, 2.0, **options)
         assert found.problem is not None
-        moved, inertia = again(found.problem, found.trajectory.path)
+        moved, inertia = solve_again(found.problem, found.trajectory.path)
         D = DiscreteLagrangian.derivatives(found.problem.ld, found.trajectory.path)
         residual = np.abs(D[1:, :2] + D[:-1, 2:]).max(axis=(0, 2)) / np.abs(D).max(axis=(0, 2))[:2]
         floor = last_bits(found.problem, found.trajectory.path)
         shown = (
             f"{found.status}, n_neg = {found.n_neg} and {inertia}; equations hold to "
-            f"{residual.max():.0e}, last bits are worth {floor:.0e}; solved again in other "
-            f"coordinates q moves by {moved:.0e}"
+            f"{residual.max():.0e}, the last bits change them by {floor:.0e}; solved again in "
+            f"other coordinates q moves by {moved:.0e}"
         )
         good = found.success and found.n_neg == inertia == 0
         held = residual.max() <= (1e-8 if count <= 10 else floor)
@@ -77,7 +77,7 @@ def digits_of_a_chain(count: int) -> Callable[[], Outcome]:
 
 
 def last_bits(problem: TrajectoryProblem, path: DiscretePath) -> float:
-    """How much the momenta change, as a share of them, with the last bits of q, v and z."""
+    """Relative change of the momenta by a change of the last bits of q, v and z."""
     random = np.random.default_rng(0)
 
     def nudged(x: Array) -> Array:
@@ -88,8 +88,8 @@ def last_bits(problem: TrajectoryProblem, path: DiscretePath) -> float:
     return float(np.max(np.abs(other - D).max(axis=(0, 2)) / np.abs(D).max(axis=(0, 2))))
 
 
-def again(problem: TrajectoryProblem, path: object) -> tuple[float, int]:
-    """How far regularized coordinates move a minimum that nodal ones found, and its inertia."""
+def solve_again(problem: TrajectoryProblem, path: object) -> tuple[float, int]:
+    """Change of a minimum by a solve in regularized coordinates, and its inertia there."""
     tree = ActionObjective(problem, "tree")
     outcome = minimize(tree, path, Options(decrease=1e-9, max_iterations=20))  # type: ignore[arg-type]
     return float(np.abs(outcome.x.q - path.q).max()), tree.negative_eigenvalues(outcome.x)  # type: ignore[attr-defined]
@@ -111,7 +111,7 @@ def refused_massless() -> Outcome:
 
 
 def refusal(work: Callable[[], object], *words: str) -> Outcome:
-    """Whether one sentence with these words refuses."""
+    """Whether `work` raises one sentence with these words."""
     try:
         work()
     except HoviError as error:
@@ -181,7 +181,7 @@ CASES = (
     ),
     Case(
         "22b",
-        "so does one of 30 links",
+        "a minimum of a chain of 30 links keeps its digits",
         naive_square,
         digits_of_a_chain(30),
         "n_neg = 0 by two algebras, equations to the last bits of q, v and z, solved again in "
@@ -193,14 +193,14 @@ CASES = (
         "a link without mass to working precision is refused",
         naive_massless,
         refused_massless,
-        "refused by the joint's name",
+        "refused with the name of the joint",
     ),
     Case(
         "24",
-        "a quaternion that is off by 1 % is refused",
+        "a quaternion with a norm off by 1 % is refused",
         naive_quaternion,
         refused_quaternion,
-        "refused by name, at the door",
+        "refused with the name of the joint",
     ),
     Case(
         "25",
@@ -215,4 +215,4 @@ CASES = (
 @pytest.mark.parametrize("case", parameters(CASES))
 def test_structure(case: Case) -> None:
     outcome = case.run()
-    assert outcome.passed, f"{outcome.shown}; the bar: {case.bar}"
+    assert outcome.passed, f"{outcome.shown}; the requirement: {case.requirement}"

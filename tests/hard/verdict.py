@@ -1,4 +1,4 @@
-"""What became of an input that somebody else made: refused, accepted, or a fault of ours."""
+"""The verdict on an untrusted input: refused, accepted, or a fault of the library."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from hovi.errors import HoviError
 
 Loaded = TypeVar("Loaded")
 
-LONGEST_SENTENCE = 1_500
+MAX_SENTENCE_LENGTH = 1_500
 
 
 class Verdict(StrEnum):
-    """Refused and accepted are as it should be; the others are faults."""
+    """The result of loading an input; all but refused and accepted are faults."""
 
     REFUSED = "refused"
     ACCEPTED = "accepted"
@@ -27,29 +27,29 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Mutant:
-    """An input.
+    """A mutated input.
 
     content: of the file.
-    poison: why it has to be refused; "" where nobody knows.
+    reason: why it must be refused; "" if unknown.
     """
 
     content: bytes
-    poison: str = ""
+    reason: str = ""
 
 
 def judge(
-    load: Callable[[], Loaded], objection: Callable[[Loaded], str], poison: str
+    load: Callable[[], Loaded], error_in: Callable[[Loaded], str], reason: str
 ) -> tuple[Verdict, str]:
-    """Load an input and say what became of it.
+    """Load an input; returns the verdict and a sentence.
 
-    load: what a user calls. objection: what is wrong with something that was loaded, or "".
-    poison: as in Mutant.
+    load: loads the input. error_in: the error in a loaded object, or "".
+    reason: see Mutant.
     """
     try:
-        problem = objection(load()) or poison
-    except HoviError as refused:
-        sentence = str(refused)
-        clear = 0 < len(sentence) <= LONGEST_SENTENCE and "\n" not in sentence
+        problem = error_in(load()) or reason
+    except HoviError as error:
+        sentence = str(error)
+        clear = 0 < len(sentence) <= MAX_SENTENCE_LENGTH and "\n" not in sentence
         return (Verdict.REFUSED if clear else Verdict.UNCLEAR), sentence
     except (Exception, RecursionError) as error:
         return Verdict.CRASH, f"{type(error).__name__}: {error}"

@@ -1,13 +1,13 @@
 """
-The machinery
-=============
+Planning step by step
+=====================
 
-`plan` is a chain of small objects, each of use by itself: a Lagrangian on accelerations, a
-grid with a scheme, the discrete Lagrangian, the boundary value problem, its solution.
+`plan` combines objects that can be used on their own: a Lagrangian of q, v and a, a grid with a
+scheme, the discrete Lagrangian, the boundary value problem, and its solution.
 """
 
 # %%
-# The Lagrangian of optimal control, L~ = 1/2 |tau(q, v, a)|^2, at a batch of points.
+# The Lagrangian of optimal control, L~ = 1/2 |tau(q, v, a)|^2.
 
 import sys
 import tempfile
@@ -25,14 +25,14 @@ scene = hovi.Scene(robot, effects=[hovi.effects.Gravity(9.8)])
 lagrangian = scene.effort_lagrangian()
 
 # %%
-# Sixteen intervals of equal length, each with two inner modes, and the action on them.
+# Sixteen equal intervals with two inner modes each, and the discrete Lagrangian on them.
 
 grid = hovi.Grid.uniform(1.0, 16, hovi.schemes.galerkin(inner_modes=2))
 ld = hovi.DiscreteLagrangian(lagrangian, grid)
 
 # %%
-# The discrete Euler-Lagrange equations with both ends given, solved by a trust-region Newton
-# method. It stops at minima only: the factorisation counts negative curvature on its way.
+# The discrete Euler-Lagrange equations with given start and goal, solved by a trust-region Newton
+# method. The factorisation gives the inertia of the Hessian, so it stops at minima only.
 
 reach = hovi.TrajectoryProblem(
     ld, start=hovi.State([-pi / 2, 0.0]), goal=hovi.State([0.3, 0.7], [0.5, -0.4])
@@ -42,8 +42,8 @@ print(solution.message)
 assert solution.success
 
 # %%
-# The momenta of the discrete motion are Pontryagin's costates. With p~ = dL/da, which is
-# M tau here, his Hamiltonian H = p v + p~ a - L is constant in time.
+# The momenta of the discrete motion are Pontryagin's costates. With p~ = dL/da = M tau, the
+# Hamiltonian H = p v + p~ a - L is constant in time.
 
 trajectory = solution.trajectory
 q, v, p = trajectory.q, trajectory.v, trajectory.momenta
@@ -63,8 +63,8 @@ print(f"H = {np.mean(hamiltonian):.5f}, spread {np.ptp(hamiltonian):.1e}")
 assert np.ptp(hamiltonian) < 1e-3
 
 # %%
-# A saddle. Holding the arm horizontal satisfies the equations exactly, and for ten seconds
-# that is far from the best: letting it swing and catching it is cheaper.
+# A saddle. Holding the arm horizontal satisfies the equations exactly, but for ten seconds it is
+# cheaper to let the arm swing and catch it.
 
 grid = hovi.Grid.uniform(10.0, 40, hovi.schemes.galerkin(inner_modes=2))
 hold = hovi.TrajectoryProblem(
