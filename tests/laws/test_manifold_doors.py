@@ -76,7 +76,7 @@ def test_limits_hold_where_joints_turn_without_end(kinova: Robot) -> None:
 def test_position_limits_are_for_joints_that_have_positions(kinova: Robot) -> None:
     limits = as_limits(kinova, {"base": "none", "q": {"j2s6s200_joint_2": [1.0, 2.0]}})
     np.testing.assert_array_equal(limits.lower[0, 1], 1.0)
-    with pytest.raises(InputError, match="'j2s6s200_joint_1' turns or moves freely"):
+    with pytest.raises(InputError, match="'j2s6s200_joint_1' has no position limits"):
         as_limits(kinova, {"q": {"j2s6s200_joint_1": [1.0, 2.0]}})
 
 

@@ -1,4 +1,4 @@
-"""Motions that keep their distance: the terms of the interior point, and whole plans."""
+"""Motions that keep a margin: the terms of the interior point, and whole plans."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hovi.schemes import galerkin
 Array = npt.NDArray[np.float64]
 HANG, REACH = [-np.pi / 2, 0.0], [0.3, 0.7]
 BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
-"""In the way of the arm's forearm between HANG and REACH."""
+"""Blocks the arm's forearm between HANG and REACH."""
 
 
 def problem(scene: hovi.Scene, *obstacles: Obstacle, intervals: int = 16) -> TrajectoryProblem:
@@ -75,8 +75,8 @@ def test_the_model_with_distances_is_that_of_linear_and_square_terms(
     np.testing.assert_allclose(dy, (up - down) / (2 * h), rtol=1e-4, atol=1e-5)
 
 
-def test_a_ball_in_the_way_is_passed_at_the_margin(arm_scene: hovi.Scene) -> None:
-    """At 10,000 samples; the motion leans on it, and costs more than the one through it."""
+def test_a_ball_on_the_path_is_passed_at_the_margin(arm_scene: hovi.Scene) -> None:
+    """At 10,000 samples; the bound is active, and the cost is higher than without the ball."""
     free = solve(problem(arm_scene))
     kept = problem(arm_scene, BALL)
     assert kept.clearance is not None
@@ -90,7 +90,7 @@ def test_a_ball_in_the_way_is_passed_at_the_margin(arm_scene: hovi.Scene) -> Non
     assert solution.trajectory.metadata["clearance"] == kept.clearance.to_dict()
 
 
-def test_an_obstacle_that_nothing_comes_near_changes_nothing(arm_scene: hovi.Scene) -> None:
+def test_a_distant_obstacle_changes_nothing(arm_scene: hovi.Scene) -> None:
     free = solve(problem(arm_scene))
     far = solve(problem(arm_scene, Sphere([-5.0, 3.0, 0.0], 0.3)))
     assert far.cost == pytest.approx(free.cost, rel=1e-9)
@@ -116,7 +116,7 @@ def test_approaches_are_those_of_dense_sampling(arm_scene: hovi.Scene) -> None:
         (Box([0.4, 0.4, 0.4], [2.0, 0, 1.2], name="box"), ("goal", "'box'", "overlap by")),
     ],
 )
-def test_an_end_that_is_too_near_is_infeasible_before_any_step(
+def test_an_end_within_the_margin_is_infeasible_before_any_step(
     arm_scene: hovi.Scene, obstacle: Obstacle, words: tuple[str, ...]
 ) -> None:
     solution = hovi.plan(arm_scene, HANG, REACH, 1.5, obstacles=[obstacle], margin=0.05)
@@ -127,8 +127,8 @@ def test_an_end_that_is_too_near_is_infeasible_before_any_step(
         assert word in solution.message
 
 
-def test_a_ball_that_bars_the_way_is_infeasible_and_named(arm_scene: hovi.Scene) -> None:
-    """The upper arm cannot pass it in its plane, whatever the forearm does."""
+def test_a_ball_that_cannot_be_passed_is_infeasible_and_named(arm_scene: hovi.Scene) -> None:
+    """The upper arm cannot pass it in its plane, for any motion of the forearm."""
     barred = problem(arm_scene, Sphere([0.49, 0.0, -0.41], 0.2, name="ball"))
     solution = solve(barred)
     assert solution.status is Status.INFEASIBLE

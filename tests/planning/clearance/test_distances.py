@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 from hovi.errors import ModelError
-from hovi.planning.clearance.clearance import SCALE, Clearance
+from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
@@ -60,7 +60,7 @@ def test_the_distance_to_a_floor_is_the_height(two_link: Robot) -> None:
 
 @pytest.mark.parametrize("obstacle", OBSTACLES, ids=lambda each: each.kind)
 def test_derivatives_are_those_of_finite_differences(panda: Robot, obstacle: Obstacle) -> None:
-    """Of meshes and boxes, apart and overlapping."""
+    """For meshes and boxes, separate and overlapping."""
     distances = Distances(panda, Clearance(obstacle))
     q = around([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7])
     d, jacobian = distances.expand(q)
@@ -106,14 +106,16 @@ def test_curvature_is_the_derivative_of_the_derivative(two_link: Robot) -> None:
     np.testing.assert_array_equal(curvature, curvature.transpose(0, 2, 1))
 
 
-def test_outputs_are_flat_beyond_their_reach_with_continuous_derivatives(two_link: Robot) -> None:
+def test_outputs_are_constant_beyond_the_cutoff_with_continuous_derivatives(
+    two_link: Robot,
+) -> None:
     outputs = ClearanceOutputs(Distances(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2))), 0.1)
     q = np.linspace([0.0, 0.0], [0.6, 0.6], 400)  # swings away from the ball
     y = outputs.values(q)[:, 2]
     d = outputs.distances.values(q)[:, 2]
-    near = d < 0.1 + SCALE
-    np.testing.assert_allclose(y[near], (d[near] - 0.1) / SCALE, atol=1e-12)
-    far = d > 0.1 + 3 * SCALE
+    near = d < 0.1 + DISTANCE_SCALE
+    np.testing.assert_allclose(y[near], (d[near] - 0.1) / DISTANCE_SCALE, atol=1e-12)
+    far = d > 0.1 + 3 * DISTANCE_SCALE
     assert near.any()
     assert far.any()
     assert np.ptp(y[far]) == 0.0
@@ -126,7 +128,7 @@ def test_outputs_are_flat_beyond_their_reach_with_continuous_derivatives(two_lin
     np.testing.assert_allclose(curvature, bend, atol=1e-2 * np.abs(bend).max())
 
 
-def test_results_do_not_depend_on_what_was_asked_before(panda: Robot) -> None:
+def test_results_do_not_depend_on_earlier_queries(panda: Robot) -> None:
     clearance = Clearance(OBSTACLES)
     q = around([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7], 6)
     used, new = Distances(panda, clearance), Distances(panda, clearance)
@@ -136,7 +138,7 @@ def test_results_do_not_depend_on_what_was_asked_before(panda: Robot) -> None:
     np.testing.assert_array_equal(used.expand(q)[1], new.expand(q)[1])
 
 
-def test_shapes_that_nothing_moves_are_not_held_against_obstacles(panda: Robot) -> None:
+def test_fixed_shapes_are_not_paired_with_obstacles(panda: Robot) -> None:
     distances = Distances(panda, Clearance(OBSTACLES[0]))
     links = {pair.link for pair in distances.pairs}
     assert "panda_link0" not in links

@@ -1,4 +1,4 @@
-"""Obstacles and clearance as values: what they hold, and what they refuse."""
+"""Obstacles and clearance as values: their fields, and the input that they refuse."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ def test_a_box_is_turned_as_in_a_urdf() -> None:
         (lambda: obstacle_from_dict({"kind": {"elbow": 1.0}}), "no obstacle of kind {"),
         (lambda: obstacle_from_dict({"kind": "box", "sise": 1}), "did you mean 'size'"),
         (lambda: obstacle_from_dict({"kind": "box", "size": [1, 1, 1]}), "needs `position`"),
-        (lambda: Clearance([ALL[0], ALL[0]]), "two obstacles are called 'ball'"),
-        (lambda: Clearance(["ball"]), "an obstacle is a hovi.Sphere"),
+        (lambda: Clearance([ALL[0], ALL[0]]), "two obstacles have the name 'ball'"),
+        (lambda: Clearance(["ball"]), "an obstacle must be a hovi.Sphere"),
         (lambda: Clearance(margin=-0.1), "a length of 0 or more"),
         (lambda: Clearance(margin="wide"), "a length of 0 or more"),
     ],
 )
-def test_what_makes_no_obstacle_is_refused_in_a_sentence(make: object, words: str) -> None:
+def test_an_invalid_obstacle_is_refused_in_one_sentence(make: object, words: str) -> None:
     with pytest.raises(InputError, match=words):
         make()  # type: ignore[operator]
 
@@ -70,6 +70,6 @@ def test_obstacles_without_names_are_numbered_and_come_back_from_json() -> None:
     assert (again.margin, again.self_collision) == (0.02, True)
 
 
-def test_one_obstacle_needs_no_brackets() -> None:
+def test_a_single_obstacle_needs_no_list() -> None:
     assert Clearance(ALL[0]).obstacles == (ALL[0],)
     assert not Clearance().wanted

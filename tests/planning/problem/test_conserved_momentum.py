@@ -1,4 +1,4 @@
-"""Robots in free fall: their base carries no torque, and what that keeps is kept."""
+"""Robots in free fall: a passive base conserves its momenta."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def reorientation(intervals: int, modes: int = 1) -> hovi.Solution:
 
 
 def momentum_map(solution: hovi.Solution) -> np.ndarray:
-    """J = Ad*_{q^-1} p of the base at every node: force and moment of p in the world's frame."""
+    """J = Ad*_{q^-1} p of the base at every node: linear and angular momentum in the world."""
     rows = []
     for q, (p, _) in zip(solution.trajectory.q, solution.trajectory.momenta, strict=True):
         base = pin.XYZQUATToSE3(q[:7])
@@ -50,7 +50,7 @@ def test_the_spacecraft_ends_turned_and_its_place_follows() -> None:
 
 
 def test_the_six_momenta_of_the_action_are_equal_at_every_node() -> None:
-    """Discrete Noether, the multipliers of the base included; the goal fixes how it is turned."""
+    """Discrete Noether theorem with the base's multipliers; the goal fixes its orientation."""
     J = momentum_map(reorientation(8))
     size = np.max(np.abs(J))
     assert size > 1e-3
@@ -58,7 +58,7 @@ def test_the_six_momenta_of_the_action_are_equal_at_every_node() -> None:
 
 
 def test_the_mechanical_momentum_drifts_by_the_order_of_the_scheme() -> None:
-    """A motion that keeps its equations at the points only keeps momentum up to quadrature."""
+    """Equations that hold at quadrature points conserve momentum up to the quadrature error."""
     model = spacecraft().scene.model
     drifts = []
     grids = [16, 32, 64]
@@ -87,7 +87,7 @@ def test_the_center_of_mass_of_a_falling_quadruped_moves_on_a_parabola() -> None
 
 
 def contradiction(**changes: object) -> str:
-    """What is said of the reorientation with another goal."""
+    """The message for the reorientation with another goal."""
     task = spacecraft()
     goal = dataclasses.replace(task.goal, **changes)
     solution = hovi.plan(task.scene, task.start, goal, task.duration, limits="none")
@@ -117,7 +117,7 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
 
 
 def test_a_redundant_goal_is_met() -> None:
-    """Everything is fixed, in agreement with what free fall keeps."""
+    """All components are prescribed, consistently with free fall."""
     free = reorientation(16)
     end, problem = free.trajectory.q[-1], free.problem
     again = hovi.solve(problem.between(problem.start, hovi.State(end)), free.trajectory)
@@ -127,7 +127,7 @@ def test_a_redundant_goal_is_met() -> None:
 
 
 def test_friction_on_the_base_is_no_free_fall() -> None:
-    """One coefficient for every coordinate brakes the base as well; those of the arm do not."""
+    """One coefficient for all coordinates also brakes the base; coefficients of the arm do not."""
     task = spacecraft()
     robot, passive = task.scene.robot, task.scene.passive
     everywhere = hovi.Scene(robot, [hovi.effects.ViscousFriction(0.1)], passive=passive)

@@ -1,4 +1,4 @@
-"""Limits that no motion can meet are named before anything is solved."""
+"""Infeasible limits are reported before any solve."""
 
 from __future__ import annotations
 

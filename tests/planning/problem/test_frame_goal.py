@@ -1,4 +1,4 @@
-"""Goals of frames: the equations, and configurations that meet them."""
+"""Task-space goals: their equations, and inverse kinematics."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_inverse_kinematics_meets_every_kind_of_goal(panda: Robot, ur5: Robot, k
 
 
 def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
-    """Kinova has joints whose configurations are (cos, sin); a frame goal and a joint goal."""
+    """For joints with configurations (cos, sin); a frame goal and a joint goal."""
     robot = hovi.load_robot("kinova")
     random = np.random.default_rng(3)
     q = robot.integrate(robot.neutral(), random.uniform(-1, 1, robot.nv))
@@ -101,7 +101,7 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
         np.testing.assert_allclose(curvature, slope, atol=1e-6)
 
 
-def test_a_goal_out_of_reach_is_told_with_what_is_missing(ur5: Robot) -> None:
+def test_a_goal_out_of_reach_is_reported_with_its_distance(ur5: Robot) -> None:
     reached = inverse_kinematics(ur5, FrameGoal("tool0", position=[3.0, 0, 0]), ur5.neutral())
     assert "frame 'tool0' misses it by" in reached.reason
     missing = float(reached.reason.split("misses it by ")[1].split(" m")[0])
@@ -111,13 +111,13 @@ def test_a_goal_out_of_reach_is_told_with_what_is_missing(ur5: Robot) -> None:
 
 
 def test_half_a_turn_away_does_not_count_as_met(ur5: Robot) -> None:
-    """There the sines of the turn vanish as well."""
+    """The sines of the rotation error vanish there, too."""
     pose = placement(ur5, "tool0", np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2]))
     turned = pose.rotation @ np.diag([1.0, -1.0, -1.0])
     condition = FrameGoal("tool0", rotation=turned).condition(ur5)
     q = np.array([0.3, -1.0, 1.2, -0.4, 0.5, 0.2])
     assert np.max(np.abs(condition.evaluate(q, np.zeros(6))[0])) < 1e-12
-    assert condition.missed(q)[1] == pytest.approx(np.pi)
+    assert condition.pose_error(q)[1] == pytest.approx(np.pi)
 
 
 def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
@@ -127,7 +127,7 @@ def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
         ({"position": [0, 0, np.nan]}, "three finite numbers"),
         ({"rotation": 2 * np.eye(3)}, "orthonormal"),
         ({"rotation": -np.eye(3)}, "reflection"),
-        ({"axis": ([0, 0, 0], [0, 0, 1])}, "no length"),
+        ({"axis": ([0, 0, 0], [0, 0, 1])}, "has length zero"),
         ({"pose": np.eye(4), "position": [0, 0, 0]}, "not both"),
         ({"rotation": np.eye(3), "axis": ([0, 0, 1], [0, 0, 1])}, "not both"),
         ({"pose": np.eye(3)}, r"\(4, 4\)"),

@@ -1,4 +1,4 @@
-"""A frame's goal inside an obstacle is refused before anything is solved, and no other is."""
+"""Task-space goals inside obstacles, and no others, are infeasible before any solve."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def placed(robot: Robot, q: np.ndarray) -> pin.SE3:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_a_pose_tells_the_distances_of_its_link_and_a_position_a_bound(
+def test_a_pose_gives_the_distances_of_its_link_and_a_position_a_bound(
     seed: int, ur5: Robot, distances: Distances
 ) -> None:
     q = np.random.default_rng(seed).uniform(-2.5, 2.5, 6)
@@ -71,4 +71,4 @@ def test_a_goal_in_a_ball_is_infeasible_at_once(
     found = hovi.plan(scene, START, duration=2.0, obstacles=OBSTACLES[:1], limits="none", **ends)
     assert (found.status, found.nit) == (Status.INFEASIBLE, 0)
     assert f"with frame 'tool0' at the {what}, link 'wrist_3_link' and obstacle" in found.message
-    assert "'ball' overlap by 0.0495 m, or are even nearer" in found.message
+    assert "'ball' overlap by 0.0495 m or come closer" in found.message

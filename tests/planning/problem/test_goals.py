@@ -1,4 +1,4 @@
-"""Motions to goals of frames, with free components, and through via points."""
+"""Motions to task-space goals, with free components, and through via points."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def placement(robot: Robot, frame: str, q: np.ndarray) -> pin.SE3:
 
 
 def at_goal(task: hovi.Task, frame: str) -> pin.SE3:
-    """The pose of a frame where the task's own goal puts it."""
+    """The pose of a frame at the task's own goal."""
     return placement(task.scene.robot, frame, np.array(task.goal.q))
 
 
@@ -129,8 +129,8 @@ def test_unreachable_goals_and_via_points_are_infeasible_with_the_reason() -> No
     assert "that reaches the via point at 1 s was found" in solution.message
 
 
-def test_planning_again_to_a_turned_goal_turns_the_hand() -> None:
-    """Half a turn away the equations of the new goal hold where the old motion ends."""
+def test_replanning_to_a_goal_turned_by_half_a_turn_turns_the_hand() -> None:
+    """At half a turn the equations of the new goal hold at the old motion's end."""
     task = hovi.load_task(hovi.example("ur5_reach"))
     pose = at_goal(task, "tool0")
     goal = hovi.FrameGoal("tool0", pose)
@@ -142,7 +142,7 @@ def test_planning_again_to_a_turned_goal_turns_the_hand() -> None:
     assert np.linalg.norm(pin.log3(end.rotation.T @ turned)) < 1e-9
     stuck = hovi.solve(again.problem, first.trajectory)
     assert stuck.status is hovi.Status.INFEASIBLE
-    assert "turned over" in stuck.message
+    assert "half a turn away from its goal" in stuck.message
 
 
 def test_two_via_points_may_share_a_time(arm_scene: hovi.Scene) -> None:
@@ -166,11 +166,11 @@ def test_bad_goals_and_via_points_are_refused() -> None:
         hovi.plan(scene, start, goal, 1.0, via=[hovi.Via(1.5, goal)])
     with pytest.raises(InputError, match="must be positive"):
         hovi.Via(-1.0, goal)
-    with pytest.raises(InputError, match=r"a hovi.State.q. or a hovi.FrameGoal"):
+    with pytest.raises(InputError, match=r"must be a hovi.State.q. or a hovi.FrameGoal"):
         hovi.Via(1.0, [0.0] * 6)  # type: ignore[arg-type]
 
 
-def test_goals_travel_through_scene_files(tmp_path, models) -> None:
+def test_goals_survive_scene_files(tmp_path, models) -> None:
     text = (models / "ur5_reach.toml").read_text()
     head, rest = text.split("[goal]")[0], text.split("[scheme]")[1]
     goal = """[goal]
@@ -240,7 +240,7 @@ def test_a_bad_via_point_is_named_by_its_number_and_line(tmp_path, models) -> No
         ),
     ],
 )
-def test_a_slip_in_a_via_point_has_its_line_and_a_hint(
+def test_a_mistake_in_a_via_point_is_reported_with_its_line_and_a_hint(
     tmp_path, models, wrong: str, place: int, sentence: str
 ) -> None:
     head = (models / "ur5_reach.toml").read_text() + "\n"

@@ -1,4 +1,4 @@
-"""Extremes of a motion between its points, against dense sampling."""
+"""Extremes of a motion between its quadrature points, against dense sampling."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_extremes_are_those_of_dense_sampling(motion: Trajectory, two_link: Robo
         assert (found <= dense + 1e-7).all()
 
 
-def test_closeness_is_the_least_room_of_the_whole_motion(
+def test_closeness_is_the_smallest_distance_from_the_bounds(
     motion: Trajectory, two_link: Robot
 ) -> None:
     limits = as_limits(two_link, LIMITS)

@@ -1,4 +1,4 @@
-"""Limits: from words, mappings and the URDF; bad input speaks in a sentence."""
+"""Limits from names, mappings and the URDF; bad input is refused in one sentence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hovi.planning.problem.limits import Limits, as_limits, no_limits
 from hovi.robot.robot import Robot
 
 
-def test_words_choose_the_urdf_or_nothing(ur5: Robot) -> None:
+def test_a_name_selects_the_limits_of_the_urdf_or_none(ur5: Robot) -> None:
     urdf = as_limits(ur5, "urdf")
     np.testing.assert_array_equal(urdf.upper[1], ur5.velocity_limit)
     np.testing.assert_array_equal(urdf.upper[3], ur5.effort_limit)
@@ -70,16 +70,16 @@ def test_bad_limits_are_refused_in_one_sentence(two_link: Robot, bad: Any) -> No
     assert str(caught.value).count("\n") == 0
 
 
-def test_bounds_beyond_all_measure_are_none(two_link: Robot) -> None:
+def test_huge_bounds_count_as_none(two_link: Robot) -> None:
     limits = as_limits(two_link, {"base": "none", "q": {"elbow": [0.0, 1e308]}, "tau": 1e200})
     assert np.isinf(limits.upper).all()
     assert list(limits.lower[0]) == [-np.inf, 0.0]
     assert np.isinf(limits.lower[3]).all()
 
 
-def test_limits_that_leave_no_room_are_refused(two_link: Robot) -> None:
+def test_empty_ranges_are_refused(two_link: Robot) -> None:
     free = no_limits(two_link)
-    with pytest.raises(InputError, match="leave no room"):
+    with pytest.raises(InputError, match="range of joint coordinate 0 is empty"):
         Limits(np.zeros((4, 2)), np.zeros((4, 2)))
     with pytest.raises(InputError, match="not a number"):
         Limits(np.full((4, 2), np.nan), free.upper)

@@ -1,4 +1,4 @@
-"""What can be planned, and the sentences for what cannot."""
+"""Valid trajectory problems, and the error messages of invalid ones."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_on_another_grid_it_is_the_problem_that_would_be_built_there(two_link: R
         first.on(Grid(steps, (by_name("mean-difference"),) * 3))
 
 
-def test_the_ends_do_not_change_behind_ones_back(two_link: Robot) -> None:
+def test_the_ends_are_copies_of_the_callers_arrays(two_link: Robot) -> None:
     q = np.array([1.0, 2.0])
     found = problem(two_link, State(q))
     q[:] = 9.0
@@ -106,7 +106,7 @@ def test_one_irregular_interval_is_enough_to_refuse(two_link: Robot) -> None:
         TrajectoryProblem(DiscreteLagrangian(L, Grid(np.ones(3), schemes)), REST, REST)
 
 
-def test_a_joint_that_follows_half_a_turn_is_named_with_the_cure() -> None:
+def test_a_mimic_joint_with_a_multiplier_on_a_turn_is_named_with_the_remedy() -> None:
     robot = load_robot(half_turning())
     start = State(robot.neutral())
     with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimics.*lock one"):

@@ -1,4 +1,4 @@
-"""Tolerances in the units that a person has."""
+"""Tolerances from numbers and texts, and the sentences about them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Tolerance
 from hovi.robot.robot import Robot
 
-SAID = [
+VALID = [
     (1e-6, Quantity.COST, 1e-6, None),
     ("1e-6", Quantity.COST, 1e-6, None),
     (" 0.1 % ", Quantity.COST, 1e-3, None),
@@ -25,10 +25,10 @@ SAID = [
 REFUSED = [
     ("1 mmm", "unit 'mmm': did you mean 'mm'"),
     ("1 parsec", "unit 'parsec'"),
-    ("mm", "a tolerance is a number"),
-    ("1.2.3 mm", "a tolerance is a number"),
-    ("", "a tolerance is a number"),
-    ("-1e-3", "a tolerance is a number"),
+    ("mm", "a tolerance must be a number"),
+    ("1.2.3 mm", "a tolerance must be a number"),
+    ("", "a tolerance must be a number"),
+    ("-1e-3", "a tolerance must be a number"),
     ("1 deg at tool0", "only a length"),
     ("1e-6 at tool0", "only a length"),
     ("1 mm at tol0", "no such frame; did you mean 'tool0'"),
@@ -36,28 +36,28 @@ REFUSED = [
     (-1e-6, "positive and finite"),
     (float("nan"), "positive and finite"),
     (float("inf"), "positive and finite"),
-    (True, "a tolerance is a number"),
-    (None, "a tolerance is a number"),
-    ([1e-6], "a tolerance is a number"),
+    (True, "a tolerance must be a number"),
+    (None, "a tolerance must be a number"),
+    ([1e-6], "a tolerance must be a number"),
 ]
 
 
-@pytest.mark.parametrize(("said", "quantity", "size", "frame"), SAID)
-def test_what_a_person_says(
-    ur5: Robot, said: float | str, quantity: Quantity, size: float, frame: str | None
+@pytest.mark.parametrize(("given", "quantity", "size", "frame"), VALID)
+def test_a_number_or_a_text_becomes_a_tolerance(
+    ur5: Robot, given: float | str, quantity: Quantity, size: float, frame: str | None
 ) -> None:
-    understood = Tolerance.of(said, ur5)
-    assert (understood.quantity, understood.frame) == (quantity, frame)
-    assert understood.size == pytest.approx(size, rel=1e-14)
-    assert Tolerance.of(understood, ur5) == understood
+    tolerance = Tolerance.of(given, ur5)
+    assert (tolerance.quantity, tolerance.frame) == (quantity, frame)
+    assert tolerance.size == pytest.approx(size, rel=1e-14)
+    assert Tolerance.of(tolerance, ur5) == tolerance
 
 
-@pytest.mark.parametrize(("said", "sentence"), REFUSED)
-def test_what_makes_no_tolerance_is_refused_in_a_sentence(
-    ur5: Robot, said: object, sentence: str
+@pytest.mark.parametrize(("given", "sentence"), REFUSED)
+def test_an_invalid_tolerance_is_refused_in_one_sentence(
+    ur5: Robot, given: object, sentence: str
 ) -> None:
     with pytest.raises(InputError, match=sentence):
-        Tolerance.of(said, ur5)  # type: ignore[arg-type]
+        Tolerance.of(given, ur5)  # type: ignore[arg-type]
 
 
 def test_each_quantity_is_measured_by_its_own_number() -> None:
@@ -80,17 +80,17 @@ def test_each_quantity_is_measured_by_its_own_number() -> None:
 def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
     wanted = Tolerance(1e-4, Quantity.FRAME, "tool0")
     assert str(Accuracy(wanted, 2e-5, True, "")) == (
-        "estimated error 0.02 mm at tool0, 0.1 mm at tool0 asked for."
+        "estimated error 0.02 mm at tool0, tolerance 0.1 mm at tool0."
     )
     assert str(Accuracy(wanted, 2e-4, False, "the time limit was reached")) == (
-        "stopped early: the time limit was reached; estimated error 0.2 mm at tool0, 0.1 mm at "
-        "tool0 asked for."
+        "stopped early: the time limit was reached; estimated error 0.2 mm at tool0, tolerance "
+        "0.1 mm at tool0."
     )
-    assert "nothing was estimated" in str(Accuracy(wanted, np.nan, False, "no minimum was found"))
+    assert "no error was estimated" in str(Accuracy(wanted, np.nan, False, "no minimum was found"))
 
 
 @pytest.mark.parametrize(
-    ("said", "words"),
+    ("given", "words"),
     [
         (1e-6, "1e-06 of the cost"),
         ("0.1 %", "0.1 % of the cost"),
@@ -100,8 +100,8 @@ def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
         ("2 um at tool0", "2 um at tool0"),
     ],
 )
-def test_errors_are_stated_in_the_unit_that_was_asked_for(
-    ur5: Robot, said: float | str, words: str
+def test_errors_are_stated_in_the_unit_of_the_tolerance(
+    ur5: Robot, given: float | str, words: str
 ) -> None:
-    understood = Tolerance.of(Tolerance.of(said, ur5), ur5)
-    assert understood.in_words(understood.size) == words
+    tolerance = Tolerance.of(Tolerance.of(given, ur5), ur5)
+    assert tolerance.in_words(tolerance.size) == words

@@ -1,4 +1,4 @@
-"""Numbers with a unit mean the same wherever they are said."""
+"""Durations and times are parsed with their units, or refused in one sentence."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hovi.planning.problem.values import as_duration, number_and_unit, seconds
 
 
 @pytest.mark.parametrize(
-    ("said", "meant"),
+    ("given", "expected"),
     [
         ("2 s", 2.0),
         ("500 ms", 0.5),
@@ -24,30 +24,30 @@ from hovi.planning.problem.values import as_duration, number_and_unit, seconds
         (np.float32(0.5), 0.5),
     ],
 )
-def test_a_time_is_a_number_of_seconds_or_has_a_unit(said: Any, meant: float) -> None:
-    assert seconds(said, "it") == meant
-    assert as_duration(said) == meant
-    assert as_duration((said, "3 h")) == (meant, 10800.0)
+def test_a_time_is_a_number_of_seconds_or_has_a_unit(given: Any, expected: float) -> None:
+    assert seconds(given, "it") == expected
+    assert as_duration(given) == expected
+    assert as_duration((given, "3 h")) == (expected, 10800.0)
 
 
 @pytest.mark.parametrize(
-    ("said", "sentence"),
+    ("given", "sentence"),
     [
         ("2 sec", "it '2 sec' has the unit 'sec': did you mean 's'"),
         ("2 mm", "it '2 mm' has the unit 'mm': did you mean 'ms'"),
-        ("2", "it '2' has no unit: say '2 s'"),
-        ("soon", "it is a number of seconds or a text such as '2 s'.*got 'soon'"),
-        ("", "it is a number of seconds"),
-        ("-2 s", "it is a number of seconds"),
-        ("1.2.3 s", "it is a number of seconds"),
-        ("2 s 3", "it is a number of seconds"),
-        (None, "it is a number of seconds.*got None"),
-        ([2.0], "it is a number of seconds"),
+        ("2", "it '2' has no unit: write '2 s'"),
+        ("soon", "it must be a number of seconds or a text such as '2 s'.*got 'soon'"),
+        ("", "it must be a number of seconds"),
+        ("-2 s", "it must be a number of seconds"),
+        ("1.2.3 s", "it must be a number of seconds"),
+        ("2 s 3", "it must be a number of seconds"),
+        (None, "it must be a number of seconds.*got None"),
+        ([2.0], "it must be a number of seconds"),
     ],
 )
-def test_a_time_that_is_none_is_refused_in_a_sentence(said: Any, sentence: str) -> None:
+def test_an_invalid_time_is_refused_in_one_sentence(given: Any, sentence: str) -> None:
     with pytest.raises(InputError, match=sentence):
-        seconds(said, "it")
+        seconds(given, "it")
 
 
 @pytest.mark.parametrize("given", [(), (1.0,), (1.0, 2.0, 3.0), None, object()])
@@ -60,4 +60,4 @@ def test_a_duration_is_one_number_or_two(given: Any) -> None:
 def test_the_time_to_read_a_text_grows_with_its_length_alone(text: str) -> None:
     began = time.process_time()
     number_and_unit(text)
-    assert time.process_time() - began < 60.0  # a square would take hours
+    assert time.process_time() - began < 60.0  # quadratic time would take hours

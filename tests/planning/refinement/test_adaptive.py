@@ -176,7 +176,7 @@ def test_no_error_is_claimed_for_what_is_no_minimum(arm_scene: Scene) -> None:
     assert found.status is Status.ITERATION_LIMIT
     assert found.error_estimate is None
     assert not accuracy_of(found).reached
-    assert "nothing was estimated" in found.message
+    assert "no error was estimated" in found.message
 
 
 def test_standing_still_is_exact(arm_scene: Scene) -> None:

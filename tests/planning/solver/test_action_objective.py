@@ -1,4 +1,4 @@
-"""The discrete action as an objective: band and tree are one model, on every grid."""
+"""The discrete action as an objective: band and tree give the same model on every grid."""
 
 from __future__ import annotations
 
@@ -52,12 +52,12 @@ def objective(
 
 
 def coordinates(path: DiscretePath) -> Array:
-    """Everything that may move: inner nodes and inner modes."""
+    """The unknowns: inner nodes and inner modes."""
     return np.concatenate([path.q[1:-1].ravel(), path.v[1:-1].ravel(), path.inner.ravel()])
 
 
 def path_at(grid: Grid, scene: Scene, origin: DiscretePath, x: Array) -> DiscretePath:
-    """The path with other coordinates, z worked out from the nodes."""
+    """The path with other coordinates, z computed from the nodes."""
     q, v = origin.q.copy(), origin.v.copy()
     nodes = q[1:-1].size
     q[1:-1], v[1:-1] = (x[i * nodes : (i + 1) * nodes].reshape(-1, 2) for i in (0, 1))
@@ -73,7 +73,7 @@ def assert_consistent(scene: Scene, grid: Grid, path: DiscretePath) -> None:
 
 
 def definite_shift(model: object) -> float:
-    """A shift at which H + shift D has a factor."""
+    """A shift for which H + shift D is positive definite."""
     shift = 0.0
     while model.factor(shift) is None:  # type: ignore[attr-defined]
         shift = max(10 * shift, 1e-6)
@@ -201,9 +201,7 @@ def test_every_inner_node_and_every_mode_is_one_unknown(grid: Grid) -> None:
     np.testing.assert_array_equal(np.unique(numbers), np.arange(layout.size))
 
 
-def test_the_exact_model_counts_the_same_inertia_in_any_algebra(
-    arm_scene: Scene, grid: Grid
-) -> None:
+def test_the_exact_model_has_the_same_inertia_in_any_algebra(arm_scene: Scene, grid: Grid) -> None:
     path = random_path(grid, 2, seed=7)
     counts = {
         objective(arm_scene, grid, path, algebra).negative_eigenvalues(path) for algebra in ALGEBRAS

@@ -1,4 +1,4 @@
-"""The solver takes any Lagrangian: here one without outputs, |a|^2 on a robot's joints."""
+"""The solver accepts any Lagrangian: here one without outputs, |a|^2 of a robot's joints."""
 
 from __future__ import annotations
 
@@ -87,5 +87,7 @@ def test_velocities_are_limited_without_any_torque(arm_scene: Scene) -> None:
 
 
 def test_limits_on_torques_need_torques(arm_scene: Scene) -> None:
-    with pytest.raises(InputError, match="limits on tau need a Lagrangian of torques"):
+    with pytest.raises(
+        InputError, match="limits on tau need a Lagrangian whose outputs are torques"
+    ):
         solved(arm_scene, {"base": "none", "tau": 5.0})

@@ -1,4 +1,4 @@
-"""The pointwise terms of limits, against finite differences of what they stand for."""
+"""The pointwise terms of limits, against finite differences."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LIMITS = {"base": "none", "q": [[-4.0, 4.0], [-3.0, 3.0]], "v": 7.0, "tau": [9.0
 
 @pytest.fixture(params=["band", "tree"])
 def limited(request: pytest.FixtureRequest, arm_scene: Scene) -> BoundedAction:
-    """The reach of the arm on four intervals of unequal length, limited in q, v and tau."""
+    """The reach of the arm on four intervals of unequal lengths, with limits on q, v and tau."""
     algebra: LinearAlgebra = request.param
     grid = Grid(np.array([0.3, 0.2, 0.1, 0.4]), (galerkin(1),) * 4)
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
@@ -80,7 +80,7 @@ def test_linear_outputs_are_first_order_changes(limited: BoundedAction) -> None:
     assert slope == pytest.approx((up.value - down.value) / (2 * h), rel=1e-6)
 
 
-def test_margins_draw_the_bounds_of_their_interval_in(arm_scene: Scene) -> None:
+def test_margins_tighten_the_bounds_of_their_interval(arm_scene: Scene) -> None:
     grid = Grid.uniform(1.0, 3, galerkin(0))
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     problem = TrajectoryProblem(ld, State([0.0, 0.0]), State([0.3, 0.7]))

@@ -1,4 +1,4 @@
-"""solve: minima against independent solvers, saddles by name, and no false success."""
+"""solve: minima against independent solvers, saddles reported as such, no false success."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def reach(arm_scene: Scene) -> Solution:
 
 @pytest.fixture(scope="module")
 def saddle(arm_scene: Scene) -> DiscretePath:
-    """Where full Newton steps from the cubic lead."""
+    """The stationary path that full Newton steps from the cubic reach."""
     return newton(problem_on(arm_scene))
 
 
@@ -76,7 +76,7 @@ def newton(problem: TrajectoryProblem) -> DiscretePath:
 
 
 def assert_fits(problem: TrajectoryProblem, solution: Solution) -> None:
-    """The motion meets its ends to the last bit, and q, v and z are of one motion."""
+    """The motion meets its ends to the last bit, and q, v and z are consistent."""
     path = solution.trajectory.path
     q0, v0, q1, v1 = problem.boundary
     for found, end in zip((path.q[0], path.v[0], path.q[-1], path.v[-1]), (q0, v0, q1, v1)):  # noqa: B905
@@ -98,10 +98,10 @@ def assert_stationary(problem: TrajectoryProblem, solution: Solution, tolerance:
     np.testing.assert_allclose(gradient[:, 4:] / scale, 0.0, rtol=0, atol=tolerance)
 
 
-# The reach, against solvers that share nothing with this one
+# The reach, against independent solvers
 
 
-def test_the_reach_is_the_minimum_that_is_known(arm_scene: Scene, reach: Solution) -> None:
+def test_the_reach_is_the_known_minimum(arm_scene: Scene, reach: Solution) -> None:
     problem = problem_on(arm_scene)
     assert reach.success
     assert reach.status is Status.MINIMUM
@@ -188,7 +188,7 @@ def test_momenta_are_the_derivatives_of_the_least_cost(arm_scene: Scene) -> None
 
 
 def test_nodes_and_momenta_do_not_depend_on_the_algebra(arm_scene: Scene) -> None:
-    # more than a thousand intervals are merged in pairs; fewer are one banded matrix
+    # more than a thousand intervals are merged in pairs, fewer use a banded matrix
     few, many = (
         solve(problem_on(arm_scene, intervals=N, scheme="galerkin-1")) for N in (505, 1010)
     )
@@ -220,7 +220,7 @@ def test_a_grid_of_unequal_steps_has_the_same_minimum(arm_scene: Scene, kind: st
     assert solution.cost == pytest.approx(REACH_COST, rel=1e-6)
 
 
-def test_intervals_of_different_schemes_make_one_motion(arm_scene: Scene) -> None:
+def test_intervals_of_different_schemes_are_solved_together(arm_scene: Scene) -> None:
     names = ["galerkin-2", "galerkin-3", "galerkin-1", "galerkin-4"] * 8
     grid = Grid(np.full(32, 1 / 32), tuple(by_name(name) for name in names))
     problem = problem_on(arm_scene, grid=grid)
@@ -234,7 +234,7 @@ def test_intervals_of_different_schemes_make_one_motion(arm_scene: Scene) -> Non
     "scheme", ["taylor-midpoint", "hermite-simpson", "galerkin-0", "galerkin-3"]
 )
 @pytest.mark.parametrize("intervals", [1, 2, 3])
-def test_few_intervals_are_no_special_case(arm_scene: Scene, scheme: str, intervals: int) -> None:
+def test_a_few_intervals_suffice(arm_scene: Scene, scheme: str, intervals: int) -> None:
     problem = problem_on(arm_scene, intervals=intervals, scheme=scheme)
     solution = solve(problem)
     assert solution.status is Status.MINIMUM
@@ -259,7 +259,9 @@ def test_newton_from_the_cubic_leads_to_a_saddle(arm_scene: Scene, saddle: Discr
     assert_stationary(problem, solution, 1e-9)
 
 
-def test_the_saddle_is_left_unless_it_is_asked_for(arm_scene: Scene, saddle: DiscretePath) -> None:
+def test_the_saddle_is_left_unless_escape_saddles_is_false(
+    arm_scene: Scene, saddle: DiscretePath
+) -> None:
     problem = problem_on(arm_scene)
     solution = solve(problem, saddle)
     assert solution.status is Status.MINIMUM
@@ -296,7 +298,7 @@ def test_swing_ups_end_in_minima(arm_scene: Scene, duration: float) -> None:
     assert_stationary(problem, solution, 1e-8)
 
 
-def test_random_motions_are_minima_or_honest(two_link: Robot, pendulum: Robot) -> None:
+def test_random_motions_are_minima_or_report_failure(two_link: Robot, pendulum: Robot) -> None:
     for robot in (pendulum, two_link):
         scene = Scene(robot, [Gravity()])
         for seed in range(15):
@@ -365,7 +367,7 @@ def test_the_iteration_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert_fits(problem, stopped)
 
 
-def test_a_newton_step_more_would_change_nothing(arm_scene: Scene) -> None:
+def test_another_newton_step_changes_nothing(arm_scene: Scene) -> None:
     robot = load_robot("kinova")
     goal = robot.integrate(robot.neutral(), np.array([0.5, 0.3, -0.2, 2.0, 0.4, -1.0]))
     wound = State(goal, turns={"j2s6s200_joint_6": 1})
@@ -404,7 +406,7 @@ def test_an_interrupt_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert_fits(problem, stopped)
 
 
-def test_a_guess_without_a_finite_cost_is_diverged_and_says_where(arm_scene: Scene) -> None:
+def test_a_guess_of_infinite_cost_is_diverged_with_joint_and_time(arm_scene: Scene) -> None:
     problem = problem_on(arm_scene)
     path = guess_path(problem, "cubic")
     inner = path.inner.copy()
@@ -412,7 +414,7 @@ def test_a_guess_without_a_finite_cost_is_diverged_and_says_where(arm_scene: Sce
     with np.errstate(over="ignore", invalid="ignore"):
         solution = solve(problem, dataclasses.replace(path, inner=inner))
     assert (solution.success, solution.status) == (False, Status.DIVERGED)
-    assert "hand in another guess" in solution.message
+    assert "try another initial guess" in solution.message
     assert "the torque of joint 'shoulder' is nan at t = 0.09" in solution.message
     assert "(interval 3)" in solution.message
     inner[3, 1, 1] = np.inf
@@ -477,7 +479,7 @@ def test_a_path_between_other_ends_is_moved_to_them(arm_scene: Scene, reach: Sol
     assert_fits(problem, solution)
 
 
-def test_a_path_that_is_not_of_one_motion_is_refused(arm_scene: Scene, reach: Solution) -> None:
+def test_an_inconsistent_path_is_refused(arm_scene: Scene, reach: Solution) -> None:
     path = reach.trajectory.path
     with pytest.raises(InputError, match="guess's z is not that of its q and v"):
         solve(problem_on(arm_scene), dataclasses.replace(path, z=path.z + 1.0))
@@ -485,7 +487,7 @@ def test_a_path_that_is_not_of_one_motion_is_refused(arm_scene: Scene, reach: So
 
 def test_a_motion_of_another_robot_is_no_guess(pendulum: Robot, reach: Solution) -> None:
     problem = problem_on(Scene(pendulum), State([0.0]), State([1.0]))
-    with pytest.raises(InputError, match="moves 2 joints, robot 'pendulum' has 1"):
+    with pytest.raises(InputError, match="has 2 velocities, but robot 'pendulum' has 1"):
         solve(problem, reach.trajectory)
 
 
@@ -494,7 +496,7 @@ def test_an_unknown_guess_is_refused(arm_scene: Scene) -> None:
         solve(problem_on(arm_scene), "cubik")
 
 
-# The answer
+# The solution
 
 
 def test_the_same_input_gives_the_same_bytes(arm_scene: Scene) -> None:
@@ -507,7 +509,9 @@ def test_the_same_input_gives_the_same_bytes(arm_scene: Scene) -> None:
     assert runs[0].trajectory.momenta.tobytes() == runs[1].trajectory.momenta.tobytes()
 
 
-def test_the_motion_carries_what_belongs_to_it(arm_scene: Scene, reach: Solution) -> None:
+def test_the_trajectory_holds_its_momenta_scene_and_metadata(
+    arm_scene: Scene, reach: Solution
+) -> None:
     motion = reach.trajectory
     assert motion.scene is arm_scene
     expected = {"cost": reach.cost, "status": "minimum", "n_neg": 0}
@@ -569,11 +573,11 @@ def test_replanning_can_be_chained_from_configurations(reach: Solution) -> None:
 
 
 def test_a_solution_without_its_problem_cannot_replan(reach: Solution) -> None:
-    with pytest.raises(InputError, match="does not know its problem"):
+    with pytest.raises(InputError, match="has no problem"):
         dataclasses.replace(reach, problem=None).replan()
 
 
-def test_a_motion_follows_its_ends_to_first_order(arm_scene: Scene, reach: Solution) -> None:
+def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, reach: Solution) -> None:
     errors, sizes = [], np.array([0.08, 0.04, 0.02, 0.01])
     for size in sizes:
         problem = problem_on(arm_scene, START, State(REACH_Q + size, REACH_V - size))
@@ -585,9 +589,7 @@ def test_a_motion_follows_its_ends_to_first_order(arm_scene: Scene, reach: Solut
     assert order == pytest.approx(2.0, abs=0.3)
 
 
-def test_corrections_bring_a_motion_nearer_than_first_order(
-    arm_scene: Scene, reach: Solution
-) -> None:
+def test_corrections_improve_on_first_order(arm_scene: Scene, reach: Solution) -> None:
     problem = problem_on(arm_scene, START, State(REACH_Q + 0.05, REACH_V))
     truth = solve(problem, follow(reach.trajectory.path, problem)).trajectory
     errors = []

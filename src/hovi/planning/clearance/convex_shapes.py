@@ -1,4 +1,4 @@
-"""A robot's collision shapes as convex ones: primitives as they are, meshes as their hulls."""
+"""A robot's collision shapes as convex shapes: primitives unchanged, meshes by their hulls."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ _CONVEX = (
 def convex_geometry(robot: Robot) -> pin.GeometryModel:
     """The collision geometry with every mesh replaced by its convex hull; treat as read-only.
 
-    Raises ModelError for a robot without collision shapes, or some of whose shapes are missing:
-    what is not seen would not be kept clear.
+    Raises ModelError for a robot without collision shapes or with missing ones, whose distances
+    would be too large.
     """
     if robot.collision_problem:
         raise ModelError(
@@ -40,7 +40,7 @@ def convex_geometry(robot: Robot) -> pin.GeometryModel:
     given = robot.collision
     if given is None or given.ngeoms == 0:
         raise ModelError(
-            f"robot {robot.name!r} has no collision shapes, so no distances to obstacles: add "
+            f"robot {robot.name!r} has no collision shapes to compute distances from: add "
             "<collision> elements to its URDF."
         )
     convex = given.copy()
@@ -60,15 +60,15 @@ def _convex(item: pin.GeometryObject, robot: Robot) -> coal.CollisionGeometry:
             return hull
     raise ModelError(
         f"collision shape {item.name!r} of robot {robot.name!r} has no convex hull "
-        f"({type(shape).__name__}); give it volume, or a primitive."
+        f"({type(shape).__name__}); use a mesh with volume, or a primitive."
     )
 
 
 def _hull(vertices: Array) -> coal.ConvexBase | None:
-    """The convex hull of vertices (M, 3); None where they span no volume.
+    """The convex hull of vertices (M, 3); None if they span no volume.
 
-    SciPy finds the corners first, since Coal's own call crashes on flat shapes. It is imported
-    here, since that takes a quarter of a second, and few scenes ask for it.
+    SciPy computes the hull's vertices first, since Coal's own call crashes on flat shapes. It is
+    imported here because the import takes a quarter of a second and few scenes need it.
     """
     from scipy.spatial import ConvexHull, QhullError
 

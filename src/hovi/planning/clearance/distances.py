@@ -1,8 +1,8 @@
-"""Distances between a robot's links and obstacles, or each other, with their derivatives in q.
+"""Distances from a robot's links to obstacles and to each other, with their derivatives in q.
 
-Coal finds the two nearest points of two convex shapes, or where they overlap the way out that is
-shortest, by GJK and EPA: d = n . (w2 - w1), with n the unit normal from the first shape to the
-second, negative where they overlap. To first order the nearest points move with their shapes:
+Coal computes the nearest points of two convex shapes by GJK, or the penetration depth where they
+overlap by EPA: d = n . (w2 - w1), with n the unit normal from the first shape to the second;
+negative where they overlap. To first order the nearest points move with their shapes:
 d' = n^T (J_w2 - J_w1), exact wherever the pair of points is unique.
 """
 
@@ -25,20 +25,20 @@ from hovi.robot.srdf import checked_pairs
 
 Array = npt.NDArray[np.float64]
 
-EXACT = 1e-12
-"""Tolerance of GJK and EPA: derivatives of curved shapes need it."""
-MOST_STEPS = 1_000
-"""Of GJK and EPA; polyhedra take a dozen."""
-
-STEP = 1e-4
-"""Of the differences that give second derivatives, in [rad] or [m]."""
+GJK_TOLERANCE = 1e-12
+"""Tolerance of GJK and EPA; derivatives of curved shapes need one this small."""
+MAX_GJK_ITERATIONS = 1_000
+"""Maximum number of iterations of GJK and EPA; polyhedra take about a dozen."""
+DIFFERENCE_STEP = 1e-4
+"""Step of the finite differences for second derivatives, in [rad] or [m]."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two shapes whose distance counts.
+    """Two shapes whose distance is bounded.
 
-    link: the robot's. other: an obstacle's name, or another link's.
+    link: a link of the robot. other: name of an obstacle or of another link. obstacle: which of
+    the two.
     """
 
     link: str
@@ -46,24 +46,24 @@ class Pair:
     obstacle: bool
 
     def __str__(self) -> str:
-        """As messages call it."""
+        """The pair as messages name it."""
         what = "obstacle" if self.obstacle else "link"
         return f"link {self.link!r} and {what} {self.other!r}"
 
 
 class Distances:
-    """Signed distances of all pairs that a clearance is about.
+    """Signed distances of all pairs that a clearance bounds.
 
-    robot: with collision shapes; meshes count as their convex hulls. Shapes that no joint moves
-        are not held against obstacles.
-    pairs: which pairs, in the order of the columns of everything here.
+    robot: with collision shapes; meshes are replaced by their convex hulls. Shapes that no joint
+        moves are not paired with obstacles.
+    pairs: the K pairs, in the order of the columns of all results.
     Raises ModelError where shapes are missing, or nothing can collide.
     """
 
     def __init__(self, robot: Robot, clearance: Clearance) -> None:
         self.robot = robot
         convex = convex_geometry(robot)
-        geometry = convex.copy()  # whose own objects move in memory as it grows
+        geometry = convex.copy()  # adding obstacles moves the geometry's own objects in memory
         shapes = list(convex.geometryObjects)
         links = [str(robot.model.frames[shape.parentFrame].name) for shape in shapes]
         pairs: list[Pair] = []
@@ -79,20 +79,23 @@ class Distances:
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
                 pairs.append(Pair(links[i], links[j], False))
         if not pairs:
-            raise ModelError(f"no collision shape of robot {robot.name!r} can come near anything.")
+            raise ModelError(
+                f"robot {robot.name!r} has no pair of shapes that can collide: its collision "
+                "shapes are fixed in the world, or its SRDF disables every pair."
+            )
         self.pairs = tuple(pairs)
         self.geometry = geometry
         self._data = robot.model.createData()
-        self._blank = geometry.createData()
-        for request in self._blank.distanceRequests:
-            _sharpen(request)
-        self._forget()
-        self._moves = _moves(robot, geometry)
+        self._initial = geometry.createData()
+        for request in self._initial.distanceRequests:
+            _set_precision(request)
+        self._reset_solvers()
+        self._signs = _signs(robot, geometry)
         self._sums = column_sums(robot.model) if robot.couplings else None
 
     def values(self, q: Array) -> Array:
         """Signed distances at configurations (P, nq), shape (P, K), in [m]."""
-        self._forget()
+        self._reset_solvers()
         distances = np.empty((len(q), len(self.pairs)))
         for row, one in zip(distances, q, strict=True):
             self._measure(one)
@@ -102,54 +105,54 @@ class Distances:
     def expand(self, q: Array, reach: float = np.inf) -> tuple[Array, Array]:
         """Signed distances (P, K), in [m], and their derivatives in the tangent space, (P, K, nv).
 
-        reach: distance beyond which derivatives are left at zero, in [m].
+        reach: distance beyond which derivatives are not computed and left at zero, in [m].
         """
-        self._forget()
+        self._reset_solvers()
         distances = np.empty((len(q), len(self.pairs)))
         contacts = _Contacts.none(len(q), len(self.pairs), self.robot.model.nvExtended)
         for p, one in enumerate(q):
             self._measure(one)
             distances[p] = [result.min_distance for result in self._results]
-            self._read(contacts, p, np.flatnonzero(distances[p] < reach))
-        slopes = np.matmul(contacts.wrenches(), contacts.J) * self._moves
+            self._record(contacts, p, np.flatnonzero(distances[p] < reach))
+        slopes = np.matmul(contacts.wrenches(), contacts.J) * self._signs
         return distances, slopes if self._sums is None else slopes @ self._sums
 
     def curvature(self, q: Array, force: Array) -> Array:
         """sum_k force_k d''_k at configurations (P, nq), shape (P, nv, nv).
 
-        By differences of the first derivatives, since Coal has no second ones: they see how the
-        nearest points slide, and a step across a kink sees its angle.
-        force: shape (P, K); pairs whose force is zero are passed over.
+        By finite differences of the first derivatives, since Coal provides no second ones: they
+        include the sliding of the nearest points, and a kink within a step as its change of slope.
+        force: shape (P, K); pairs whose force is zero are skipped.
         """
         P, nv = len(q), self.robot.nv
-        pushed = np.flatnonzero(force.any(axis=1))
-        if len(pushed) == 0:
+        active = np.flatnonzero(force.any(axis=1))
+        if len(active) == 0:
             return np.zeros((P, nv, nv))
-        pairs = [np.flatnonzero(row) for row in force[pushed]]
-        steps = STEP * np.vstack([np.zeros(nv), np.eye(nv)])  # (1 + nv, nv)
+        pairs = [np.flatnonzero(row) for row in force[active]]
+        steps = DIFFERENCE_STEP * np.vstack([np.zeros(nv), np.eye(nv)])  # (1 + nv, nv)
         moved = self.robot.integrate(
-            np.repeat(q[pushed], 1 + nv, axis=0), np.tile(steps, (len(pushed), 1))
+            np.repeat(q[active], 1 + nv, axis=0), np.tile(steps, (len(active), 1))
         )
-        self._forget()
+        self._reset_solvers()
         contacts = _Contacts.none(len(moved), len(self.pairs), self.robot.model.nvExtended)
         for i, one in enumerate(moved):
             chosen = pairs[i // (1 + nv)]
             self._place(one)
             for k in chosen:
                 pin.computeDistance(self.geometry, self._places, int(k))
-            self._read(contacts, i, chosen)
-        pulls = np.repeat(force[pushed], 1 + nv, axis=0)[:, :, None] * self._moves
-        slopes = np.einsum("pka,paj,pkj->pj", contacts.wrenches(), contacts.J, pulls)
+            self._record(contacts, i, chosen)
+        weights = np.repeat(force[active], 1 + nv, axis=0)[:, :, None] * self._signs
+        slopes = np.einsum("pka,paj,pkj->pj", contacts.wrenches(), contacts.J, weights)
         slopes = slopes if self._sums is None else slopes @ self._sums
-        slopes = slopes.reshape(len(pushed), 1 + nv, nv)
-        rows = (slopes[:, 1:] - slopes[:, :1]) / STEP
+        slopes = slopes.reshape(len(active), 1 + nv, nv)
+        rows = (slopes[:, 1:] - slopes[:, :1]) / DIFFERENCE_STEP
         curvature = np.zeros((P, nv, nv))
-        curvature[pushed] = 0.5 * (rows + rows.transpose(0, 2, 1))
+        curvature[active] = 0.5 * (rows + rows.transpose(0, 2, 1))
         return curvature
 
-    def _forget(self) -> None:
-        """Coal's solvers remember where they ended, which shows in the last digit."""
-        self._places = self._blank.copy()
+    def _reset_solvers(self) -> None:
+        """Discard the warm starts of Coal's solvers, which change the last digit of results."""
+        self._places = self._initial.copy()
         self._results = list(self._places.distanceResults)
 
     def _measure(self, q: Array) -> None:
@@ -158,26 +161,26 @@ class Distances:
     def _place(self, q: Array) -> None:
         pin.updateGeometryPlacements(self.robot.model, self._data, self.geometry, self._places, q)
 
-    def _read(self, contacts: _Contacts, p: int, pairs: npt.NDArray[np.intp]) -> None:
-        """Keep the normals and nearest points of some pairs where they were measured last."""
+    def _record(self, contacts: _Contacts, p: int, pairs: npt.NDArray[np.intp]) -> None:
+        """Store Jacobian, normals and nearest points of some pairs after a distance computation."""
         if len(pairs) == 0:
             return
         contacts.J[p] = pin.computeJointJacobians(self.robot.model, self._data)
         results = [self._results[k] for k in pairs]
         normals = np.array([result.normal for result in results])
         points = np.array([result.getNearestPoint1() for result in results])
-        sound = np.abs(np.vecdot(normals, normals) - 1.0) < 1e-6
-        for i in np.flatnonzero(~(sound & np.isfinite(points).all(axis=1))):
+        valid = np.abs(np.vecdot(normals, normals) - 1.0) < 1e-6
+        for i in np.flatnonzero(~(valid & np.isfinite(points).all(axis=1))):
             normals[i], points[i] = self._between_centers(int(pairs[i]))
         contacts.normals[p, pairs], contacts.points[p, pairs] = normals, points
 
     def _between_centers(self, pair: int) -> tuple[Array, Array]:
-        """A normal for shapes that touch in a way that has none: from center to center."""
+        """Normal from center to center, for contacts where Coal returns none, and a point."""
         ends = self.geometry.collisionPairs[pair]
         first, second = (self._places.oMg[k].translation for k in (ends.first, ends.second))
-        way = np.asarray(second - first)
-        length = float(np.linalg.norm(way))
-        n = way / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+        offset = np.asarray(second - first)
+        length = float(np.linalg.norm(offset))
+        n = offset / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
         return n, np.asarray(first)
 
 
@@ -185,7 +188,7 @@ class Distances:
 class _Contacts:
     """Normals and nearest points of the first shapes, (P, K, 3), and joint Jacobians (P, 6, nv).
 
-    Columns for every joint, those that mimic others included.
+    The Jacobians have columns for every joint, mimic joints included.
     """
 
     normals: Array
@@ -194,7 +197,7 @@ class _Contacts:
 
     @classmethod
     def none(cls, points: int, pairs: int, nv: int) -> _Contacts:
-        """Nothing yet: pairs that are not read have no derivatives."""
+        """All zero: pairs that are not recorded have zero derivatives."""
         zero = np.zeros((points, pairs, 3))
         return cls(zero, zero.copy(), np.zeros((points, 6, nv)))
 
@@ -206,28 +209,28 @@ class _Contacts:
 
 @lru_cache(maxsize=16)
 def distances_between(robot: Robot, clearance: Clearance) -> Distances:
-    """The distances that a clearance of a robot is about, built once for both objects."""
+    """The distances that a clearance bounds for a robot, cached."""
     return Distances(robot, clearance)
 
 
-def _sharpen(request: coal.DistanceRequest) -> None:
-    """Exact results, whatever came before."""
+def _set_precision(request: coal.DistanceRequest) -> None:
+    """Tight tolerances, and an initial guess that does not depend on earlier queries."""
     request.gjk_initial_guess = coal.GJKInitialGuess.DefaultGuess
-    request.gjk_tolerance = request.epa_tolerance = EXACT
-    request.gjk_max_iterations = request.epa_max_iterations = MOST_STEPS
+    request.gjk_tolerance = request.epa_tolerance = GJK_TOLERANCE
+    request.gjk_max_iterations = request.epa_max_iterations = MAX_GJK_ITERATIONS
 
 
-def _moves(robot: Robot, geometry: pin.GeometryModel) -> Array:
-    """Which velocities move the second shape of each pair (1), the first (-1) or both, (K, nv).
+def _signs(robot: Robot, geometry: pin.GeometryModel) -> Array:
+    """Per pair, 1 for velocities that move its second shape only, -1 its first only, (K, nv).
 
-    Of every joint, those that mimic others included.
+    Columns for every joint, mimic joints included.
     """
-    carried = np.zeros((robot.model.njoints, robot.model.nvExtended))
+    moved_by = np.zeros((robot.model.njoints, robot.model.nvExtended))
     for joint in range(1, robot.model.njoints):
         for support in list(robot.model.supports[joint])[1:]:
-            mover = robot.model.joints[support]
-            first = mover.idx_vExtended
-            carried[joint, first : first + mover.nvExtended] = 1.0
+            joint_model = robot.model.joints[support]
+            first = joint_model.idx_vExtended
+            moved_by[joint, first : first + joint_model.nvExtended] = 1.0
     parents = [shape.parentJoint for shape in geometry.geometryObjects]
     pairs = geometry.collisionPairs
-    return np.array([carried[parents[p.second]] - carried[parents[p.first]] for p in pairs])
+    return np.array([moved_by[parents[p.second]] - moved_by[parents[p.first]] for p in pairs])

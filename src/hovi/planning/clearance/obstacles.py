@@ -19,24 +19,24 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Obstacle(ABC):
-    """A convex shape at a fixed place in the world, in [m] and [rad].
+    """A convex shape with a fixed pose in the world, in [m] and [rad].
 
-    name: what messages call it.
+    name: used in messages.
     """
 
     name: str = field(default="", kw_only=True)
 
     @abstractmethod
     def shape(self) -> coal.CollisionGeometry:
-        """The shape about its own origin."""
+        """The shape in its own frame."""
 
     @abstractmethod
     def placement(self) -> pin.SE3:
-        """Where its origin is in the world, and how it is turned."""
+        """Pose of the shape's frame in the world."""
 
     @property
     def kind(self) -> str:
-        """What files call it: "sphere", "capsule" or "box"."""
+        """The kind as files name it: "sphere", "capsule" or "box"."""
         return type(self).__name__.lower()
 
     def to_dict(self) -> dict[str, Any]:
@@ -45,7 +45,7 @@ class Obstacle(ABC):
         return {"kind": self.kind, **values}
 
     def _keep(self, key: str, shape: tuple[int, ...]) -> None:
-        """Hold a field as nested tuples of finite numbers. Raises InputError."""
+        """Store a field as nested tuples of finite numbers. Raises InputError."""
         value = getattr(self, key)
         try:
             numbers = np.array(value, dtype=np.float64)
@@ -57,7 +57,7 @@ class Obstacle(ABC):
         object.__setattr__(self, key, _tuples(numbers.tolist()))
 
     def _keep_lengths(self, key: str, shape: tuple[int, ...]) -> None:
-        """As _keep, for what must be positive."""
+        """As _keep, for positive lengths."""
         self._keep(key, shape)
         if np.min(getattr(self, key)) <= 0:
             raise InputError(
@@ -70,7 +70,7 @@ class Sphere(Obstacle):
     """A ball.
 
     position: of its center, shape (3,), in [m]. radius: in [m].
-    Raises InputError.
+    Raises InputError for other shapes, and a radius that is not positive.
     """
 
     position: npt.ArrayLike
@@ -81,7 +81,7 @@ class Sphere(Obstacle):
         self._keep_lengths("radius", ())
 
     def shape(self) -> coal.CollisionGeometry:
-        """The ball about its center."""
+        """A sphere about its center."""
         return coal.Sphere(self.radius)
 
     def placement(self) -> pin.SE3:
@@ -94,7 +94,7 @@ class Capsule(Obstacle):
     """Everything within a radius of a line segment.
 
     ends: of the segment, shape (2, 3), in [m]. radius: in [m].
-    Raises InputError.
+    Raises InputError for other shapes, ends that coincide, and a radius that is not positive.
     """
 
     ends: npt.ArrayLike
@@ -128,7 +128,7 @@ class Box(Obstacle):
 
     size: lengths of its edges, shape (3,), in [m]. position: of its center, shape (3,), in [m].
     rpy: roll, pitch and yaw about the world's axes, as in a URDF, shape (3,), in [rad].
-    Raises InputError.
+    Raises InputError for other shapes, and edges that are not positive.
     """
 
     size: npt.ArrayLike
@@ -151,11 +151,11 @@ class Box(Obstacle):
 
 
 KINDS: dict[str, type[Obstacle]] = {"sphere": Sphere, "capsule": Capsule, "box": Box}
-"""The obstacles by what files call them."""
+"""The obstacle classes by kind."""
 
 
 def obstacle_from_dict(data: Mapping[str, Any]) -> Obstacle:
-    """The obstacle that `to_dict` wrote, or that a file describes. Raises InputError."""
+    """The inverse of `to_dict`, also for a table of a scene file. Raises InputError."""
     kind = data.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(f"there is no obstacle of kind {kind!r}: {nearest(str(kind), KINDS)}")

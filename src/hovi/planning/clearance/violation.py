@@ -1,4 +1,4 @@
-"""How far a motion keeps from obstacles everywhere, not only at the quadrature points."""
+"""Smallest distances along a motion, between the quadrature points, too."""
 
 from __future__ import annotations
 
@@ -8,46 +8,46 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.planning.clearance.clearance import SCALE
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
 
 Array = npt.NDArray[np.float64]
 
 SAMPLES = 33
-"""Samples of an interval in the first pass, both ends included."""
-AROUND = 9
-"""Samples around a nearest approach in each later pass."""
-PASSES = 4
-"""Later passes, in each of which the samples are four times as dense."""
-NEAR = 0.05 * SCALE
-"""Approaches within this of the least distance are searched again, in [m]."""
+"""Samples per interval in the first pass, both ends included."""
+REFINED_SAMPLES = 9
+"""Samples around a closest approach in each refinement pass."""
+REFINEMENT_PASSES = 4
+"""Refinement passes, each with samples four times as dense."""
+REFINEMENT_DISTANCE = 0.05 * DISTANCE_SCALE
+"""Closest approaches up to this much above the required distance are refined, in [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """The least distance of every pair in every interval, and where in the interval it is.
+    """The smallest distance of every pair in every interval, and where in the interval it occurs.
 
-    distance: shape (N, K), in [m]. at: in [0, 1].
+    distance: shape (N, K), in [m]. at: relative position in the interval, in [0, 1].
     """
 
     distance: Array
     at: Array
 
     def worst(self) -> tuple[int, int]:
-        """Interval and pair of the least distance of all."""
+        """Interval and pair with the smallest distance."""
         k, pair = np.unravel_index(int(np.argmin(self.distance)), self.distance.shape)
         return int(k), int(pair)
 
 
 def approach_along(trajectory: Trajectory, distances: Distances, least: float) -> Approach:
-    """Nearest approaches along the interpolant, searched again where they come near `least`."""
+    """Closest approaches along the interpolant, refined where they are near `least`, in [m]."""
     N = trajectory.grid.intervals
     s = np.linspace(0.0, 1.0, SAMPLES)
     d = _measured(trajectory, distances, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
     d = d.reshape(N, SAMPLES, -1)
     index = np.argmin(d, axis=1)  # (N, K)
     nearest = np.take_along_axis(d, index[:, None], axis=1)[:, 0]
-    return _refined(trajectory, distances, nearest, s[index], least + NEAR)
+    return _refined(trajectory, distances, nearest, s[index], least + REFINEMENT_DISTANCE)
 
 
 def distances_over_time(trajectory: Trajectory, distances: Distances, t: Array) -> Array:
@@ -58,7 +58,7 @@ def distances_over_time(trajectory: Trajectory, distances: Distances, t: Array) 
 def _measured(
     trajectory: Trajectory, distances: Distances, k: npt.NDArray[np.intp], s: Array
 ) -> Array:
-    """Distances at places of intervals, shape (M, K)."""
+    """Distances at relative positions s in intervals k, shape (M, K)."""
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     return distances_over_time(trajectory, distances, np.minimum(t, trajectory.duration))
 
@@ -70,31 +70,31 @@ def _refined(
     k, pair = np.nonzero(nearest < below)
     width = 1.0 / (SAMPLES - 1)
     rows = np.arange(len(k))
-    for _ in range(PASSES if len(k) else 0):
-        around = at[k, pair][:, None] + width * np.linspace(-1.0, 1.0, AROUND)
+    for _ in range(REFINEMENT_PASSES if len(k) else 0):
+        around = at[k, pair][:, None] + width * np.linspace(-1.0, 1.0, REFINED_SAMPLES)
         around = np.clip(around, 0.0, 1.0)
-        d = _measured(trajectory, distances, np.repeat(k, AROUND), around.ravel())
-        values = d.reshape(len(k), AROUND, -1)[rows, :, pair]
+        d = _measured(trajectory, distances, np.repeat(k, REFINED_SAMPLES), around.ravel())
+        values = d.reshape(len(k), REFINED_SAMPLES, -1)[rows, :, pair]
         best = np.argmin(values, axis=1)
         nearest[k, pair], at[k, pair] = values[rows, best], around[rows, best]
-        width *= 2.0 / (AROUND - 1)
+        width *= 2.0 / (REFINED_SAMPLES - 1)
     return Approach(nearest, at)
 
 
 def approach_sentence(
     trajectory: Trajectory, distances: Distances, approach: Approach, margin: float
 ) -> str:
-    """Which pair comes nearest: its names, the distance, the time and the margin."""
+    """The pair that comes closest: its names, the distance, the time and the margin."""
     k, pair = approach.worst()
     t = trajectory.t[k] + approach.at[k, pair] * trajectory.grid.steps[k]
     return (
-        f"{distances.pairs[pair]} {in_words(float(approach.distance[k, pair]))} at "
+        f"{distances.pairs[pair]} {distance_in_words(float(approach.distance[k, pair]))} at "
         f"t = {t:.3g} s, the margin is {margin:g} m"
     )
 
 
-def in_words(distance: float) -> str:
-    """A signed distance as a person says it."""
+def distance_in_words(distance: float) -> str:
+    """A signed distance as the predicate of a sentence about a pair."""
     if distance < 0:
         return f"overlap by {-distance:.3g} m"
     return f"are {distance:.3g} m apart"

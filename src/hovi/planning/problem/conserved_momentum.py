@@ -1,8 +1,8 @@
-"""What a robot whose free base carries no torque keeps, whatever its joints do.
+"""Conserved momenta of a robot with an unactuated floating base.
 
-Under gravity g alone, with total mass m, the center of mass moves on c(t) = c0 + P0 t/m + g t^2/2,
-the linear momentum is P(t) = P0 + m g t, and the angular momentum about the center of mass is
-constant. A goal that fixes more than that leaves is redundant or cannot be met.
+Under gravity g alone, with total mass m, the center of mass is c(t) = c0 + P0 t/m + g t^2/2, the
+linear momentum is P(t) = P0 + m g t, and the angular momentum about the center of mass is
+constant. A goal that prescribes these as well is redundant or infeasible.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from hovi.scene.scene import Scene
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-CLOSE = 1e-6
-"""Relative difference up to which a goal agrees with what is kept."""
+MOMENTUM_TOLERANCE = 1e-6
+"""Relative tolerance for the agreement of a goal with the conserved quantities."""
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
-    """Center of mass in [m], linear momentum in [kg m/s], angular momentum about it in [Nms]."""
+class CentroidalState:
+    """Center of mass [m], linear momentum [kg m/s] and angular momentum about it [N m s]."""
 
     center: Array
     linear: Array
@@ -34,7 +34,7 @@ class Kept:
 
 
 def falls_freely(scene: Scene) -> bool:
-    """Whether the first joint is a free base without torque on which nothing acts but gravity."""
+    """Whether the first joint is a passive floating base on which only gravity acts."""
     model, terms = scene.robot.model, scene.terms
     floats = kind_of(model.joints[1]) is FLOATING
     alone = sum(parent == 0 for parent in list(model.parents)[1:]) == 1
@@ -44,84 +44,85 @@ def falls_freely(scene: Scene) -> bool:
     return untouched and terms.symbols.base is None and not scene.model.armature[:6].any()
 
 
-def kept(scene: Scene, q: Array, v: Array) -> Kept:
-    """Center of mass and momenta of a state in the world."""
+def centroidal_state(scene: Scene, q: Array, v: Array) -> CentroidalState:
+    """Center of mass and momenta of a state, in the world frame."""
     data = scene.model.createData()
     momentum = pin.computeCentroidalMomentum(scene.model, data, q, v)
     center = pin.centerOfMass(scene.model, data, q)
-    return Kept(center.copy(), momentum.linear.copy(), momentum.angular.copy())
+    return CentroidalState(center.copy(), momentum.linear.copy(), momentum.angular.copy())
 
 
-def after(scene: Scene, start: Kept, duration: float) -> Kept:
-    """What becomes of it in free fall."""
+def after_free_fall(scene: Scene, start: CentroidalState, duration: float) -> CentroidalState:
+    """The centroidal state after free fall for a duration in [s]."""
     mass, g, T = pin.computeTotalMass(scene.model), scene.model.gravity.linear, duration
     center = start.center + start.linear / mass * T + g * T**2 / 2
-    return Kept(center, start.linear + mass * g * T, start.angular)
+    return CentroidalState(center, start.linear + mass * g * T, start.angular)
 
 
 def free_fall_contradiction(
     scene: Scene, boundary: tuple[Array, Array, Array, Array], free: Mask, duration: float
 ) -> str:
-    """Why no joint torque brings a free-falling robot from one state to another, or "".
+    """Why no joint torques take a free-falling robot from one state to another, or "".
 
     boundary: (q0, v0, q1, v1). free: which of (q, v) are free at both ends, shape (2, 2, nv).
     """
     if not falls_freely(scene) or free[0].any():
         return ""
     q0, v0, q1, v1 = boundary
-    expected = after(scene, kept(scene, q0, v0), duration)
+    expected = after_free_fall(scene, centroidal_state(scene, q0, v0), duration)
     base = scene.robot.joint_names[0]
     if not free[1, 0].any():
-        gap = float(np.linalg.norm(kept(scene, q1, v1).center - expected.center))
-        if gap > CLOSE * (1.0 + float(np.linalg.norm(expected.center))):
+        gap = float(np.linalg.norm(centroidal_state(scene, q1, v1).center - expected.center))
+        if gap > MOMENTUM_TOLERANCE * (1.0 + float(np.linalg.norm(expected.center))):
             return (
-                f"the base {base!r} carries no torque, so that joint torques cannot move the "
-                f"center of mass: it would have to end {gap:.4g} m from where free fall takes it; "
-                f"leave the goal's base position free"
+                f"the base {base!r} is passive, so joint torques cannot move the center of mass: "
+                f"the goal's is {gap:.4g} m from where free fall takes it; leave the goal's base "
+                "position free"
             )
-    if not free[1, 0, 3:].any() or _rests(v1, free):
-        return _momentum(scene, q1, v1, free[1, 1], expected, base)
+    if not free[1, 0, 3:].any() or _at_rest(v1, free):
+        return _momentum_contradiction(scene, q1, v1, free[1, 1], expected, base)
     return ""
 
 
 def without_redundancy(scene: Scene, v1: Array, free: Mask) -> Mask:
-    """Which components of both ends are free, with those freed that follow from what is kept.
+    """The free components of both ends, with redundant ones of the base freed.
 
     v1: velocity at the goal, shape (nv,). free: as above, shape (2, 2, nv).
-    The base's place follows where all else of the goal's configuration is fixed, and its velocity
-    where all joint rates are. Equations that repeat others would have no unique multipliers.
+    The base's position is redundant if all else of the goal's configuration is fixed, and its
+    velocity if all joint rates are. Redundant equations would have no unique multipliers.
     """
     if not falls_freely(scene) or free[0].any():
         return free
     freed = free.copy()
     if not free[1, 0].any():
         freed[1, 0, :3] = True
-    known = not free[1, 0, 3:].any() or _rests(v1, free)
+    known = not free[1, 0, 3:].any() or _at_rest(v1, free)
     if known and not free[1, 1, 6:].any():
         freed[1, 1, :6] = True
     return freed
 
 
-def _rests(v1: Array, free: Mask) -> bool:
-    """Whether the goal has no momentum, however the robot stands there."""
+def _at_rest(v1: Array, free: Mask) -> bool:
+    """Whether the goal's velocity is prescribed as zero, so that its momenta are zero."""
     return not v1.any() and not free[1, 1].any()
 
 
-def _momentum(scene: Scene, q: Array, v: Array, free: Mask, expected: Kept, base: str) -> str:
-    """Why no choice of the free velocities has the momenta that are kept."""
+def _momentum_contradiction(
+    scene: Scene, q: Array, v: Array, free: Mask, expected: CentroidalState, base: str
+) -> str:
+    """Why no choice of the free velocities has the expected momenta, or ""."""
     data = scene.model.createData()
     A = pin.computeCentroidalMap(scene.model, data, q)  # momenta = A v
     wanted = np.concatenate([expected.linear, expected.angular])
     gap = wanted - A @ np.where(free, 0.0, v)
     if free.any():
         gap = gap - A[:, free] @ np.linalg.lstsq(A[:, free], gap, rcond=None)[0]
-    if np.linalg.norm(gap) <= CLOSE * (1.0 + np.linalg.norm(wanted)):
+    if np.linalg.norm(gap) <= MOMENTUM_TOLERANCE * (1.0 + np.linalg.norm(wanted)):
         return ""
     kind, size, unit = "linear", np.linalg.norm(gap[:3]), "kg m/s"
     if size < np.linalg.norm(gap[3:]):
         kind, size, unit = "angular", np.linalg.norm(gap[3:]), "N m s"
     return (
-        f"the base {base!r} carries no torque, so that joint torques cannot change the momentum: "
-        f"the goal's {kind} momentum is off by {size:.4g} {unit}; leave the goal's base velocity "
-        "free"
+        f"the base {base!r} is passive, so joint torques cannot change the momentum: the goal's "
+        f"{kind} momentum is off by {size:.4g} {unit}; leave the goal's base velocity free"
     )

@@ -1,14 +1,14 @@
-"""Limits that no motion can meet, seen without solving anything."""
+"""Infeasibility checks without a solve: ends outside limits or in obstacles, too little time."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.clearance.violation import in_words
+from hovi.planning.clearance.violation import distance_in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
-from hovi.planning.problem.limits import KINDS, NAMES, Limits
+from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.robot import Robot
@@ -16,14 +16,14 @@ from hovi.robot.robot import Robot
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-ROUNDING = 1e-9
-"""By how much an end may be nearer than the margin, in [m]."""
+MARGIN_TOLERANCE = 1e-9
+"""Distance by which an end may violate the margin, in [m]."""
 
 
 def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Why no motion between the problem's ends is within the limits; "" if nothing speaks against.
+    """Why no motion between the problem's ends satisfies the limits; "" if none is found.
 
-    The ends themselves, and the mean velocity that the distance needs.
+    Checks the ends, the via points, and the mean velocities that the duration requires.
     """
     q0, v0, q1, v1 = problem.boundary
     names, space = problem.robot.coordinate_names, problem.robot.space
@@ -36,11 +36,15 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
             sentence = _outside(problem.robot, end, row, state[row], limits, held)
             if sentence:
                 return sentence
-    return _via_outside(problem, limits) or _too_near(problem) or _too_short(problem, limits, names)
+    return (
+        _via_outside(problem, limits)
+        or _end_in_obstacle(problem)
+        or _duration_too_short(problem, limits, names)
+    )
 
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Which end takes more than a torque limit at rest, as the end of a sentence, or ""."""
+    """Which end exceeds a torque limit at rest, as the end of a sentence; "" if none does."""
     q0, v0, q1, v1 = problem.boundary
     zero = np.zeros((1, problem.robot.nv))
     for i, (end, q, v) in enumerate((("start", q0, v0), ("goal", q1, v1))):
@@ -52,7 +56,7 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
         if over[i] > 0:
             bound = limits.upper[3, i] if tau[i] > 0 else limits.lower[3, i]
             return (
-                f"; holding the {end} alone takes {tau[i]:.4g} "
+                f"; holding the robot still at the {end} takes {tau[i]:.4g} "
                 f"{problem.robot.coordinate_units[i].tau} at joint "
                 f"{problem.robot.coordinate_names[i]!r}, whose limit is {bound:.4g}"
             )
@@ -60,7 +64,7 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
 
 
 def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, held: Mask) -> str:
-    """Which held component of an end's q or v is outside its limits; "" where none is."""
+    """Which prescribed component of an end's q or v is outside its limits; "" if none is."""
     outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
     outside = np.where(held, outside / limits.ranges[row], -np.inf)
     i = int(np.argmax(outside))
@@ -68,29 +72,29 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, he
         return ""
     name, unit = robot.coordinate_names[i], robot.coordinate_units[i][row]
     return (
-        f"the {NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
-        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; move the "
-        f"{end} or widen them"
+        f"the {KIND_NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
+        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; change the "
+        f"{end} or widen the limits"
     )
 
 
 def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Which via point is outside the limits; "" where none is."""
+    """Which via point is outside the limits; "" if none is."""
     space, t = problem.robot.space, problem.grid.t
     for each in problem.conditions:
-        passed = each.condition
-        if not isinstance(passed, JointCondition):
+        via = each.condition
+        if not isinstance(via, JointCondition):
             continue
         end = f"via point at {t[each.node]:g} s"
-        for row, values in enumerate((space.coordinates(passed.target), passed.velocity)):
-            sentence = _outside(problem.robot, end, row, values, limits, passed.held[row])
+        for row, values in enumerate((space.coordinates(via.target), via.velocity)):
+            sentence = _outside(problem.robot, end, row, values, limits, via.held[row])
             if sentence:
                 return sentence
     return ""
 
 
-def _too_near(problem: TrajectoryProblem) -> str:
-    """Which end is inside an obstacle, or nearer to one than the margin; "" where none is."""
+def _end_in_obstacle(problem: TrajectoryProblem) -> str:
+    """Which end overlaps an obstacle or violates the margin; "" if none does."""
     if problem.distances is None or problem.clearance is None:
         return ""
     margin, pairs = float(problem.clearance.margin), problem.distances.pairs
@@ -99,22 +103,23 @@ def _too_near(problem: TrajectoryProblem) -> str:
             continue
         d = problem.distances.values(problem.boundary[2 * i][None])[0]
         k = int(np.argmin(d))
-        if d[k] < margin - ROUNDING:
+        if d[k] < margin - MARGIN_TOLERANCE:
             needed = "" if d[k] < 0 else f", less than the margin of {margin:g} m"
             return (
-                f"at the {end} {pairs[k]} {in_words(float(d[k]))}{needed}; move the {end} or what "
-                "is in its way"
+                f"at the {end} {pairs[k]} {distance_in_words(float(d[k]))}{needed}; change the "
+                f"{end} or move the obstacle"
             )
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
     for goal, name in goals:
         if isinstance(goal, FrameGoal):
-            sentence = goal_in_obstacle(goal, name, problem.distances, margin - ROUNDING)
+            sentence = goal_in_obstacle(goal, name, problem.distances, margin - MARGIN_TOLERANCE)
             if sentence:
                 return sentence
     return ""
 
 
-def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
+def _duration_too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
+    """Which joint cannot cover its distance at its velocity limit in time; "" if all can."""
     q0, _, q1, _ = problem.boundary
     distance = problem.robot.difference(q0, q1)
     T = problem.grid.duration
@@ -126,7 +131,7 @@ def _too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...
         return ""
     units = problem.robot.coordinate_units[i]
     return (
-        f"joint {names[i]!r} has {abs(distance[i]):.4g} {units.q} to go, which takes "
-        f"{needed[i]:.4g} s at its velocity limit of {fastest[i]:.4g} {units.v}, more than the "
-        f"duration of {T:.4g} s; allow more time or a higher velocity"
+        f"joint {names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}, which takes "
+        f"{needed[i]:.4g} s at its velocity limit of {fastest[i]:.4g} {units.v}, longer than the "
+        f"duration of {T:.4g} s; increase the duration or the velocity limit"
     )

@@ -1,4 +1,4 @@
-"""Goals of a frame: where a hand is to be and how it is turned, the joints being free."""
+"""Task-space goals: pose, position, orientation or axis of a frame."""
 
 from __future__ import annotations
 
@@ -20,24 +20,25 @@ from hovi.robot.space.tangent import Symbols, hessian, jacobian
 
 Array = npt.NDArray[np.float64]
 
-HALF_TURN = 1e-6
-"""Angle in [rad] by which a frame may miss a goal whose equations hold: else it is turned over."""
-UNIT = 1e-6
-"""How far a rotation matrix or a direction may be from orthonormal."""
+MAX_ANGLE_ERROR = 1e-6
+"""Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
+ORTHONORMALITY_TOLERANCE = 1e-6
+"""Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameGoal:
-    """A pose, a position, an orientation or the direction of an axis, at a frame of the robot.
+    """A target pose, position, orientation or axis direction of a frame of the robot.
 
     frame: name of the frame.
-    pose: a homogeneous matrix (4, 4) or a pinocchio.SE3; stands for position and rotation.
+    pose: a homogeneous matrix (4, 4) or a pinocchio.SE3; sets position and rotation.
     position: of the frame's origin in the world, shape (3,), in [m].
     rotation: of the frame's axes in the world, shape (3, 3).
     axis: (direction in the frame, direction in the world), two vectors of shape (3,).
-    free_velocity: joints whose velocity at the goal is free, by name or ALL; the others rest.
-    guess: configuration (nq,) from which the first one that meets the goal is looked for.
-    Raises InputError for what is no rotation, no direction or no goal at all.
+    free_velocity: joints whose velocity at the goal is free, by name or ALL; the others are at
+        rest.
+    guess: configuration (nq,) from which inverse kinematics starts.
+    Raises InputError for a matrix that is no rotation, an axis without length, or an empty goal.
     """
 
     frame: str
@@ -51,12 +52,14 @@ class FrameGoal:
     def __post_init__(self) -> None:
         if self.pose is not None:
             if self.position is not None or self.rotation is not None or self.axis is not None:
-                raise InputError("a frame goal takes a pose, or its parts, not both.")
+                raise InputError(
+                    "a frame goal takes a pose, or a position with a rotation or an axis, not both."
+                )
             matrix = _numbers("pose", getattr(self.pose, "homogeneous", self.pose))
             if matrix.shape != (4, 4):
-                raise InputError(f"a pose is a matrix of shape (4, 4), not {matrix.shape}.")
+                raise InputError(f"a pose must be a matrix of shape (4, 4), got {matrix.shape}.")
             if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-                raise InputError(f"the last row of a pose is 0, 0, 0, 1, not {matrix[3]}.")
+                raise InputError(f"the last row of a pose must be 0, 0, 0, 1, got {matrix[3]}.")
             object.__setattr__(self, "position", matrix[:3, 3])
             object.__setattr__(self, "rotation", matrix[:3, :3])
             object.__setattr__(self, "pose", None)
@@ -70,7 +73,9 @@ class FrameGoal:
             object.__setattr__(self, "rotation", _rotation(self.rotation))
         if self.axis is not None:
             if len(self.axis) != 2:
-                raise InputError("an axis is a pair: a direction in the frame, one in the world.")
+                raise InputError(
+                    "an axis must be a pair: a direction in the frame and one in the world."
+                )
             object.__setattr__(self, "axis", tuple(_direction(each) for each in self.axis))
         if isinstance(self.free_velocity, str):
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
@@ -82,18 +87,18 @@ class FrameGoal:
             raise InputError(f"robot {robot.name!r} has no frame {self.frame!r}: {hint}")
 
     def condition(self, robot: Robot) -> FrameCondition:
-        """The goal as equations."""
+        """The goal as a condition c(q) = 0."""
         self.check(robot)
         return FrameCondition(self, robot)
 
 
 @dataclass(frozen=True, eq=False)
 class FrameCondition(Condition):
-    """The equations of a frame goal: position - target, then the sine of the turn that is missing.
+    """The equations of a frame goal: position - target, then the sine of the rotation error.
 
-    A turn by theta about a unit axis u is missing by sin(theta) u = sum_i R_i x R*_i / 2 over the
-    columns; an axis by the two components across its target. Both vanish at half a turn as well,
-    which `missed` tells.
+    A rotation error by theta about a unit axis u gives sin(theta) u = sum_i R_i x R*_i / 2 over
+    the columns; an axis gives its two components orthogonal to the target. Both also vanish at
+    half a turn, which `pose_error` detects.
     """
 
     goal: FrameGoal
@@ -120,8 +125,8 @@ class FrameCondition(Condition):
         curvature[0, :, 0] = np.asarray(self._curvature(q, weights))
         return curvature
 
-    def missed(self, q: Array) -> tuple[float, float]:
-        """Distance in [m] and angle in [rad] from the goal; 0 for what it does not ask."""
+    def pose_error(self, q: Array) -> tuple[float, float]:
+        """Distance in [m] and angle in [rad] from the goal; 0 for parts that it leaves free."""
         R, p = (np.asarray(each, dtype=float) for each in self._placement(q))
         distance = 0.0 if self.goal.position is None else _norm(p.ravel() - self.goal.position)
         angle = 0.0
@@ -132,13 +137,13 @@ class FrameCondition(Condition):
             angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
         return distance, angle
 
-    def elsewhere(self, q: Array, v: Array) -> bool:
+    def is_spurious(self, q: Array, v: Array) -> bool:
         """Whether the frame is half a turn away from its goal."""
-        return self.missed(q)[1] > HALF_TURN
+        return self.pose_error(q)[1] > MAX_ANGLE_ERROR
 
     def describe(self, q: Array, v: Array) -> str:
-        """By how much the frame misses its goal."""
-        distance, angle = self.missed(q)
+        """The distance and the angle by which the frame misses its goal."""
+        distance, angle = self.pose_error(q)
         parts = [f"{distance:.3g} m"] * (self.goal.position is not None)
         parts += [f"{angle:.3g} rad"] * (self.goal.rotation is not None or bool(self.goal.axis))
         return f"frame {self.goal.frame!r} misses it by {' and '.join(parts)}"
@@ -165,7 +170,7 @@ class FrameCondition(Condition):
             rows.append((turns[0] + turns[1] + turns[2]) / 2)
         if self.goal.axis is not None:
             inner, world = (np.asarray(each) for each in self.goal.axis)
-            across = np.linalg.svd(world[None])[2][1:]  # two directions across the target
+            across = np.linalg.svd(world[None])[2][1:]  # two directions orthogonal to the target
             rows.append(ca.DM(across) @ (R @ ca.DM(inner)))
         return ca.vertcat(*rows)
 
@@ -187,31 +192,33 @@ def _numbers(name: str, value: Any) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"the {name} of a frame goal is numbers, not {value!r}.") from None
+        raise InputError(f"the {name} of a frame goal must be numeric, got {value!r}.") from None
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Array:
     vector = _numbers(name, value)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"the {name} of a frame goal is three finite numbers, not {value!r}.")
+        raise InputError(f"the {name} of a frame goal must be three finite numbers, got {value!r}.")
     return vector
 
 
 def _direction(value: npt.ArrayLike) -> Array:
     vector = _vector("axis", value)
     length = np.linalg.norm(vector)
-    if length < UNIT:
-        raise InputError("the axis of a frame goal has no length; give a direction.")
+    if length < ORTHONORMALITY_TOLERANCE:
+        raise InputError("the axis of a frame goal has length zero; give a direction.")
     return np.asarray(vector / length)
 
 
 def _rotation(value: npt.ArrayLike) -> Array:
     matrix = _numbers("rotation", value)
     fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
-    if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > UNIT:
-        raise InputError(f"the rotation of a frame goal is an orthonormal (3, 3), not {value!r}.")
+    if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > ORTHONORMALITY_TOLERANCE:
+        raise InputError(
+            f"the rotation of a frame goal must be an orthonormal (3, 3) matrix, got {value!r}."
+        )
     if np.linalg.det(matrix) < 0:
-        raise InputError("the rotation of a frame goal is a reflection; turn one axis around.")
+        raise InputError("the rotation of a frame goal is a reflection; reverse one of its axes.")
     return matrix
 
 

@@ -1,11 +1,11 @@
-"""Whether a frame's goal puts the link that carries the frame into an obstacle.
+"""Whether a task-space goal places the link of its frame in an obstacle.
 
-Without a rotation the link may still turn about the frame's origin. Then a bound speaks: distances
-to a set change by no more than the way one goes, so that
+Without a rotation the link may still turn about the frame's origin, and the triangle inequality
+gives an upper bound,
 
     d(link, obstacle) <= d(origin, obstacle) + d(origin, link),
 
-all of them negative by the depth of what is inside.
+with signed distances, negative inside a shape.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ import numpy as np
 import pinocchio as pin
 
 from hovi.planning.clearance.distances import Distances, Pair
-from hovi.planning.clearance.violation import in_words
+from hovi.planning.clearance.violation import distance_in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 
 POINT = coal.Sphere(0.0)
 
 
 def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
-    """The largest distances that a goal leaves the shapes of its link, in [m], by pair.
+    """Upper bounds of the distances of the goal's link from obstacles, in [m], by pair.
 
-    Exact for a pose, a bound for a position; none for what leaves the position free.
+    Exact for a pose, a bound for a position, none for a goal without a position.
     """
     if goal.position is None:
         return {}
@@ -47,26 +47,27 @@ def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
 
 
 def goal_in_obstacle(goal: FrameGoal, name: str, distances: Distances, margin: float) -> str:
-    """Which obstacle the goal's link has to come too near to, in a sentence without its end, or "".
+    """The obstacle to which the goal's link violates the margin, as a sentence without its end.
 
-    name: what the goal is called. margin: that is kept, in [m].
+    "" if there is none. name: of the goal in messages. margin: in [m].
     """
     found = goal_distances(goal, distances)
     if not found or min(found.values()) >= margin:
         return ""
     pair = min(found, key=lambda each: found[each])
     needed = "" if found[pair] < 0 else f", less than the margin of {margin:g} m"
-    least = "" if goal.rotation is not None else ", or are even nearer"
+    least = "" if goal.rotation is not None else " or come closer"
+    apart = f"{distance_in_words(found[pair])}{least}{needed}"
     return (
-        f"with frame {goal.frame!r} at the {name}, {pair} {in_words(found[pair])}{least}{needed}; "
-        f"move the {name} or what is in its way"
+        f"with frame {goal.frame!r} at the {name}, {pair} {apart}; change the {name} or move the "
+        "obstacle"
     )
 
 
 def _distance(
     shape: coal.CollisionGeometry, placement: pin.SE3, other: pin.GeometryObject
 ) -> float:
-    """Signed distance of a shape and another where that is placed, in [m]."""
+    """Signed distance of a shape from a geometry object, in [m]."""
     first = coal.Transform3s(placement.rotation, placement.translation)
     second = coal.Transform3s(other.placement.rotation, other.placement.translation)
     result = coal.DistanceResult()

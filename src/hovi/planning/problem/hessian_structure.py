@@ -1,4 +1,4 @@
-"""What the action's Hessian looks like on a grid, whatever the robot's motion."""
+"""Block structure of the action's Hessian, which depends on the grid and not on the motion."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class ActionStructure:
-    """Unknowns, metric and elimination order of a grid, each worked out when first asked for.
+    """Unknowns, metric and elimination order of a grid, each computed on first use.
 
     grid: the intervals. dof: n, the degrees of freedom.
-    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, n); none when
-        None.
+    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, n); None for
+        fixed ends.
     """
 
     grid: Grid
@@ -38,7 +38,7 @@ class ActionStructure:
 
     @cached_property
     def sizes(self) -> dict[Coordinates, Array]:
-        """What makes columns changes of q, T v and h^2 c, 0 where one is none, (N or 1, m, 1)."""
+        """Factors from columns to changes of q, T v and h^2 c, or 0, shape (N or 1, m, 1)."""
         h = self.grid.steps
         speed = self.grid.duration / (h[:1] if np.ptp(h) == 0 else h)
         sizes = np.ones((len(speed), 4 + self.grid.inner_modes, 1))
@@ -49,7 +49,7 @@ class ActionStructure:
 
     @cached_property
     def layout(self) -> BandLayout:
-        """The places of nodes and inner modes in a banded matrix."""
+        """The indices of nodes and inner modes in a banded matrix."""
         return BandLayout.of(unknowns(self.grid, self.dof, self.free_ends), self._scales())
 
     @cached_property
@@ -58,7 +58,7 @@ class ActionStructure:
         return self.layout.assemble(self.metric["nodal"][..., None, None] * np.eye(self.dof))
 
     def _scales(self) -> Array | None:
-        """Columns over unknowns: h over the mean h for velocities; None where steps are equal."""
+        """Ratios of columns and unknowns, h / mean h for velocities; None if steps are equal."""
         steps = self.grid.steps
         if np.ptp(steps) == 0:
             return None
@@ -78,7 +78,7 @@ class ActionStructure:
 
 
 def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
-    """The trust region's metric: T^3 times the integral of |da|^2 over each interval, (N, m, m)."""
+    """The trust region's metric: T^3 integral |da|^2 over each interval, shape (N, m, m)."""
     metric = np.zeros((grid.intervals, 4 + grid.inner_modes, 4 + grid.inner_modes))
     for scheme, index in grid.groups:
         rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 2]
@@ -89,7 +89,7 @@ def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
 
 
 def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
-    """Numbers of the unknowns of every interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
+    """Indices of the unknowns of each interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
 
     Nodes and inner modes alternate along the motion. Shape (N, m, n).
     free_ends: as in ActionStructure.
@@ -98,7 +98,7 @@ def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
     modes = np.zeros(N, dtype=np.intp)
     for scheme, index in grid.groups:
         modes[index] = scheme.inner_modes
-    free = np.ones((2 * N + 1, max(2, r), n), dtype=bool)  # nodes and inner modes by turns
+    free = np.ones((2 * N + 1, max(2, r), n), dtype=bool)  # nodes and inner modes alternate
     free[0::2, 2:] = False
     free[[0, -1], :2] = False if free_ends is None else free_ends
     free[1::2] = np.arange(max(2, r))[:, None] < modes[:, None, None]

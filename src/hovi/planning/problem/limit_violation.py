@@ -1,4 +1,4 @@
-"""How a motion stands to its limits everywhere, not only at the quadrature points."""
+"""Limit violations along a whole motion, between the quadrature points, too."""
 
 from __future__ import annotations
 
@@ -8,24 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Sample, Trajectory
-from hovi.planning.problem.limits import KINDS, NAMES, Limits
+from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
 SAMPLES = 33
-"""Samples of an interval in the first pass, both ends included."""
-NEAR = 0.05
-"""Outputs that come this near to a bound, as a share of its range, are searched again."""
+"""Samples per interval in the first pass, both ends included."""
+REFINEMENT_SHARE = 0.05
+"""Extremes closer than this to a bound, as a share of its range, are refined."""
 AT_LIMIT = 1e-3
-"""Share of its range within which an output counts as standing at its bound."""
+"""Distance to a bound, as a share of its range, within which an output is at the bound."""
 
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """By which share of its range each bound is exceeded in each interval; negative inside.
+    """Largest excess over each bound in each interval, as a share of its range; negative inside.
 
-    lower, upper: shape (N, 4, nv). at_lower, at_upper: where in the interval, in [0, 1].
+    lower, upper: shape (N, 4, nv). at_lower, at_upper: relative position in the interval of that
+        excess, in [0, 1].
     """
 
     lower: Array
@@ -40,14 +41,14 @@ class Excess:
 
     @property
     def worst(self) -> float:
-        """The largest excess of all."""
+        """The largest excess over any bound."""
         return float(max(self.lower.max(), self.upper.max()))
 
 
 def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
-    """The extremes of q, v, a and tau of the interpolant, against the limits.
+    """The extremes of q, v, a and tau along the interpolant, compared with the limits.
 
-    Every interval is sampled, and sampled again around the extremes that come near a bound.
+    Every interval is sampled, and again more densely around the extremes that are near a bound.
     """
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     s = np.linspace(0.0, 1.0, SAMPLES)
@@ -64,7 +65,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 
 
 def _outputs(trajectory: Trajectory, k: npt.NDArray[np.intp], s: Array) -> Array:
-    """(q, v, a, tau) at places of intervals, shape (M, 4, nv)."""
+    """(q, v, a, tau) at relative positions s in intervals k, shape (M, 4, nv)."""
     q, v, a, tau = trajectory.sample_intervals(k, s)
     q = q if trajectory.space is None else trajectory.space.coordinates(q)
     return np.stack([q, v, a, tau], axis=1)
@@ -73,9 +74,9 @@ def _outputs(trajectory: Trajectory, k: npt.NDArray[np.intp], s: Array) -> Array
 def _refined(
     trajectory: Trajectory, limits: Limits, sign: float, bound: Array, largest: Array, s: Array
 ) -> tuple[Array, Array]:
-    """Excesses and their places, searched again around the samples that come near a bound."""
+    """Excesses and their positions, sampled more densely around those that are near a bound."""
     largest, s = largest.copy(), s.copy()
-    near = np.isfinite(largest) & (largest > -NEAR)
+    near = np.isfinite(largest) & (largest > -REFINEMENT_SHARE)
     spots = np.argwhere(near)
     width = 1.0 / (SAMPLES - 1)
     for _ in range(2):
@@ -97,7 +98,7 @@ def _refined(
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
-    """Which limit is exceeded most: kind, joint, time, values."""
+    """The limit that is exceeded most: kind, joint, time, value and bound."""
     excess = excess_along(trajectory, limits)
     above = excess.upper.max() >= excess.lower.max()
     side = excess.upper if above else excess.lower
@@ -109,22 +110,22 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     unit = robot.coordinate_units[joint][kind]
     return (
-        f"the {NAMES[KINDS[kind]]} of joint {robot.coordinate_names[joint]!r} reaches {value:.4g} "
-        f"{unit} at t = {t:.3g} s, its limit is {bound:.4g}"
+        f"the {KIND_NAMES[KINDS[kind]]} of joint {robot.coordinate_names[joint]!r} reaches "
+        f"{value:.4g} {unit} at t = {t:.3g} s, its limit is {bound:.4g}"
     )
 
 
 def closeness(trajectory: Trajectory, limits: Limits) -> Array:
-    """Share of its range that each output stays away from its nearest bound, (4, nv).
+    """Smallest distance of each output from its bounds, as a share of its range, (4, nv).
 
-    Negative where a limit is exceeded, infinite where there is none. Kinds as in limits.KINDS.
+    Negative where a limit is exceeded, infinite where there is none. Rows as in limits.KINDS.
     """
     excess = excess_along(trajectory, limits)
     return np.asarray(-np.maximum(excess.lower.max(axis=0), excess.upper.max(axis=0)))
 
 
 def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> npt.NDArray[np.bool_]:
-    """Which of q, v, a and tau stand at a bound, shape (M, 4, nv)."""
+    """Which of q, v, a and tau are at a bound, shape (M, 4, nv)."""
     q = motion.q
     if robot is not None and not robot.vector_joints:
         q = robot.space.coordinates(q)

@@ -1,4 +1,4 @@
-"""Limits on a motion: bounds on q, v, a and tau of every joint coordinate."""
+"""Limits: bounds on q, v, a and tau of every joint coordinate."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
 
 KINDS = ("q", "v", "a", "tau")
-"""What can be limited, in the order in which outputs are stacked."""
-NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
-UNLIMITED = 1e15
-"""Bounds beyond this mean that there is none."""
-LEAST_ROOM = 1e-12
-"""Least range of a limit, relative to its bounds where they are larger than one."""
+"""The limited quantities, in the order in which outputs are stacked."""
+KIND_NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
+UNBOUNDED = 1e15
+"""Absolute value above which a bound counts as no bound."""
+MIN_RANGE = 1e-12
+"""Minimum range upper - lower, relative to the bounds where they are larger than one."""
 TOLERANCE = 1e-6
 """Share of its range by which a limit may be exceeded between the quadrature points."""
 
@@ -32,8 +32,8 @@ class Limits:
 
     lower, upper: shape (4, nv), one row per kind, in [rad], [rad/s], [rad/s^2] and [N m] (metres
         and newtons for sliding joints).
-    tolerance: by which share of its range a limit may be exceeded anywhere.
-    Raises InputError for a range that is empty, to rounding, or not a number.
+    tolerance: share of its range by which a limit may be exceeded anywhere.
+    Raises InputError for NaN and for a range that is empty to rounding.
     """
 
     lower: Array
@@ -42,38 +42,38 @@ class Limits:
 
     def __post_init__(self) -> None:
         if np.isnan(self.lower).any() or np.isnan(self.upper).any():
-            raise InputError("a limit is not a number; leave out what is not limited.")
-        for k, i in np.argwhere(self._without_room):
+            raise InputError("a limit is not a number; use -inf or inf for no bound.")
+        for k, i in np.argwhere(self._empty):
             raise InputError(
-                f"the {NAMES[KINDS[k]]} limits of joint coordinate {i} leave no room: "
-                f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; widen them."
+                f"the {KIND_NAMES[KINDS[k]]} range of joint coordinate {i} is empty: "
+                f"[{self.lower[k, i]:g}, {self.upper[k, i]:g}]; lower must be less than upper."
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
 
     @property
-    def _without_room(self) -> npt.NDArray[np.bool_]:
-        """Where rounding leaves nothing between the bounds, or only numbers beyond all limits."""
+    def _empty(self) -> npt.NDArray[np.bool_]:
+        """Where a range is empty to rounding, or beyond UNBOUNDED altogether, shape (4, nv)."""
         size = np.maximum(1.0, np.minimum(np.abs(self.lower), np.abs(self.upper)))
         size[np.isinf(size)] = 1.0
-        beyond = (self.lower > UNLIMITED) | (self.upper < -UNLIMITED)
-        return np.asarray((self.lower + LEAST_ROOM * size >= self.upper) | beyond)
+        beyond = (self.lower > UNBOUNDED) | (self.upper < -UNBOUNDED)
+        return np.asarray((self.lower + MIN_RANGE * size >= self.upper) | beyond)
 
     @property
     def bounded(self) -> npt.NDArray[np.bool_]:
-        """Which outputs have a bound on at least one side, shape (4, nv)."""
+        """Which outputs have at least one bound, shape (4, nv)."""
         return np.isfinite(self.lower) | np.isfinite(self.upper)
 
     @property
     def ranges(self) -> Array:
-        """Size by which each output is measured: its range, or its only bound, (4, nv)."""
+        """Scale of each output: its range, or the size of its only bound, shape (4, nv)."""
         both = self.upper - self.lower
         one = np.where(np.isfinite(self.lower), self.lower, self.upper)
         single = np.maximum(1.0, np.abs(np.where(np.isfinite(one), one, 1.0)))
         return np.where(np.isfinite(both), both, single)
 
     def to_dict(self) -> dict[str, Any]:
-        """The limits as JSON-able data, None where there is none."""
+        """The limits as JSON-able data; None for no bound."""
         rows = {
             name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
             for name, bound in (("lower", self.lower), ("upper", self.upper))
@@ -82,7 +82,7 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Limits:
-        """The limits that to_dict wrote."""
+        """The inverse of to_dict."""
         bounds = [
             np.array([[free if x is None else x for x in row] for row in data[name]], dtype=float)
             for name, free in (("lower", -np.inf), ("upper", np.inf))
@@ -90,7 +90,7 @@ class Limits:
         return cls(bounds[0], bounds[1], float(data["tolerance"]))
 
     def excess(self, outputs: Array) -> Array:
-        """By which share of its range each output is outside; negative inside.
+        """Distance of each output outside its range, as a share of the range; negative inside.
 
         outputs: (q, v, a, tau) stacked, shape (..., 4, nv).
         """
@@ -98,21 +98,21 @@ class Limits:
         return np.asarray(outside / self.ranges)
 
     def with_margin(self, margin: float) -> Limits:
-        """Limits narrower by a share of their ranges on every side."""
+        """Limits tightened by a share of their ranges on both sides. Raises InputError."""
         if not (np.isfinite(margin) and 0 <= margin < 0.5):
-            raise InputError(f"a margin is a share of the range in [0, 0.5), got {margin}.")
+            raise InputError(f"a margin must be a share of the range in [0, 0.5), got {margin}.")
         room = margin * self.ranges
         return Limits(self.lower + room, self.upper - room, self.tolerance)
 
 
 def no_limits(robot: Robot) -> Limits:
-    """Limits that are nowhere."""
+    """Limits without any bound."""
     shape = (4, robot.nv)
     return Limits(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
 def urdf_limits(robot: Robot) -> Limits:
-    """Position, velocity and effort limits of the URDF; 0 or nothing there means no limit."""
+    """Position, velocity and effort limits of the URDF; 0 or a missing value means no limit."""
     lower, upper = np.full((4, robot.nv), -np.inf), np.full((4, robot.nv), np.inf)
     if not robot.unplanned_joints:
         iq, iv = robot.space.plain
@@ -120,33 +120,33 @@ def urdf_limits(robot: Robot) -> Limits:
     for row, size in ((1, robot.velocity_limit), (3, robot.effort_limit)):
         bound = np.where(size > 0, size, np.inf)
         lower[row], upper[row] = -bound, bound
-    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
+    lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     return Limits(lower, upper)
 
 
 def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
-    """Limits from a word or a mapping, as `plan` and scene files take them.
+    """Limits from a name or a mapping, as `plan` and scene files accept them.
 
     limits: "urdf", "none", a Limits, or a mapping with any of `base` ("urdf", the default, or
-        "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or a list for
-        bounds on both sides alike, a list of pairs (lower, upper), or a mapping from joint names
-        to either.
-    Raises InputError for what does not fit the robot.
+        "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or a list of
+        numbers x for -x and x, a list of pairs (lower, upper), or a mapping from joint names to
+        either.
+    Raises InputError for unknown keys or joints and for bounds that do not fit the robot.
     """
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _by_word(robot, limits)
+        return _by_name(robot, limits)
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
-            raise InputError(f"there is no limit {key!r}: {nearest(key, keys)}")
-    base = _by_word(robot, limits.get("base", "urdf"))
+            raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
+    base = _by_name(robot, limits.get("base", "urdf"))
     lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):
         for i, (low, high) in _entries(robot, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
-    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
+    lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
     return chosen.with_margin(_number(limits, "margin", 0.0))
 
@@ -154,26 +154,26 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
 def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
     value = limits.get(key, default)
     if isinstance(value, bool) or not isinstance(value, float | int | np.number):
-        raise InputError(f"limits.{key} is a number, got {value!r}.")
+        raise InputError(f"limits.{key} must be a number, got {value!r}.")
     return float(value)
 
 
-def _by_word(robot: Robot, word: Any) -> Limits:
-    words = {"urdf": urdf_limits, "none": no_limits}
-    if not isinstance(word, str) or word not in words:
-        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {word!r}.")
-    return words[word](robot)
+def _by_name(robot: Robot, name: Any) -> Limits:
+    known = {"urdf": urdf_limits, "none": no_limits}
+    if not isinstance(name, str) or name not in known:
+        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {name!r}.")
+    return known[name](robot)
 
 
 def _entries(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
-    """Bounds by place in v, from any of the ways to give them."""
+    """Bounds by index in v, from any of the accepted forms."""
     found = _pairs(robot, kind, given)
     if kind == "q" and not robot.vector_joints:
         for i in found:
             if i not in robot.space.plain[1] and isinstance(given, Mapping):
                 raise InputError(
-                    f"limits.q: {robot.coordinate_names[i]!r} turns or moves freely and has no "
-                    "position limits; leave it out."
+                    f"limits.q: {robot.coordinate_names[i]!r} has no position limits, as the "
+                    "joint is continuous or floating; leave it out."
                 )
         found = {i: pair for i, pair in found.items() if i in robot.space.plain[1]}
     return found
@@ -193,7 +193,7 @@ def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]
         given = [given] * robot.nv
     if not isinstance(given, Sequence | np.ndarray) or len(given) != robot.nv:
         raise InputError(
-            f"limits.{kind} needs one entry for each of {', '.join(names)}, got {given!r}."
+            f"limits.{kind} must have one entry for each of {', '.join(names)}, got {given!r}."
         )
     return {i: _pair(kind, names[i], value) for i, value in enumerate(given)}
 
@@ -208,5 +208,6 @@ def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
     if numbers.shape == (2,) and numbers[0] < numbers[1]:
         return float(numbers[0]), float(numbers[1])
     raise InputError(
-        f"limits.{kind} of {name!r} is a positive number or a rising pair, got {value!r}."
+        f"limits.{kind} of {name!r} must be a positive number or a pair lower < upper, got "
+        f"{value!r}."
     )

@@ -1,4 +1,4 @@
-"""Conditions c(q, v) = 0 that a motion has to meet at one of its nodes."""
+"""Equality constraints c(q, v) = 0 at the nodes of a motion."""
 
 from __future__ import annotations
 
@@ -26,27 +26,28 @@ class Condition(ABC):
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         """c, shape (k,), and its Jacobian with respect to (q, v), shape (k, 2, nv).
 
-        Components of a position are in [m], of a turn or a joint in [rad], of a velocity per [s].
+        Components of a position are in [m], of a rotation or a joint in [rad], of a velocity per
+        [s].
         """
 
     @abstractmethod
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
         """sum_i weights_i d2 c_i, shape (2, nv, 2, nv)."""
 
-    def elsewhere(self, q: Array, v: Array) -> bool:
-        """Whether c vanishes although what is meant is not met."""
+    def is_spurious(self, q: Array, v: Array) -> bool:
+        """Whether c = 0 holds at a spurious root, where the goal itself is not met."""
         return False
 
     @abstractmethod
     def describe(self, q: Array, v: Array) -> str:
-        """What is missed, and by how much, as the end of a sentence."""
+        """The error of the condition, as a clause of a sentence."""
 
 
 @dataclass(frozen=True, eq=False)
 class NodeCondition:
     """A condition at a node of a grid.
 
-    node: its number. condition: c(q, v) = 0.
+    node: index of the node. condition: c(q, v) = 0.
     """
 
     node: int
@@ -55,10 +56,10 @@ class NodeCondition:
 
 @dataclass(frozen=True, eq=False)
 class JointCondition(Condition):
-    """q (-) target = 0 and v = velocity, in the components that are held.
+    """q (-) target = 0 and v = velocity, in the prescribed components.
 
     target: configuration, shape (nq,). velocity: shape (nv,). held: which components of (q, v)
-    count, shape (2, nv).
+    are prescribed, shape (2, nv).
     """
 
     robot: Robot
@@ -68,29 +69,29 @@ class JointCondition(Condition):
 
     @property
     def size(self) -> int:
-        """Number of held components."""
+        """Number of prescribed components."""
         return int(self.held.sum())
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """The held components of (q (-) target, v - velocity), and rows of its Jacobian."""
+        """The prescribed components of (q (-) target, v - velocity), and their Jacobian."""
         n = self.robot.nv
         J = np.eye(2 * n).reshape(2, n, 2, n)
         if not self.robot.vector_joints:
             J[0, :, 0] = pin.dDifference(self.robot.model, self.target, q, pin.ARG1)
-        return self._missed(q, v)[self.held], J[self.held]
+        return self._error(q, v)[self.held], J[self.held]
 
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
-        """Zero: the condition is linear, or its curvature vanishes where it is met."""
+        """Zero: c is linear, or its curvature vanishes at its root."""
         n = len(v)
         return np.zeros((2, n, 2, n))
 
     def describe(self, q: Array, v: Array) -> str:
-        """The joint that misses most."""
-        missed = np.abs(self._missed(q, v)) * self.held
-        row, i = np.unravel_index(int(np.argmax(missed)), missed.shape)
+        """The joint with the largest error."""
+        error = np.abs(self._error(q, v)) * self.held
+        row, i = np.unravel_index(int(np.argmax(error)), error.shape)
         kind = ("position", "velocity")[row]
         joint = self.robot.coordinate_names[i]
-        return f"the {kind} of joint {joint!r} misses it by {missed[row, i]:.3g}"
+        return f"the {kind} of joint {joint!r} misses it by {error[row, i]:.3g}"
 
-    def _missed(self, q: Array, v: Array) -> Array:
+    def _error(self, q: Array, v: Array) -> Array:
         return np.stack([self.robot.difference(self.target, q), v - self.velocity])

@@ -1,4 +1,4 @@
-"""The trajectory problem: which boundary data a motion of least action has to meet."""
+"""The trajectory problem: boundary data, via points, limits and obstacles of a motion."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via, met, via_conditions
+from hovi.planning.problem.goals import Via, goal_state, via_conditions
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import NodeCondition
@@ -33,8 +33,8 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 MORE_MODES = 2
-"""Inner modes that the problem by which errors are estimated has more: with one more the costs of
-both may be off by as much to the same side, and their difference would say nothing."""
+"""Additional inner modes of the problem for error estimates. With one more, both costs may have
+nearly the same error, which their difference would not show."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,15 +46,16 @@ class TrajectoryProblem:
     [ColomboFerraroMartin2016, section 3]
 
     ld: the discrete Lagrangian on a grid; its Lagrangian belongs to a scene.
-    start: state at t = 0. goal: state at t = T, or a goal of a frame.
-    limits: bounds that hold along the motion; none when None.
-    via: what the motion passes through, at nodes of the grid.
-    clearance: what the robot keeps away from along the motion; nothing when None.
-    boundary: (q0, v0, q1, v1) of the two ends, first guesses where they are free.
+    start: state at t = 0. goal: state at t = T, or a task-space goal.
+    limits: bounds along the motion; none if None.
+    via: via points, at nodes of the grid.
+    clearance: obstacles and their margin; none if None.
+    boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
     free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, nv).
-    conditions: what has to hold at nodes besides. unreachable: why the goal cannot be met, or "".
-    turns: rotation vectors over 2 pi by which the first guess goes beyond the shortest way, (nv,).
-    Raises InputError, ModelError or SchemeError when no motion can be planned.
+    conditions: equations at nodes. unreachable: why the goal cannot be met, or "".
+    turns: full turns of the initial guess beyond the shortest path, as rotation vectors over 2 pi,
+        shape (nv,).
+    Raises InputError, ModelError or SchemeError if the input defines no problem.
     """
 
     ld: DiscreteLagrangian
@@ -75,15 +76,19 @@ class TrajectoryProblem:
         require_plannable(self.scene)
         robot, N = self.robot, self.grid.intervals
         start = self.start.on(robot, "start")
-        end = met(self.goal, "goal", robot, start[0], self.limits)
+        end = goal_state(self.goal, "goal", robot, start[0], self.limits)
         goal = end.state.on(robot, "goal")
         conditions = [NodeCondition(N, condition) for condition in end.conditions]
         unreachable = end.reason
         for via in self.via:
-            passed = met(via.goal, f"via point at {via.time:g} s", robot, start[0], self.limits)
+            reached = goal_state(
+                via.goal, f"via point at {via.time:g} s", robot, start[0], self.limits
+            )
             node = self.grid.node_at(via.time)
-            conditions += [NodeCondition(node, each) for each in via_conditions(via, passed, robot)]
-            unreachable = unreachable or passed.reason
+            conditions += [
+                NodeCondition(node, each) for each in via_conditions(via, reached, robot)
+            ]
+            unreachable = unreachable or reached.reason
         free = self.start.free_on(robot, "start"), end.state.free_on(robot, "goal")
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
@@ -96,11 +101,11 @@ class TrajectoryProblem:
             self, "free_ends", without_redundancy(self.scene, goal[1], self.free_ends)
         )
         object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
-        _ = self.distances  # shapes that are missing speak before any work is done
+        _ = self.distances  # raises for missing collision shapes
 
     @cached_property
     def structure(self) -> ActionStructure:
-        """What the action's Hessian looks like on this grid."""
+        """Block structure of the action's Hessian on this grid."""
         free = self.free_ends if self.free_ends.any() else None
         return ActionStructure(self.grid, self.robot.nv, free)
 
@@ -112,7 +117,7 @@ class TrajectoryProblem:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)
-        problem = copy.copy(self)  # nothing else depends on the grid, and was checked already
+        problem = copy.copy(self)  # nothing else depends on the grid
         object.__setattr__(problem, "ld", ld)
         for name in ("structure", "finer"):
             problem.__dict__.pop(name, None)
@@ -120,23 +125,23 @@ class TrajectoryProblem:
 
     @cached_property
     def finer(self) -> TrajectoryProblem:
-        """The same problem with more inner modes, by which errors are estimated."""
+        """The same problem with more inner modes, for error estimates."""
         return self.on(self.grid.enriched(MORE_MODES))
 
     def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
-        """The same problem between other states, with everything that was built for this one."""
+        """The same problem between other states, sharing what was built for this one."""
         problem = dataclasses.replace(self, start=start, goal=goal)
         if np.array_equal(problem.free_ends, self.free_ends):
             object.__setattr__(problem, "structure", self.structure)
         return problem
 
     def path(self, curve: Curve) -> DiscretePath:
-        """A curve on the grid, its ends those of the problem as far as they are not free."""
+        """A curve sampled on the grid, with the problem's ends in fixed components."""
         q, v, _ = curve(np.array([0.0, self.grid.duration]))
         return path_on_grid(curve, self.grid, self.ends(q, v), self.robot)
 
     def ends(self, q: Array, v: Array) -> Boundary:
-        """The boundary data, with what is free taken from the ends of q (M, nq) and v (M, nv)."""
+        """The boundary data, with free components from the ends of q (M, nq) and v (M, nv)."""
         q0, v0, q1, v1 = self.boundary
         if not self._has_free_ends:
             return self.boundary
@@ -152,23 +157,23 @@ class TrajectoryProblem:
 
     @cached_property
     def inertial_torque(self) -> float:
-        """The largest inertia of a joint at the start, over T^2: one [rad/s^2] or [m/s^2] T^2."""
+        """max diag M(q0) / T^2: torque scale of a motion by 1 rad or 1 m, in [N m] or [N]."""
         mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]
         return float(np.max(np.diag(mass))) / self.grid.duration**2
 
     @property
     def passive(self) -> npt.NDArray[np.intp]:
-        """Places in v of the joints that carry no torque."""
+        """Indices in v of the passive joints."""
         return self.scene.passive_coordinates
 
     @property
     def constrained(self) -> bool:
-        """Whether the motion has to meet equations besides its boundary data."""
+        """Whether there are equality constraints: conditions at nodes or passive joints."""
         return bool(self.conditions) or len(self.passive) > 0
 
     @property
     def plain(self) -> bool:
-        """Whether both ends are fixed and no equation has to be met."""
+        """Whether both ends are fixed and there are no equality constraints."""
         return not self.constrained and not self._has_free_ends
 
     @cached_property
@@ -177,13 +182,13 @@ class TrajectoryProblem:
 
     @property
     def limited(self) -> bool:
-        """Whether anything is bounded, or has to be kept away from."""
+        """Whether there are limits or obstacles."""
         bounded = self.limits is not None and bool(self.limits.bounded.any())
         return bounded or self.distances is not None
 
     @property
     def distances(self) -> Distances | None:
-        """Distances to what the robot keeps away from; None where there is nothing."""
+        """Distances to obstacles and between links; None if nothing is to be avoided."""
         if self.clearance is None or not self.clearance.wanted:
             return None
         return distances_between(self.robot, self.clearance)
@@ -209,9 +214,11 @@ class TrajectoryProblem:
 
 @lru_cache(maxsize=64)
 def require_plannable(scene: Scene) -> None:
-    """Raise ModelError for a robot on which motions cannot be planned."""
+    """Raise ModelError for a robot without moving joints or with an invalid mass matrix."""
     robot = scene.robot
     require_known_joints(robot)
     if robot.nv == 0:
-        raise ModelError(f"robot {robot.name!r} has no joint that moves; nothing can be planned.")
+        raise ModelError(
+            f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
+        )
     check_mass_matrix(scene.model)

@@ -1,4 +1,4 @@
-"""How accurate a plan has to be, in a unit that a person has."""
+"""Accuracy of a plan: a tolerance for the cost, the joints or a frame, and what was reached."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hovi.robot.robot import Robot
 
 
 class Quantity(StrEnum):
-    """What is accurate: the cost, the joints or a frame."""
+    """The quantity whose error is bounded."""
 
     COST = "cost"
     JOINTS = "joints"
@@ -27,12 +27,12 @@ class Quantity(StrEnum):
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The largest error that a plan may have, over the whole motion.
+    """The largest allowed error of a plan, over the whole motion.
 
-    size: relative in the cost, in [rad] in the joints (a sliding joint may be off by as many
-        metres), in [m] at a frame.
-    quantity: which of the three. frame: name of the frame; the robot's tip_frame when None.
-    unit: in which sentences state it: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
+    size: relative for the cost, in [rad] for the joints ([m] for sliding ones), in [m] for a
+        frame.
+    quantity: which of the three. frame: name of the frame; the robot's tip_frame if None.
+    unit: used in messages: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
     """
 
     size: float
@@ -42,11 +42,11 @@ class Tolerance:
 
     @classmethod
     def of(cls, tolerance: float | str | Tolerance, robot: Robot) -> Self:
-        """A tolerance from what a person says.
+        """A tolerance from a number or a text.
 
-        tolerance: a bare number (or percentage) is relative in the cost; "0.1 mm" is an error of
-            the robot's tip_frame, "0.1 mm at tool0" of another frame; "0.01 deg" or "1e-4 rad" are
-            of the joints.
+        tolerance: a number or a percentage is relative to the cost; "0.1 mm" is an error of the
+            robot's tip_frame, "0.1 mm at tool0" of another frame; "0.01 deg" or "1e-4 rad" of the
+            joints.
         Raises InputError for anything else.
         """
         if isinstance(tolerance, Tolerance):
@@ -69,7 +69,9 @@ class Tolerance:
         if unit in LENGTHS:
             return cls(size * LENGTHS[unit], Quantity.FRAME, frame, unit)
         if frame is not None:
-            raise InputError(f"tolerance {text!r}: only a length, such as '0.1 mm', is at a frame.")
+            raise InputError(
+                f"tolerance {text!r}: only a length, such as '0.1 mm', can be at a frame."
+            )
         if unit in ANGLES:
             return cls(size * ANGLES[unit], Quantity.JOINTS, unit=unit)
         if unit in SHARES:
@@ -88,7 +90,7 @@ class Tolerance:
         return self
 
     def measure(self, error: MotionError) -> float:
-        """The error in the tolerance's quantity, as a number to compare with `size`."""
+        """The error in the tolerance's quantity and SI unit, to compare with `size`."""
         if self.quantity is Quantity.COST:
             return error.cost
         if self.quantity is Quantity.JOINTS:
@@ -96,7 +98,7 @@ class Tolerance:
         return error.largest_tip
 
     def in_words(self, size: float) -> str:
-        """A size of this quantity with its unit."""
+        """An error of this quantity, with its unit."""
         if self.quantity is Quantity.COST:
             number = f"{size / SHARES[self.unit]:.2g}"
             return f"{number} {self.unit} of the cost".replace("  ", " ")
@@ -108,7 +110,7 @@ class Tolerance:
 
 
 def as_number_or_text(tolerance: float | str | Tolerance | None) -> float | str | None:
-    """A number or a text that `Tolerance.of` takes for the same tolerance; None for None."""
+    """The inverse of `Tolerance.of`: a number or a text; None for None."""
     if not isinstance(tolerance, Tolerance):
         return tolerance
     size = float(tolerance.size)
@@ -121,18 +123,18 @@ def as_number_or_text(tolerance: float | str | Tolerance | None) -> float | str 
 
 def _expected(tolerance: object) -> str:
     return (
-        "a tolerance is a number, relative in the cost, or a text such as '0.1 mm', "
+        "a tolerance must be a number, relative to the cost, or a text such as '0.1 mm', "
         f"'0.1 mm at tool0' or '0.01 deg', got {tolerance!r}."
     )
 
 
 @dataclass(frozen=True)
 class Round:
-    """One grid on the way to a tolerance.
+    """One round of the refinement to a tolerance: a grid and its solution.
 
-    intervals: N. points: quadrature points of all of them. cost: of the solution.
-    error: estimated, in the tolerance's unit; not a number where none could be estimated.
-    nit: steps of the optimiser. seconds: wall time of the solve and of the estimate.
+    intervals: N. points: total number of quadrature points. cost: of the solution.
+    error: estimate, in the tolerance's SI unit; NaN if there is none.
+    nit: steps of the optimiser. seconds: wall time of the solve and the estimate.
     """
 
     intervals: int
@@ -145,13 +147,12 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """How accurate a plan is, as far as that was estimated.
+    """The estimated accuracy of a plan.
 
-    tolerance: what was asked for. error: the estimate of the plan that is returned, in the same
-        unit; not a number where none could be made.
-    reached: whether error <= tolerance. reason: why the search ended before, in a sentence; ""
-        where it did not.
-    rounds: the grids on the way. compare: what `estimate` calls.
+    tolerance: the requested one. error: estimate for the returned plan, in the same unit; NaN if
+        there is none.
+    reached: whether error <= tolerance. reason: why the refinement ended early; "" if it did not.
+    rounds: the grids that were solved on. compare: computes `estimate`.
     """
 
     tolerance: Tolerance
@@ -163,13 +164,13 @@ class Accuracy:
 
     @cached_property
     def estimate(self) -> MotionError | None:
-        """The estimate in every unit, worked out when first asked for; None where there is none."""
+        """The estimated errors of all quantities, computed on first use; None if unknown."""
         return None if self.compare is None else self.compare()
 
     def __str__(self) -> str:
         """One sentence."""
         wanted = self.tolerance.in_words(self.tolerance.size)
         if np.isnan(self.error):
-            return f"{self.reason}; nothing was estimated ({wanted} asked for)."
-        found = f"estimated error {self.tolerance.in_words(self.error)}, {wanted} asked for"
+            return f"{self.reason}; no error was estimated (tolerance {wanted})."
+        found = f"estimated error {self.tolerance.in_words(self.error)}, tolerance {wanted}"
         return f"{found}." if self.reached else f"stopped early: {self.reason}; {found}."

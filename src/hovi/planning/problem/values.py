@@ -1,4 +1,4 @@
-"""Numbers with a unit as people write them: "2 s", "0.1 mm", "0.01 deg"."""
+"""Parsing of numbers with a unit: "2 s", "0.1 mm", "0.01 deg"."""
 
 from __future__ import annotations
 
@@ -16,51 +16,51 @@ DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
 
 Duration = float | str | tuple[float | str, float | str]
-"""A length of time or, for one that is free, its bounds."""
+"""A duration, or (lower, upper) bounds of a free duration."""
 
 
 def number_and_unit(text: str) -> tuple[float, str] | None:
-    """The number and the unit of a text, "" where it has none; None for another text."""
+    """The number and the unit of a text, "" for no unit; None if it does not parse."""
     match = _TEXT.fullmatch(text.strip())
     if match is None:
         return None
     try:
         return float(match[1]), match[2]
-    except ValueError:  # as of 1.2.3
+    except ValueError:  # such as 1.2.3
         return None
 
 
 def seconds(given: Any, what: str) -> float:
-    """A length of time, in [s].
+    """A duration or time, in [s].
 
     given: a number of seconds, or a text such as "2 s", "500 ms" or "1.5 min".
-    what: what it is called in a sentence, as "the duration".
-    Raises InputError for what is neither.
+    what: its name in messages, such as "the duration".
+    Raises InputError for anything else.
     """
     if isinstance(given, float | int | np.number):
         return float(given)
     parsed = number_and_unit(given) if isinstance(given, str) else None
     if parsed is None:
         raise InputError(
-            f"{what} is a number of seconds or a text such as '2 s', '500 ms' or '1.5 min', got "
-            f"{given!r}."
+            f"{what} must be a number of seconds or a text such as '2 s', '500 ms' or '1.5 min', "
+            f"got {given!r}."
         )
     number, unit = parsed
     if not unit:
-        raise InputError(f"{what} {given!r} has no unit: say '{given.strip()} s', for instance.")
+        raise InputError(f"{what} {given!r} has no unit: write '{given.strip()} s', for example.")
     if unit not in DURATIONS:
         raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, DURATIONS)}")
     return number * DURATIONS[unit]
 
 
 def as_duration(given: Any) -> float | tuple[float, float]:
-    """A length of time, in [s], or the bounds (lower, upper) of one. Raises InputError."""
+    """A duration in [s], or (lower, upper) bounds of a free one. Raises InputError."""
     if isinstance(given, str | float | int | np.number):
         return seconds(given, "the duration")
     try:
         lower, upper = given
     except (TypeError, ValueError):
         raise InputError(
-            f"the duration is a number or a pair (lower, upper), got {given!r}."
+            f"the duration must be a number or a pair (lower, upper), got {given!r}."
         ) from None
     return seconds(lower, "the duration"), seconds(upper, "the duration")

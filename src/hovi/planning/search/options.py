@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
-from hovi.planning.clearance.clearance import MARGIN, Clearance
+from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
 from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
@@ -94,7 +94,7 @@ class PlanOptions:
         "motion: hovi.Sphere, hovi.Capsule and hovi.Box.",
     )
     margin: float = option(
-        MARGIN,
+        DEFAULT_MARGIN,
         "the distance that is kept, in [m]: see Clearance.",
         SceneKey("a length of 0 or more, in metres", written=_where_kept),
         least=0,

@@ -1,7 +1,6 @@
-"""The discrete action of a trajectory problem as an objective of the trust region.
+"""The discrete action of a trajectory problem as an objective of the trust-region method.
 
-Where a motion has to meet equations, it is their augmented Lagrangian, see
-hovi.planning.solver.multipliers.
+With equality constraints it is their augmented Lagrangian, see hovi.planning.solver.multipliers.
 """
 
 from __future__ import annotations
@@ -29,23 +28,23 @@ from hovi.scene.lagrangian import Lagrangian, PointTerms
 Array = npt.NDArray[np.float64]
 LinearAlgebra = Literal["band", "tree"]
 
-CHART_END = 1.4 * np.pi
-"""Turn of an orientation within an interval, in [rad], at which no motion is looked for."""
-LEAST_TORQUE = 1e-4
-"""Torque beside which others are small, as a share of M / T^2, where a motion takes none."""
-BAND_INTERVALS = 1000
-"""Up to this many intervals the nodal band matrix, whose condition grows like N^4, is factored."""
+MAX_CHART_TURN = 1.4 * np.pi
+"""Turn of an orientation within an interval, in [rad], above which the value is infinite."""
+TORQUE_FLOOR = 1e-4
+"""Lower bound of the torque scale for residuals, as a share of the inertial torque M / T^2."""
+MAX_BAND_INTERVALS = 1000
+"""Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
 
 
 class ActionObjective(Objective[DiscretePath]):
     """The discrete action between fixed ends, in nodal or in regularized coordinates.
 
-    problem: what to minimise.
-    structure: what depends on the grid alone, from an earlier objective on the same grid.
-    algebra: "band" (a banded Cholesky in nodal coordinates, the faster one) or "tree"
-        (merging intervals in regularized coordinates, right at every step length; for fixed ends
-        without conditions).
-    multipliers: of the equations, where there are some.
+    problem: the trajectory problem.
+    algebra: "band" (banded Cholesky in nodal coordinates, faster) or "tree" (merging intervals in
+        regularized coordinates, accurate for every step length; for fixed ends without
+        constraints).
+    structure: of an earlier objective on the same grid, to be reused.
+    multipliers: of the equality constraints, if any.
     """
 
     def __init__(
@@ -59,10 +58,10 @@ class ActionObjective(Objective[DiscretePath]):
         self.multipliers = multipliers
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
-        small = problem.grid.intervals <= BAND_INTERVALS
+        small = problem.grid.intervals <= MAX_BAND_INTERVALS
         tree = problem.plain and problem.ld.chart is None and not small
         if algebra == "tree" and not problem.plain:
-            raise InputError("the tree is for fixed ends without conditions; use the band.")
+            raise InputError("algebra 'tree' needs fixed ends without conditions; use 'band'.")
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
@@ -70,35 +69,35 @@ class ActionObjective(Objective[DiscretePath]):
 
     @property
     def expansion(self) -> Expansion:
-        """The expansion behind the last model."""
+        """The expansion of the last model."""
         if self._expansion is None:
-            raise RuntimeError("no model has been asked for yet")
+            raise RuntimeError("there is no expansion before the first model")
         return self._expansion
 
     @property
     def coordinates(self) -> Coordinates:
-        """Columns in which the intervals are expanded."""
+        """Coordinates in which the intervals are expanded."""
         return "nodal" if self.algebra == "band" else "regular"
 
     def value(self, x: DiscretePath) -> float:
-        """The discrete action, with what equations add."""
+        """The discrete action, with the terms of multipliers and penalties."""
         return self.value_of(x, self.outputs(x))
 
     def outputs(self, x: DiscretePath) -> list[Array]:
-        """The Lagrangian's outputs at the quadrature points, per batch, kept for the last path."""
+        """The Lagrangian's outputs at the quadrature points, per batch; the last are cached."""
         if self._outputs is None or self._outputs[0] is not x:
             output = self.lagrangian.output
             pairs = zip(self.jets(x), self.ld.point_times, strict=True)
             self._outputs = x, [output(*jet, t=t) for jet, t in pairs]
         return self._outputs[1]
 
-    def _overturned(self, x: DiscretePath) -> bool:
-        """Whether an orientation leaves the chart of an interval, which is singular at a turn."""
-        return self.ld.chart is not None and bool(self.ld.turns(x).max() > CHART_END)
+    def _outside_chart(self, x: DiscretePath) -> bool:
+        """Whether an orientation leaves the chart of an interval, which is singular at 2 pi."""
+        return self.ld.chart is not None and bool(self.ld.turns(x).max() > MAX_CHART_TURN)
 
     def value_of(self, x: DiscretePath, outputs: list[Array]) -> float:
-        """The value where the outputs at the quadrature points are known."""
-        if self._overturned(x):
+        """The value from given outputs at the quadrature points."""
+        if self._outside_chart(x):
             return float("inf")
         value = 0.0
         for i, (jet, t, weights) in enumerate(
@@ -115,25 +114,25 @@ class ActionObjective(Objective[DiscretePath]):
         return value
 
     def output_slope(self, outputs: Array, batch: int) -> Array:
-        """d value / dy at the points of a batch: R y, and the multipliers."""
+        """d value / dy at the points of a batch: R y plus the multipliers."""
         slope = self.lagrangian.output_slope(outputs)
         return slope if self.multipliers is None else slope + self.multipliers.torque[batch]
 
     def residuals(self, x: DiscretePath) -> Residuals:
-        """By how much the equations fail."""
+        """Residuals of the equality constraints."""
         torques = self.outputs(x)
         largest = max(float(np.max(np.abs(tau))) for tau in torques)
-        largest = max(largest, LEAST_TORQUE * self.problem.inertial_torque)
+        largest = max(largest, TORQUE_FLOOR * self.problem.inertial_torque)
         passive = [tau[:, self.problem.passive] for tau in torques]
         return Residuals(passive, node_residuals(self.problem, x), largest)
 
     @property
     def lagrangian(self) -> Lagrangian:
-        """What is minimised, with the weights of penalties."""
+        """The Lagrangian, with the penalties among its weights."""
         return self.ld.lagrangian
 
     def jets(self, x: DiscretePath) -> list[Jet]:
-        """(q, v, a) at the quadrature points, remembered for the last path."""
+        """(q, v, a) at the quadrature points; cached for the last path."""
         if self._last is None or self._last[0] is not x:
             self._last = x, self.ld.jets(x)
         return self._last[1]
@@ -159,9 +158,9 @@ class ActionObjective(Objective[DiscretePath]):
         curvatures: list[Array] | None,
         terms: list[PointTerms] | None,
     ) -> QuadraticModel:
-        """The model at x with given curvature weights and with what limits add at the points.
+        """The model at x with given weights of the outputs' curvature and with terms of limits.
 
-        curvatures: weights of the outputs' curvature, multipliers of equations included.
+        curvatures: weights per batch, multipliers of constraints included. terms: at the points.
         """
         if self.multipliers is not None:
             terms = self.multipliers.added_to(terms)
@@ -193,7 +192,7 @@ class ActionObjective(Objective[DiscretePath]):
         return MergeTreeModel(intervals, self.structure.tree)
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
-        """What conditions at nodes add to the intervals that have these nodes."""
+        """Add the terms of the conditions to the intervals that contain their nodes."""
         N, rho = self.problem.grid.intervals, known.node_penalty
         for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
             k = min(each.node, N - 1)
@@ -226,7 +225,7 @@ class ActionObjective(Objective[DiscretePath]):
 
 
 def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
-    """The discrete Lagrangian whose weight of the passive joints' torques is their penalty."""
+    """The discrete Lagrangian with the penalty as the weight of the passive joints' torques."""
     if len(problem.passive) == 0:
         return problem.ld
     weight = problem.ld.lagrangian.output_weight.copy()

@@ -27,15 +27,14 @@ Array = npt.NDArray[np.float64]
 class BoundedAction(BoundedObjective[DiscretePath]):
     """The discrete action, with (q, v, a, tau) bounded at the quadrature points.
 
-    Outputs of q that have to be 0 or more, distances to obstacles for instance, follow those in
-    their columns.
+    Further outputs y(q) >= 0, such as distances to obstacles, follow in the last columns.
 
-    problem: what to minimise.
+    problem: the trajectory problem.
     limits: the bounds.
-    margins: by which share of its range each bound is drawn in, below and above, in each
-        interval, shape (2, N, 4 nv + more); none when None.
+    margins: share of its range by which each lower and upper bound is tightened in each interval,
+        shape (2, N, 4 nv + more); none if None.
     algebra, multipliers: as for ActionObjective.
-    more: outputs besides.
+    more: further outputs.
     """
 
     def __init__(
@@ -56,7 +55,9 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._jet_size = (self.lagrangian.order + 1) * self.lagrangian.nv
         self._size = self._jet_size + len(self.lagrangian.output_weight)
         if self.columns.max(initial=0) >= self._size:
-            raise InputError("limits on tau need a Lagrangian of torques: leave them out.")
+            raise InputError(
+                "limits on tau need a Lagrangian whose outputs are torques; leave them out."
+            )
         self.more = more
         self.bounds = self._bounds(margins)
         self._predicted: list[Array] | None = None
@@ -65,7 +66,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._jacobian = np.zeros((0, 0, 0))
 
     def outputs(self, x: DiscretePath) -> Outputs:
-        """The discrete action, and the bounded outputs in units of their ranges."""
+        """The discrete action, and the bounded outputs relative to their ranges."""
         outputs = self.action.outputs(x)
         pairs = zip(self.action.jets(x), outputs, strict=True)
         space = self.lagrangian.space
@@ -81,7 +82,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
     ) -> QuadraticModel:
-        """The action's model with the bounds' terms: see BoundedObjective.model."""
+        """The model of the action with the terms of the bounds: see BoundedObjective.model."""
         self._rho = rho
         gradient = self._unscaled(rho, 1)
         weight = self._unscaled(sigma, 2)
@@ -97,7 +98,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self.action.model_with(x, curvatures, terms)
 
     def forces(self, x: DiscretePath, multipliers: Array) -> list[PointTerms]:
-        """What the bounds, and equations besides, exert on (q, v, a, tau) at the points.
+        """The multipliers of bounds and constraints as terms in (q, v, a, tau) at the points.
 
         multipliers: of the outputs, shape (P, K).
         """
@@ -120,7 +121,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         rho: Array,
         multipliers: Array,
     ) -> list[PointTerms]:
-        """The terms with those of the other outputs."""
+        """The terms with those of the further outputs added."""
         assert self.more is not None
         first, nv = len(self.columns), self.lagrangian.nv
         J, curve = self.more.expand(self._configurations(x), multipliers[:, first:])
@@ -135,7 +136,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         ]
 
     def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
-        """Change of the action and of the bounded outputs, to first order."""
+        """First-order change of the action and of the bounded outputs."""
         expansion = self.action.expansion
         changes = self.ld.point_steps(model.gather(step), self.action.coordinates, expansion)
         rows = []
@@ -153,7 +154,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return slope - float(np.sum(self.bounds.weights * self._rho * dy)), dy
 
     def apply_fraction(self, fraction: float) -> None:
-        """The torques that the step taken foresees weight the next curvature."""
+        """Use the torques that the step predicts as weights of the next model's curvature."""
         pairs = zip(self.action.expansion.outputs, self._linear, strict=True)
         self._predicted = [
             self.action.output_slope(tau + fraction * dtau, i)
@@ -169,7 +170,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return np.concatenate([jet[0] for jet in self.action.jets(x)])
 
     def _slope(self, x: DiscretePath, batch: int) -> Array:
-        """R y as foreseen, or as it is at x."""
+        """R y as predicted, or at x before the first step."""
         if self._predicted is not None:
             return self._predicted[batch]
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
@@ -181,13 +182,13 @@ class BoundedAction(BoundedObjective[DiscretePath]):
 
     @cached_property
     def _parts(self) -> list[slice]:
-        """Rows of every batch among all points."""
+        """Slice of each batch in the array of all points."""
         ends = np.cumsum([0, *(len(weights) for weights in self.ld.point_weights)])
         return [slice(a, b) for a, b in itertools.pairwise(ends)]
 
     @cached_property
     def _origin(self) -> Array:
-        """Where the scale of every output starts: its lower bound, or its only one."""
+        """Origin of each scaled output: its lower bound, or its only one."""
         lower, upper = self.limits.lower.ravel(), self.limits.upper.ravel()
         return np.where(np.isfinite(lower), lower, upper)[self.columns]
 
@@ -195,7 +196,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return (rows[:, self.columns] - self._origin) / self._ranges
 
     def _unscaled(self, y: Array, power: int) -> Array:
-        """Derivatives by scaled outputs as derivatives by (q, v, a, tau), (P, 4 nv)."""
+        """Derivatives in scaled outputs as derivatives in (q, v, a, tau), shape (P, 4 nv)."""
         full = np.zeros((len(y), self._size))
         full[:, self.columns] = y[:, : len(self.columns)] / self._ranges**power
         return full
@@ -210,8 +211,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         shape = (len(intervals), len(lower))
         if margins is None:
             return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
-        drawn = margins.reshape(2, len(margins[0]), -1)
+        tightening = margins.reshape(2, len(margins[0]), -1)
         first = self.limits.lower.size
         chosen = np.append(self.columns, np.arange(first, first + size))
-        drawn = drawn[:, :, chosen][:, intervals]
-        return Bounds(lower + drawn[0], upper - drawn[1], weights)
+        tightening = tightening[:, :, chosen][:, intervals]
+        return Bounds(lower + tightening[0], upper - tightening[1], weights)

@@ -1,4 +1,4 @@
-"""Outputs of q that have to be 0 or more at the quadrature points: distances, for instance."""
+"""Outputs y(q) >= 0 at the quadrature points, such as distances."""
 
 from __future__ import annotations
 
@@ -7,22 +7,21 @@ from abc import ABC, abstractmethod
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.clearance.clearance import SCALE
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
 
 Array = npt.NDArray[np.float64]
 
-CUSHION = 5e-4
-"""What distances keep beyond the margin at the points, as a share of SCALE: 0.05 mm that the
-motion may use up between them."""
-LEVELS = 1.0, 3.0
-"""Excess over the margin at which distances begin to count less, and from which not at all."""
-NEGLIGIBLE = 1e-2
-"""Share of the largest force below which the curvature of an output is left out."""
+EXTRA_CLEARANCE = 5e-4
+"""Clearance at the points beyond the margin, in DISTANCE_SCALE: 0.05 mm for the motion between."""
+CUTOFF = 1.0, 3.0
+"""Excess over the margin, in DISTANCE_SCALE, from which outputs level off, and are constant."""
+NEGLIGIBLE_FORCE = 1e-2
+"""Share of the largest force below which the curvature of an output is omitted."""
 
 
 class PointOutputs(ABC):
-    """y(q) >= 0 in units of its own scale, with its derivatives in the tangent space."""
+    """y(q) >= 0, dimensionless, with its derivatives in the tangent space."""
 
     @property
     @abstractmethod
@@ -43,12 +42,12 @@ class PointOutputs(ABC):
 
 
 class ClearanceOutputs(PointOutputs):
-    """y = (phi(d) - least) / SCALE for every pair's distance d.
+    """y = (phi(d) - least) / DISTANCE_SCALE for every pair's distance d.
 
-    phi(d) = d for near pairs and constant for far ones, with two continuous derivatives between:
-    what is far away has no influence, and needs no derivatives.
+    phi(d) = d for near pairs and constant for far ones, with two continuous derivatives: far
+    pairs have no influence, and need no derivatives.
 
-    distances: of the pairs. least: what they have to keep, in [m].
+    distances: of the pairs. least: lower bound, in [m].
     """
 
     def __init__(self, distances: Distances, least: float) -> None:
@@ -62,27 +61,30 @@ class ClearanceOutputs(PointOutputs):
 
     def values(self, q: Array) -> Array:
         """y, shape (P, K)."""
-        return _levelled(self._excess(self.distances.values(q)))[0]
+        return _saturated(self._excess(self.distances.values(q)))[0]
 
     def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
-        """Derivatives, and the curvature of the pairs that are near and push: see PointOutputs."""
-        d, jacobian = self.distances.expand(q, self.least + LEVELS[1] * SCALE)
-        y, slope, bend = _levelled(self._excess(d))
-        jacobian /= SCALE
-        pushing = np.abs(force) > NEGLIGIBLE * np.max(np.abs(force), initial=0.0)
-        pull = np.where(pushing & (y < LEVELS[1]), force * slope / SCALE, 0.0)
-        curvature = self.distances.curvature(q, pull)
-        bent = (force * bend)[:, :, None] * jacobian
-        curvature += np.matmul(jacobian.transpose(0, 2, 1), bent)
+        """Derivatives, and the curvature of near pairs with a force: see PointOutputs."""
+        d, jacobian = self.distances.expand(q, self.least + CUTOFF[1] * DISTANCE_SCALE)
+        y, slope, bend = _saturated(self._excess(d))
+        jacobian /= DISTANCE_SCALE
+        active = np.abs(force) > NEGLIGIBLE_FORCE * np.max(np.abs(force), initial=0.0)
+        weights = np.where(active & (y < CUTOFF[1]), force * slope / DISTANCE_SCALE, 0.0)
+        curvature = self.distances.curvature(q, weights)
+        bending = (force * bend)[:, :, None] * jacobian
+        curvature += np.matmul(jacobian.transpose(0, 2, 1), bending)
         return slope[:, :, None] * jacobian, curvature
 
     def _excess(self, d: Array) -> Array:
-        return (d - self.least) / SCALE
+        return (d - self.least) / DISTANCE_SCALE
 
 
-def _levelled(y: Array) -> tuple[Array, Array, Array]:
-    """phi and its two derivatives, in units of SCALE: y, then y - x^3 + x^4/2, then constant."""
-    near, far = LEVELS
+def _saturated(y: Array) -> tuple[Array, Array, Array]:
+    """phi(y) and its two derivatives, in DISTANCE_SCALE.
+
+    y up to the first CUTOFF, then width (x - x^3 + x^4/2) more with x in [0, 1], then constant.
+    """
+    near, far = CUTOFF
     width = far - near
     x = np.clip((y - near) / width, 0.0, 1.0)
     level = near + width * (x - x**3 + 0.5 * x**4)

@@ -1,4 +1,4 @@
-"""Rounds of an augmented Lagrangian: minimise, correct the multipliers, minimise again."""
+"""Augmented Lagrangian iteration: minimise, update multipliers and penalties, repeat."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
 
-TORQUE_PENALTY = 10.0
-"""First penalty of a passive joint's torque, relative to the mean weight of the others."""
-NEARLY = 0.1
-"""The same as TORQUE_SHARE for a guess that is a solution nearby, and keeps its passive joints."""
-WARM = 1e3
-"""Factor of the first penalty for such a guess."""
-NODE_PENALTY = 1e3
-"""First penalty of conditions at nodes, relative to the cost, per [rad^2] or [m^2]."""
-GROWTH = 10.0
-"""Factor of a penalty whose equations fall too slowly."""
-FALL = 0.1
-"""Share of the last round's residual above which they do."""
-LARGEST = 1e9
-"""Largest penalty, relative to the first."""
-ROUNDS = 60
-"""Rounds before giving up."""
-TORQUE_SHARE = 1e-10
-"""Torque of a passive joint that counts as none, as a share of the largest torque."""
-NODE_MISS = 1e-11
-"""Residual of a condition that counts as met, in [rad] or [m]."""
-CLOSE = 1e-6
-"""The same for a round whose residuals rounding keeps from falling further."""
+INITIAL_TORQUE_PENALTY = 10.0
+"""Initial penalty of passive torques, relative to the mean weight of the other joints."""
+WARM_TORQUE_SHARE = 0.1
+"""Passive torque of a guess, relative to the largest torque, up to which it counts as warm."""
+WARM_PENALTY_FACTOR = 1e3
+"""Factor of the initial torque penalty for a warm guess."""
+INITIAL_NODE_PENALTY = 1e3
+"""Initial penalty of conditions at nodes, relative to the cost, per [rad^2] or [m^2]."""
+PENALTY_GROWTH = 10.0
+"""Factor by which a penalty grows if its residual decreases too slowly."""
+SLOW_DECREASE = 0.1
+"""Ratio of successive residuals above which their decrease is too slow."""
+MAX_PENALTY_RATIO = 1e9
+"""Maximum penalty, relative to the initial one."""
+MAX_ROUNDS = 60
+"""Maximum number of rounds."""
+TORQUE_TOLERANCE = 1e-10
+"""Largest passive torque at convergence, relative to the largest torque."""
+NODE_TOLERANCE = 1e-11
+"""Largest residual of a condition at convergence, in [rad] or [m]."""
+FEASIBLE_RESIDUAL = 1e-6
+"""Residual above which a problem counts as infeasible: relative for torques, else [rad] or [m]."""
 FIRST_DECREASE = 1e-3
-"""Relative decrease that a first round may leave; later rounds leave what their residual allows."""
+"""Relative decrease at which a first round stops; later rounds stop by their residual."""
 
 
 class Minimized(Protocol):
-    """Where one round ended."""
+    """The result of one round: its final point and why it ended."""
 
     x: DiscretePath
     stop: Stop
@@ -51,12 +51,12 @@ Result = TypeVar("Result", bound=Minimized)
 
 
 @dataclass(frozen=True, eq=False)
-class Satisfied(Generic[Result]):
-    """Where the rounds ended.
+class ConstrainedResult(Generic[Result]):
+    """The result of the iteration.
 
-    result: of the last round. multipliers: those of that round, or the next ones where the number
-    of rounds ended it. reason: why the equations cannot be met,
-    in a sentence without its end, or "".
+    result: of the last round. multipliers: of that round, or updated ones after MAX_ROUNDS.
+    residuals: of the constraints. reason: why they cannot be met, as a sentence without its end,
+        or "".
     """
 
     result: Result
@@ -66,98 +66,108 @@ class Satisfied(Generic[Result]):
 
     @property
     def met(self) -> bool:
-        """Whether the equations hold to working precision."""
-        return within(self.residuals, TORQUE_SHARE, NODE_MISS)
+        """Whether the constraints hold to their tolerances."""
+        return within(self.residuals, TORQUE_TOLERANCE, NODE_TOLERANCE)
 
 
-def satisfy(
+def minimize_constrained(
     problem: TrajectoryProblem,
     path: DiscretePath,
     minimize: Callable[[Multipliers, DiscretePath, float], Result],
     known: Multipliers | None = None,
-) -> Satisfied[Result]:
-    """Minimise under the problem's equations.
+) -> ConstrainedResult[Result]:
+    """Minimise subject to the problem's equality constraints.
 
-    minimize: a minimum of the augmented Lagrangian with given multipliers, from a path, to a
+    minimize: minimises the augmented Lagrangian with given multipliers, from a path, to a
         relative decrease.
-    known: multipliers of a problem nearby.
+    known: multipliers of a nearby problem, for a warm start.
     """
     multipliers = known or first_multipliers(problem, path)
     first = multipliers
     decrease = FIRST_DECREASE
     last = np.inf, np.inf
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         result = minimize(multipliers, path, decrease)
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)
-        sizes = residuals.torque_share, residuals.node_miss
-        if result.stop is not Stop.STATIONARY or within(residuals, TORQUE_SHARE, NODE_MISS):
+        sizes = residuals.torque_share, residuals.node_error
+        if result.stop is not Stop.STATIONARY or within(
+            residuals, TORQUE_TOLERANCE, NODE_TOLERANCE
+        ):
             break
         slow = [
-            size > max(FALL * before, 0.1 * met)
-            for size, before, met in zip(sizes, last, (TORQUE_SHARE, NODE_MISS), strict=True)
+            size > max(SLOW_DECREASE * before, 0.1 * met)
+            for size, before, met in zip(
+                sizes, last, (TORQUE_TOLERANCE, NODE_TOLERANCE), strict=True
+            )
         ]
-        if _stiffest(multipliers, first, slow):
+        if _at_maximum_penalty(multipliers, first, slow):
             break
         multipliers = multipliers.updated(residuals, problem.passive)
-        multipliers = multipliers.stiffer(*(GROWTH if each else 1.0 for each in slow))
+        multipliers = multipliers.with_scaled_penalties(
+            *(PENALTY_GROWTH if each else 1.0 for each in slow)
+        )
         decrease = float(np.clip(max(sizes) ** 2, 1e-12, FIRST_DECREASE))
         last = sizes
     reason = ""
-    if result.stop is Stop.STATIONARY and not within(residuals, CLOSE, CLOSE):
+    if result.stop is Stop.STATIONARY and not within(
+        residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL
+    ):
         reason = unmet_sentence(problem, path, residuals)
     elif result.stop is Stop.STATIONARY:
-        reason = _elsewhere(problem, path)
-    return Satisfied(result, multipliers, residuals, reason)
+        reason = _spurious_sentence(problem, path)
+    return ConstrainedResult(result, multipliers, residuals, reason)
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
-    """None, with penalties that suit the weights of the torques and the cost of a path."""
+    """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
     weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
     weight = float(weights.mean()) if len(weights) > 0 else 1.0
     cost = max(abs(problem.ld.action(path)), 1e-6)
-    none = Multipliers.zero(problem, TORQUE_PENALTY * weight, NODE_PENALTY * cost)
-    share = ActionObjective(problem, multipliers=none).residuals(path).torque_share
-    return none.stiffer(WARM, 1.0) if share <= NEARLY else none
+    zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)
+    share = ActionObjective(problem, multipliers=zero).residuals(path).torque_share
+    warm = share <= WARM_TORQUE_SHARE
+    return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
 
 
-def within(residuals: Residuals, torque_share: float, node_miss: float) -> bool:
-    """Whether passive torques and conditions at nodes fail by no more than that."""
-    return residuals.torque_share <= torque_share and residuals.node_miss <= node_miss
+def within(residuals: Residuals, torque_share: float, node_error: float) -> bool:
+    """Whether passive torques and conditions at nodes are within these tolerances."""
+    return residuals.torque_share <= torque_share and residuals.node_error <= node_error
 
 
-def _stiffest(now: Multipliers, first: Multipliers, slow: list[bool]) -> bool:
-    """Whether a penalty that would have to grow has grown as far as it may."""
+def _at_maximum_penalty(now: Multipliers, first: Multipliers, slow: list[bool]) -> bool:
+    """Whether a penalty that should grow has reached its maximum."""
     grown = now.torque_penalty / first.torque_penalty, now.node_penalty / first.node_penalty
-    return any(each and size >= LARGEST for each, size in zip(slow, grown, strict=True))
+    return any(each and size >= MAX_PENALTY_RATIO for each, size in zip(slow, grown, strict=True))
 
 
-def _elsewhere(problem: TrajectoryProblem, path: DiscretePath) -> str:
-    """Which condition is met by what it does not mean, or ""."""
+def _spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+    """Which condition holds at a spurious root, as a sentence without its end; "" if none does."""
     for each in problem.conditions:
         q, v = path.q[each.node], path.v[each.node]
-        if each.condition.elsewhere(q, v):
+        if each.condition.is_spurious(q, v):
             return (
-                f"the motion ends turned over at t = {problem.grid.t[each.node]:.4g} s: "
-                f"{each.condition.describe(q, v)}; plan again from another guess"
+                f"the frame is half a turn away from its goal at t = "
+                f"{problem.grid.t[each.node]:.4g} s: {each.condition.describe(q, v)}; try another "
+                "initial guess"
             )
     return ""
 
 
 def unmet_sentence(problem: TrajectoryProblem, path: DiscretePath, residuals: Residuals) -> str:
-    """Which equation fails most."""
-    if residuals.torque_share > CLOSE or not problem.conditions:
+    """The constraint with the largest residual, as a sentence without its end."""
+    if residuals.torque_share > FEASIBLE_RESIDUAL or not problem.conditions:
         joints = ", ".join(repr(joint) for joint in problem.scene.passive)
         return (
-            f"no motion was found on which joint {joints} carries no torque: it still takes "
-            f"{residuals.torque_share:.3g} of the largest torque; allow more time or another goal"
+            f"no motion was found with zero torque at passive joint {joints}: the remaining torque "
+            f"is {residuals.torque_share:.3g} of the largest; allow more time or change the goal"
         )
     worst = max(
         zip(problem.conditions, residuals.nodes, strict=True),
         key=lambda pair: float(np.max(np.abs(pair[1]), initial=0.0)),
     )[0]
-    missed = worst.condition.describe(path.q[worst.node], path.v[worst.node])
+    error = worst.condition.describe(path.q[worst.node], path.v[worst.node])
     return (
-        f"what is asked at t = {problem.grid.t[worst.node]:.4g} s cannot be met: {missed}; ask for "
-        "less, or plan again from another guess"
+        f"the goal at t = {problem.grid.t[worst.node]:.4g} s cannot be met: {error}; change the "
+        "goal or try another initial guess"
     )

@@ -1,9 +1,12 @@
-"""Multipliers of the equations along a motion, in an augmented Lagrangian.
+"""Multipliers and penalties of the equality constraints: an augmented Lagrangian.
 
-With c = 0 the torques of passive joints at the quadrature points and conditions at nodes, the
-action is replaced by  action + sum w (lambda tau + rho tau^2/2) + sum (mu c + rho c^2/2):  the
-block structure stays, minima under the equations are minima of it once rho is large enough, and
-its negative eigenvalues then count those directions alone in which the equations hold.
+For the constraints tau = 0 of passive joints at the quadrature points, with weights w, and c = 0
+at nodes, the action is replaced by
+
+    action + sum w (lambda tau + rho tau^2/2) + sum (mu c + rho c^2/2).
+
+It keeps the block structure. For rho large enough constrained minima are minima of it, and its
+negative eigenvalues are those of the Hessian on the tangent space of the constraints.
 [NocedalWright2006, section 17.3]
 """
 
@@ -24,11 +27,11 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """By how much the equations fail.
+    """Residuals of the equality constraints.
 
     torque: of the passive joints at the quadrature points, (P, passive) per batch, in [N m].
-    nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, and at
-        least a little of what moving takes at all, in [N m].
+    nodes: c of every condition, shape (k,) each. largest_torque: of any joint at any point, in
+        [N m], bounded below by a small share of the inertial torque.
     """
 
     torque: list[Array]
@@ -37,19 +40,19 @@ class Residuals:
 
     @property
     def torque_share(self) -> float:
-        """The largest torque of a passive joint, as a share of the largest of all."""
+        """The largest torque of a passive joint, relative to `largest_torque`."""
         passive = max((float(np.max(np.abs(t), initial=0.0)) for t in self.torque), default=0.0)
         return passive / max(self.largest_torque, 1e-300)
 
     @property
-    def node_miss(self) -> float:
+    def node_error(self) -> float:
         """The largest component of a condition, in [m] or [rad]."""
         return max((float(np.max(np.abs(c), initial=0.0)) for c in self.nodes), default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """lambda and mu with their penalties.
+    """The multipliers lambda and mu, and their penalties.
 
     torque: lambda of every joint at the quadrature points, (P, nv) per batch, zero where a joint
         is not passive. nodes: mu of every condition.
@@ -66,7 +69,7 @@ class Multipliers:
     def zero(
         cls, problem: TrajectoryProblem, torque_penalty: float, node_penalty: float
     ) -> Multipliers:
-        """No multipliers yet."""
+        """Zero multipliers with given penalties."""
         lagrangian = problem.ld.lagrangian
         outputs = len(lagrangian.output_weight)
         torque = [np.zeros((len(t), outputs)) for t in problem.ld.point_times]
@@ -87,11 +90,11 @@ class Multipliers:
 
     @property
     def forces(self) -> list[PointTerms]:
-        """What they exert on the torques at the quadrature points."""
+        """The multipliers as terms at the quadrature points."""
         return self.added_to(None)
 
     def added_to(self, terms: list[PointTerms] | None) -> list[PointTerms]:
-        """What limits add at the points, and the forces on the torques."""
+        """The terms of limits at the points, plus the multipliers of the torques."""
         if terms is None:
             return [PointTerms.on_outputs(force, self.jet_size) for force in self.torque]
         return [
@@ -99,8 +102,8 @@ class Multipliers:
             for term, force in zip(terms, self.torque, strict=True)
         ]
 
-    def stiffer(self, torque: float, node: float) -> Multipliers:
-        """The same multipliers with larger penalties, by the given factors."""
+    def with_scaled_penalties(self, torque: float, node: float) -> Multipliers:
+        """The same multipliers with penalties scaled by the given factors."""
         return dataclasses.replace(
             self,
             torque_penalty=self.torque_penalty * torque,

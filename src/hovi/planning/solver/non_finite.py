@@ -1,4 +1,4 @@
-"""Which number of a motion is not finite, by joint, term and time."""
+"""Diagnosis of NaN and infinity in a motion: quantity, joint and time."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ Array = npt.NDArray[np.float64]
 
 
 def non_finite_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
-    """The first number that is infinite or not a number, as part of a sentence; "" if none is.
+    """The first number that is infinite or NaN, as a clause; "" if all are finite.
 
-    Looked for among the nodes, then at the quadrature points among accelerations, torques and
-    costs, and then among the derivatives of the cost.
+    Checked in this order: the nodes; accelerations, torques and costs at the quadrature points;
+    the derivatives of the cost.
     """
     with np.errstate(all="ignore"):
         return _at_nodes(problem, path) or _at_points(problem, path) or _derivative(problem, path)
@@ -25,9 +25,9 @@ def non_finite_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 def _at_nodes(problem: TrajectoryProblem, path: DiscretePath) -> str:
     for term, values in (("position", path.q), ("velocity", path.v)):
-        place = _first(values)
-        if place is not None:
-            k, i = place
+        index = _first_non_finite(values)
+        if index is not None:
+            k, i = index
             where = f"at node {k} of {path.intervals} (t = {problem.grid.t[k]:.4g} s)"
             return f"the {term} of {_joint(problem, i)} is {values[k, i]} {where}"
     return ""
@@ -37,14 +37,14 @@ def _at_points(problem: TrajectoryProblem, path: DiscretePath) -> str:
     jets = problem.ld.jets(path)
     points = zip(jets, problem.ld.point_times, problem.ld.point_intervals, strict=True)
     for jet, t, numbers in points:
-        found: list[tuple[str, Array]] = [("acceleration", jet[2])]
+        quantities: list[tuple[str, Array]] = [("acceleration", jet[2])]
         lagrangian = problem.ld.lagrangian
-        found.append((lagrangian.output_name, lagrangian.output(*jet, t=t)))
-        found.append(("cost", lagrangian.value(*jet, t=t)[:, None]))
-        for term, values in found:
-            place = _first(values)
-            if place is not None:
-                j, i = place
+        quantities.append((lagrangian.output_name, lagrangian.output(*jet, t=t)))
+        quantities.append(("cost", lagrangian.value(*jet, t=t)[:, None]))
+        for term, values in quantities:
+            index = _first_non_finite(values)
+            if index is not None:
+                j, i = index
                 of = "" if term == "cost" else f" of {_joint(problem, i)}"
                 return (
                     f"the {term}{of} is {values[j, i]} at t = {t[j]:.4g} s (interval {numbers[j]})"
@@ -55,17 +55,17 @@ def _at_points(problem: TrajectoryProblem, path: DiscretePath) -> str:
 def _derivative(problem: TrajectoryProblem, path: DiscretePath) -> str:
     expansion = problem.ld.expand(path, "regular")
     for term, values in (("first", expansion.gradient), ("second", expansion.hessian)):
-        place = _first(values)
-        if place is not None:
-            k = place[0]
+        index = _first_non_finite(values)
+        if index is not None:
+            k = index[0]
             where = f"in interval {k} (from t = {problem.grid.t[k]:.4g} s)"
             return f"the {term} derivatives of the cost are too large {where}"
     return ""
 
 
-def _first(values: npt.NDArray[Any]) -> tuple[int, ...] | None:
-    places = np.argwhere(~np.isfinite(values))
-    return None if len(places) == 0 else tuple(int(i) for i in places[0])
+def _first_non_finite(values: npt.NDArray[Any]) -> tuple[int, ...] | None:
+    indices = np.argwhere(~np.isfinite(values))
+    return None if len(indices) == 0 else tuple(int(i) for i in indices[0])
 
 
 def _joint(problem: TrajectoryProblem, i: int) -> str:

@@ -1,4 +1,4 @@
-"""The action with a penalty in the place of limits: where to look when no way inside is found."""
+"""The action with quadratic penalties instead of limits, to restore feasibility."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 
 class PenalizedAction(Objective[DiscretePath]):
-    """The action plus penalty/2 sum weights (distance outside the bounds)^2."""
+    """action + penalty/2 sum weights (distance outside the bounds)^2."""
 
     def __init__(self, limited: BoundedAction, penalty: float) -> None:
         self.limited = limited
@@ -32,7 +32,7 @@ class PenalizedAction(Objective[DiscretePath]):
     def model(
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
-        """The quadratic model, the penalty's kinks taken as they are at x."""
+        """The quadratic model, with the bounds that are violated at x."""
         outside = self._outside(x)
         force = self.penalty * outside
         return self.limited.model(x, self.penalty * (outside != 0), force, force)

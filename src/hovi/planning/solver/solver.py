@@ -21,7 +21,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.solver.methods.choice import method_for
-from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.status import Status
 from hovi.planning.solver.warm_start import follow
 from hovi.robot.robot import Robot
@@ -29,28 +29,28 @@ from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.interruption import interruptible, record_interrupt
 
-CORRECTIONS = 6
-"""Quasi-Newton steps that may correct the guess of a motion between other states."""
-DECREASE = 1e-9
-"""Relative decrease of a Newton step from which on a motion is stationary but for rounding."""
+MAX_CORRECTIONS = 6
+"""Maximum number of quasi-Newton steps on the initial guess of `replan`."""
+STATIONARY_DECREASE = 1e-9
+"""Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The answer to a trajectory problem.
+    """The solution of a trajectory problem, or the best motion found.
 
-    success: whether a minimum was found. status, message: what happened, in a word and in a
+    success: whether a minimum was found. status, message: the outcome, as a word and in a
         sentence.
-    trajectory: the motion, the best so far where no minimum was found.
-    cost: the discrete action of L~, 1/2 integral |tau|^2 where nothing else was asked.
-    error_estimate: relative, in the cost; None where there is none.
-    accuracy: what was reached of a tolerance; None where none was asked for.
-    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 where it
-        was not counted.
+    trajectory: the motion; the best one found if there is no minimum.
+    cost: the discrete action of L~, by default 1/2 integral |tau|^2.
+    error_estimate: of the cost, relative; None if there is none.
+    accuracy: the accuracy that was reached; None if no tolerance was given.
+    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they
+        were not counted.
     minima: costs of all minima that a multi-start found, ascending.
-    history: what each step did.
+    history: one record per step.
     setup_seconds, solve_seconds: wall time before and during the solve.
-    problem: what was solved; `replan` starts from it.
+    problem: the trajectory problem; `replan` starts from it.
     forces: multipliers of limits and of passive joints' torques at the quadrature points.
     """
 
@@ -72,12 +72,12 @@ class Solution:
 
     @cached_property
     def duration_derivative(self) -> float:
-        """d cost / d T with all else as it was asked, per [s]: minus Pontryagin's Hamiltonian.
+        """d cost / d T with all else fixed, per [s]: minus Pontryagin's Hamiltonian.
 
         For an effort that does not depend on time. Raises InputError without a problem.
         """
         if self.problem is None:
-            raise InputError("this solution does not know its problem; plan again instead.")
+            raise InputError("this solution has no problem; call plan again instead.")
         return self.problem.ld.duration_derivative(self.trajectory.path, self.forces)
 
     def replan(
@@ -87,19 +87,19 @@ class Solution:
         guess: Solution | None = None,
         **options: Any,
     ) -> Solution:
-        """The motion between other states, from this one or another as the guess.
+        """The motion between other states, with this motion or another as the initial guess.
 
-        Everything that was built is used again, so that this can run in a loop. The guess is
-        where the earlier motion goes to first order, which counts as one of the steps, corrected
-        by a few gradients, which do not: see hovi.planning.solver.warm_start.
+        Precomputed functions are reused, for planning in a loop. The guess is the first-order
+        prediction of the motion, which counts as one step, corrected by a few gradient
+        evaluations, which do not: see hovi.planning.solver.warm_start.
         start, goal: a State, a configuration at rest or the name of a pose; the goal may be a
-            FrameGoal; as before when None.
-        guess: an earlier answer on the same grid; this one when None.
+            FrameGoal; unchanged if None.
+        guess: an earlier solution on the same grid; this one if None.
         options: as for `solve`.
-        Raises InputError when this solution does not know its problem.
+        Raises InputError if this solution has no problem.
         """
         if self.problem is None:
-            raise InputError("this solution does not know its problem; plan again instead.")
+            raise InputError("this solution has no problem; call plan again instead.")
         old = self.problem
         problem = old.between(
             old.start if start is None else as_state(start, old.robot),
@@ -107,11 +107,11 @@ class Solution:
         )
         origin = self if guess is None else guess
         path = origin.trajectory.path
-        if isinstance(goal, FrameGoal):  # from where it is met: half a turn away it seems to be
+        if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
             path = moved(path, problem.grid, problem.boundary, problem.robot)
         if problem.limited or not problem.plain:
             return solve(problem, path, **options)
-        solution = solve(problem, follow(path, problem, CORRECTIONS), **options)
+        solution = solve(problem, follow(path, problem, MAX_CORRECTIONS), **options)
         return dataclasses.replace(solution, nit=solution.nit + 1)
 
 
@@ -135,88 +135,92 @@ def solve(
 
     problem: the boundary data and the discrete Lagrangian.
     guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
-    max_iterations: steps; with limits or equations, of every round. time_limit: in [s]. Both
-        return the best motion so far.
-    escape_saddles: leave a saddle along negative curvature; False stops there, with its status.
+    max_iterations: maximum number of steps; with limits or constraints, per round.
+    time_limit: in [s]. At either limit the best motion so far is returned.
+    escape_saddles: whether to leave saddles along negative curvature; False stops there with
+        status SADDLE.
     report: called with the number of each step and the least cost so far.
-    method: how to minimise; the first of hovi.planning.solver.methods.choice that suits when None.
-    With limits, `cost` is that of the motion that holds them everywhere, and intervals may have
-    been split for it.
-    Raises InputError for a guess or a method that does not fit.
+    method: minimisation method; None for the first suitable one of
+        hovi.planning.solver.methods.choice.
+    With limits, `cost` belongs to the motion that satisfies them everywhere, and intervals may
+    have been split.
+    Raises InputError for a guess or a method that does not fit the problem.
     """
     began = time.perf_counter()
     method = method or method_for(problem)
     if not method.suits(problem):
-        raise InputError(f"{type(method).__name__} cannot meet all that this problem asks for.")
+        raise InputError(
+            f"method {type(method).__name__} does not support this problem; leave `method` out."
+        )
     path = guess_path(problem, guess)
     options = Options(
-        decrease=DECREASE,
+        decrease=STATIONARY_DECREASE,
         max_iterations=max_iterations,
         time_limit=time_limit,
         escape_saddles=escape_saddles,
     )
     started = time.perf_counter()
     try:
-        answer = method.minimize(problem, path, options, report)
-    except KeyboardInterrupt:  # outside of the iterations, which keep what they have
+        result = method.minimize(problem, path, options, report)
+    except KeyboardInterrupt:  # outside the iterations, which return their current point
         record_interrupt()
-        answer = _interrupted(problem, path)
-    return _solution(answer, started - began, time.perf_counter() - started)
+        result = _interrupted(problem, path)
+    return _solution(result, started - began, time.perf_counter() - started)
 
 
-def _trajectory(answer: Answer) -> Trajectory:
-    """The motion with its momenta and where it came from."""
-    problem = answer.problem
+def _trajectory(result: MethodResult) -> Trajectory:
+    """The motion with its momenta and metadata."""
+    problem = result.problem
     metadata: dict[str, Any] = {
-        "cost": answer.cost,
-        "status": str(answer.status),
-        "n_neg": answer.n_neg,
+        "cost": result.cost,
+        "status": str(result.status),
+        "n_neg": result.n_neg,
     }
     if problem.limits is not None and problem.limited:
         metadata["limits"] = problem.limits.to_dict()
     if problem.clearance is not None and problem.distances is not None:
         metadata["clearance"] = problem.clearance.to_dict()
-    derivatives = problem.ld.derivatives(answer.path, answer.forces, answer.jets)
+    derivatives = problem.ld.derivatives(result.path, result.forces, result.jets)
     momenta = carried_momenta(derivatives)
-    return Trajectory(problem.grid, answer.path, momenta, problem.scene, metadata)
+    return Trajectory(problem.grid, result.path, momenta, problem.scene, metadata)
 
 
-def _solution(answer: Answer, setup_seconds: float, solve_seconds: float) -> Solution:
-    """The answer as a Solution."""
+def _solution(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
+    """The result as a Solution."""
     return Solution(
-        success=answer.status is Status.MINIMUM,
-        status=answer.status,
-        message=answer.message,
-        trajectory=_trajectory(answer),
-        cost=answer.cost,
-        nit=answer.nit,
-        n_neg=answer.n_neg,
-        problem=answer.problem,
-        minima=(answer.cost,) if answer.status is Status.MINIMUM else (),
-        history=tuple(answer.history),
+        success=result.status is Status.MINIMUM,
+        status=result.status,
+        message=result.message,
+        trajectory=_trajectory(result),
+        cost=result.cost,
+        nit=result.nit,
+        n_neg=result.n_neg,
+        problem=result.problem,
+        minima=(result.cost,) if result.status is Status.MINIMUM else (),
+        history=tuple(result.history),
         setup_seconds=setup_seconds,
         solve_seconds=solve_seconds,
-        forces=answer.forces,
+        forces=result.forces,
     )
 
 
 def minimum_at(
     problem: TrajectoryProblem, path: DiscretePath, steps: int, seconds: float
 ) -> Solution:
-    """A path that is known to be a minimum as a Solution; without limits and equations.
+    """A Solution from a path that is known to be a minimum, without limits or constraints.
 
-    steps: that led to it. seconds: that they took.
+    steps: of the optimiser. seconds: wall time.
     """
     value = problem.ld.action(path)
     message = f"a minimum of cost {value:.10g} after {steps} steps."
-    answer = Answer(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
-    return _solution(answer, 0.0, seconds)
+    result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
+    return _solution(result, 0.0, seconds)
 
 
-def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> Answer:
-    """The guess, where an interrupt left nothing else."""
-    value, message = problem.ld.action(path), "the solve was interrupted; the motion is its guess."
-    return Answer(problem, path, value, Status.INTERRUPTED, message)
+def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> MethodResult:
+    """The guess, if an interrupt came before any step."""
+    value, message = problem.ld.action(path), "the solve was interrupted; the motion is the guess."
+    return MethodResult(problem, path, value, Status.INTERRUPTED, message)
 
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
@@ -232,6 +236,7 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
         return problem.path(curve)
     if guess.v.shape[1] != robot.nv:
         raise InputError(
-            f"the guess moves {guess.v.shape[1]} joints, robot {robot.name!r} has {robot.nv}."
+            f"the guess has {guess.v.shape[1]} velocities, but robot {robot.name!r} has "
+            f"{robot.nv}; use a motion of the same robot."
         )
     return problem.path(stretched(guess, grid.duration))

@@ -1,4 +1,4 @@
-"""How a solve ended: its status, and the sentence that says what happened."""
+"""Status of a solve, and the sentence that describes its outcome."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 
 class Status(StrEnum):
-    """What a solve ended in."""
+    """Outcome of a solve."""
 
     MINIMUM = "minimum"
     SADDLE = "saddle"
@@ -28,7 +28,7 @@ class Status(StrEnum):
 
 
 def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
-    """What to say where an orientation turns by more than half a turn in an interval, or ""."""
+    """A warning if an orientation turns by more than pi within an interval; "" if none does."""
     if problem.ld.chart is None:
         return ""
     turns = problem.ld.turns(path)
@@ -37,7 +37,7 @@ def chart_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
         return ""
     return (
         f" An orientation turns by {turns[k]:.3g} rad in the interval at t = "
-        f"{problem.grid.t[k]:.3g} s, more than half a turn: take more intervals."
+        f"{problem.grid.t[k]:.3g} s, more than half a turn: use more intervals."
     )
 
 
@@ -45,24 +45,24 @@ _UNFINISHED = {
     Stop.ITERATION_LIMIT: (Status.ITERATION_LIMIT, "the iteration limit was reached"),
     Stop.TIME_LIMIT: (Status.TIME_LIMIT, "the time limit was reached"),
     Stop.INTERRUPTED: (Status.INTERRUPTED, "the solve was interrupted"),
-    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost any more"),
+    Stop.DIVERGED: (Status.DIVERGED, "no step decreases the cost"),
 }
 
 
 def unfinished(stop: Stop) -> tuple[Status, str]:
-    """Status and first words of the sentence for what ended a method before a stationary motion."""
+    """Status and reason for a method that ended before it found a stationary motion."""
     return _UNFINISHED[stop]
 
 
 def status_of(
     problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
 ) -> tuple[Status, str]:
-    """Status and sentence of an outcome."""
+    """Status and message of an outcome."""
     if outcome.stop is Stop.DIVERGED:
         reason = non_finite_sentence(problem, outcome.x)
         if reason:
             return Status.DIVERGED, (
-                f"{reason}, after {outcome.iterations} steps; hand in another guess."
+                f"{reason}, after {outcome.iterations} steps; try another initial guess."
             )
     left = "".join(
         f" A saddle of cost {cost:.10g} was left along negative curvature."

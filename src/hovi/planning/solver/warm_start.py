@@ -1,4 +1,4 @@
-"""Where a stationary motion goes when its boundary data move: the guess of a planning loop."""
+"""Warm start of replanning: the first-order change of a solution with its boundary data."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from hovi.planning.solver.action_objective import ActionObjective
 
 Array = npt.NDArray[np.float64]
 
-ENOUGH = 1e-9
-"""Corrections end when they promise a smaller decrease than this, relative to the action."""
+CORRECTION_DECREASE = 1e-9
+"""Predicted decrease, relative to the action, below which corrections stop."""
 
 
 def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 0) -> DiscretePath:
-    """Where a stationary path goes when its boundary data move.
+    """The path between new ends, predicted to first order from a stationary path.
 
-    To first order it is dx = cubic - H^-1 H cubic, with the cubic that carries the old ends to the
-    new ones and H the action's Hessian at the old path: one Newton step of the equations linearised
-    there. Just the cubic where H is not positive definite.
+    dx = cubic - H^-1 H cubic, with the cubic that takes the old ends to the new ones and H the
+    action's Hessian at the old path: one Newton step of the equations linearised there. The cubic
+    alone if H is not positive definite.
 
     solved: a stationary path on the problem's grid, between other ends.
-    corrections: how many quasi-Newton steps may follow, which begin with H's factorisation and
-        cost a gradient each.
+    corrections: maximum number of quasi-Newton steps that follow; they reuse the factorisation of
+        H and need one gradient each.
     """
     ends = problem.ends(solved.q, solved.v)
     path = moved(solved, problem.grid, ends, problem.robot)
@@ -41,8 +41,8 @@ def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 
     change = _columns(objective, solved, path)
     residual = np.einsum("kijab,kjb->kia", model.intervals.hessian, change)
     step = factor.solve(-model.scatter(residual) - model.gradient)
-    ahead = objective.retract(path, step, model)
-    return descend(_Action(objective, model), ahead, factor, corrections, ENOUGH)
+    predicted = objective.retract(path, step, model)
+    return descend(_Action(objective, model), predicted, factor, corrections, CORRECTION_DECREASE)
 
 
 class _Action(Smooth[DiscretePath]):
@@ -65,7 +65,7 @@ class _Action(Smooth[DiscretePath]):
 
 
 def _columns(objective: ActionObjective, old: DiscretePath, new: DiscretePath) -> Array:
-    """How the intervals' columns change from one path to another, inner modes kept, (N, m, n)."""
+    """Change of the intervals' columns between two paths, 0 for inner modes, shape (N, m, n)."""
     problem = objective.problem
     h = problem.grid.steps[:, None]
     dq, dv = problem.robot.difference(old.q, new.q), new.v - old.v

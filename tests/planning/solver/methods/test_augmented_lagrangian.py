@@ -1,4 +1,4 @@
-"""Passive joints: no torque where it counts, orders of the scheme, and a motion that is driven."""
+"""Passive joints: zero torque at the points, orders of convergence, forward simulation."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ACROBOT, CART_POLE, PENDUBOT = "acrobot_swing_up", "cart_pole_swing_up", "pendub
 
 @cache
 def swing_up(scene: str, intervals: int, modes: int, near: int | None = None) -> hovi.Solution:
-    """The swing-up without limits, from the cubic guess or from the motion on `near` intervals."""
+    """The swing-up without limits, from the cubic guess or the motion on `near` intervals."""
     task = hovi.load_task(hovi.example(scene))
     grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.galerkin(modes))
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
@@ -29,7 +29,7 @@ def swing_up(scene: str, intervals: int, modes: int, near: int | None = None) ->
 
 
 def miss(solution: hovi.Solution) -> float:
-    """Largest miss of a next node when pin.aba is driven by the planned torques of active joints.
+    """Largest error at a next node of pin.aba with the planned torques of the active joints.
 
     SciPy integrates from every node to the next, passive joints with no torque at all.
     """
@@ -77,7 +77,7 @@ def test_cost_and_nodes_of_a_cart_pole_converge_at_the_order_of_the_scheme(modes
     assert slopes[1] > order - 0.3
 
 
-def test_the_cart_pole_driven_by_its_planned_force_misses_by_the_order_of_the_scheme() -> None:
+def test_the_simulated_cart_pole_deviates_by_the_order_of_the_scheme() -> None:
     """Collocation at s Gauss points has a local error of h^(2 s + 1)."""
     misses = [miss(swing_up(CART_POLE, N, 1, near=40)) for N in (20, 40, 80)]
     slopes = np.log2(np.divide(misses[:-1], misses[1:]))
@@ -85,8 +85,8 @@ def test_the_cart_pole_driven_by_its_planned_force_misses_by_the_order_of_the_sc
     assert misses[-1] < 1e-8
 
 
-def test_the_momenta_of_a_passive_motion_belong_to_both_sides_of_a_node() -> None:
-    """The discrete Euler-Lagrange equations hold with the multipliers' work in L_d."""
+def test_the_momenta_of_a_passive_motion_agree_on_both_sides_of_a_node() -> None:
+    """The discrete Euler-Lagrange equations hold with the multipliers' terms in L_d."""
     solution = swing_up(CART_POLE, 40, 2)
     problem = solution.problem
     d = problem.ld.derivatives(solution.trajectory.path, solution.forces)
@@ -126,7 +126,7 @@ def test_an_underactuated_motion_keeps_its_limits() -> None:
     assert ActionObjective(solution.problem).residuals(solution.trajectory.path).torque_share < 1e-8
 
 
-def test_a_pole_that_has_to_stay_where_it_would_fall_is_infeasible(models) -> None:
+def test_a_pole_held_where_it_would_fall_is_infeasible(models) -> None:
     robot = hovi.load_robot(models / "cart_pole.urdf")
     scene = hovi.Scene(robot, [hovi.effects.Gravity()], passive=["hinge"])
     limits = {"q": {"slide": [-0.01, 0.01]}}
@@ -135,7 +135,7 @@ def test_a_pole_that_has_to_stay_where_it_would_fall_is_infeasible(models) -> No
     assert "'hinge'" in solution.message or "'slide'" in solution.message
 
 
-def test_passive_joints_are_checked_at_the_door(models) -> None:
+def test_invalid_passive_joints_are_refused(models) -> None:
     robot = hovi.load_robot(models / "cart_pole.urdf")
     with pytest.raises(SceneError, match="did you mean 'hinge'"):
         hovi.Scene(robot, passive=["hinges"])
@@ -148,7 +148,7 @@ def test_passive_joints_are_checked_at_the_door(models) -> None:
     assert hovi.Scene.from_dict(scene.to_dict()).passive == ("hinge",)
 
 
-def test_a_torque_that_is_nearly_none_is_told_where_nothing_else_is_asked() -> None:
+def test_a_residual_torque_is_reported_where_there_are_no_conditions() -> None:
     solution = swing_up("acrobot_swing_up", 12, 0)
     assert solution.problem is not None
     left = Residuals([np.full((3, 1), 1e-5)], [], 1.0)

@@ -1,4 +1,4 @@
-"""Every problem is solved by the first method that suits it, and methods are exchangeable."""
+"""Every problem is solved by the first method that supports it; methods agree."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_methods_that_suit_the_same_problem_find_the_same_minimum() -> None:
     assert found[1].cost == pytest.approx(found[0].cost, rel=1e-11)
 
 
-def test_limits_that_bind_nowhere_change_nothing() -> None:
+def test_inactive_limits_change_nothing() -> None:
     free = solve(problem_of("two_link_reach", limits="none"))
     wide = {"base": "none", "v": 1e3 * float(np.abs(free.trajectory.v).max())}
     between = solve(problem_of("two_link_reach", limits=wide))
@@ -55,6 +55,6 @@ def test_limits_that_bind_nowhere_change_nothing() -> None:
     assert between.cost == pytest.approx(free.cost, rel=1e-6)
 
 
-def test_a_method_that_does_not_suit_is_refused() -> None:
-    with pytest.raises(InputError, match="TrustRegion cannot meet all"):
+def test_an_unsuitable_method_is_refused() -> None:
+    with pytest.raises(InputError, match="method TrustRegion does not support this problem"):
         solve(problem_of("ur5_reach", limits="urdf"), method=TrustRegion())

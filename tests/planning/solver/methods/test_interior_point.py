@@ -1,4 +1,4 @@
-"""Motions under hard limits, against Ipopt, dense sampling and what cannot be."""
+"""Motions with hard limits, against Ipopt and dense sampling, and infeasible problems."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def reach(models: Path, name: str, limits: dict[str, object]) -> TrajectoryProbl
 
 
 def largest_excess(trajectory: Trajectory, limits: Limits, samples: int = 10_000) -> float:
-    """By which share of its range a limit is exceeded, both sides of every node included."""
+    """Largest excess over a limit, as a share of its range, both sides of each node included."""
     N = trajectory.grid.intervals
     s = np.linspace(0.0, 1.0, max(samples // N, 2))
     k = np.repeat(np.arange(N), len(s))
@@ -88,14 +88,14 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
     assert largest_excess(solution.trajectory, limits) <= limits.tolerance
 
 
-def test_limits_that_nothing_reaches_change_nothing(models: Path) -> None:
+def test_inactive_limits_change_nothing(models: Path) -> None:
     free = solve(reach(models, "two_link_reach", {"base": "none"}))
     wide = solve(reach(models, "two_link_reach", {"base": "none", "q": 50.0, "tau": 1e4}))
     assert wide.cost == pytest.approx(free.cost, rel=1e-9)
     np.testing.assert_allclose(wide.trajectory.q, free.trajectory.q, atol=1e-6)
 
 
-def test_limits_that_bind_cost_something_and_are_reached(models: Path) -> None:
+def test_active_limits_raise_the_cost_and_are_reached(models: Path) -> None:
     free = solve(reach(models, "two_link_reach", {"base": "none"}))
     limits = {"base": "none", "v": [3.0, 6.0]}
     bound = solve(reach(models, "two_link_reach", limits))
@@ -105,7 +105,7 @@ def test_limits_that_bind_cost_something_and_are_reached(models: Path) -> None:
 
 
 def test_a_hard_range_is_the_limit_of_a_steeper_potential(models: Path) -> None:
-    """With the hard range, then, from that motion, with the paper's potential instead."""
+    """With the hard range and then, starting from that motion, with the paper's potential."""
     task = hovi.load_task(models / "two_link_elbow.toml")
     grid = Grid.uniform(task.duration, 200, hovi.schemes.by_name("taylor-midpoint"))
     robot, ends = task.scene.robot, (task.start, task.goal)
@@ -144,7 +144,7 @@ def test_a_hard_range_is_the_limit_of_a_steeper_potential(models: Path) -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_infeasible_for_the_right_reason(
+def test_infeasible_problems_are_reported_with_the_right_reason(
     arm_scene: hovi.Scene,
     start: list[float],
     goal: list[float],
@@ -161,7 +161,7 @@ def test_what_cannot_be_is_infeasible_for_the_right_reason(
 
 
 @pytest.mark.parametrize("intervals", [16, 24, 32, 48])
-def test_a_way_around_a_weak_motor_is_found_on_every_grid(
+def test_a_motion_with_a_weak_motor_is_found_on_every_grid(
     arm_scene: hovi.Scene, intervals: int
 ) -> None:
     """With 2 N m the arm cannot hold the pose, but falls, swings and comes back."""
@@ -171,14 +171,14 @@ def test_a_way_around_a_weak_motor_is_found_on_every_grid(
     assert largest_excess(solution.trajectory, as_limits(arm_scene.robot, limits)) <= 1e-6
 
 
-def test_budgets_have_their_own_statuses(models: Path) -> None:
+def test_time_and_iteration_limits_have_their_own_statuses(models: Path) -> None:
     problem = reach(models, "ur5_reach", UR5)
     assert solve(problem, max_iterations=3).status is Status.ITERATION_LIMIT
     assert solve(problem, time_limit=1e-4).status is Status.TIME_LIMIT
 
 
 def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
-    """The last joint of a Z1 weighs so little that it would start and stop within milliseconds."""
+    """The last joint of a Z1 has so little inertia that it could start and stop in milliseconds."""
     robot = hovi.load_robot("z1", locked=["jointGripper"])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start = State([1.0, 1.5, -1.5, 0.5, -0.5, 2.0])
@@ -189,7 +189,7 @@ def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:
 
 @pytest.mark.parametrize("intervals", [16, 32])
 def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: int) -> None:
-    """The straight way asks for 1.22 times the shoulder's torque, held still."""
+    """Held still along the straight path, the arm needs 1.22 times the shoulder's torque limit."""
     robot = hovi.load_robot("talos_arm", locked=["gripper_left_joint"])
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start = [0.499, 0.422, -0.098, 1.096, 1.342, 0.104]
@@ -201,8 +201,8 @@ def test_a_guess_that_fails_on_the_halved_grid_is_restored_there_too(intervals: 
 
 
 @pytest.mark.long
-def test_a_light_wrist_that_needs_many_steps_goes_on_with_finer_intervals() -> None:
-    """The last joint weighs next to nothing, and coarse intervals leave it free to whirl."""
+def test_a_light_wrist_at_the_iteration_limit_is_refined_to_a_minimum() -> None:
+    """The last joint has almost no inertia and can spin between the points of coarse intervals."""
     robot = hovi.load_robot("xarm7")
     scene = hovi.Scene(robot, [hovi.effects.Gravity()])
     start = [-2.028, -0.447, -2.746, 2.798, -2.59, 0.217, 2.347]

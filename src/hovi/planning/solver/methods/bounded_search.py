@@ -1,4 +1,4 @@
-"""What the stages of a solve under limits share: the problem, its bounds and budgets, the solve."""
+"""State shared by the stages of a solve under limits: problem, bounds, budgets and multipliers."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
-from hovi.planning.clearance.clearance import SCALE
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.violation import approach_along, approach_sentence
 from hovi.planning.problem.contradictions import static_sentence
 from hovi.planning.problem.limit_violation import excess_along, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.clearance_outputs import CUSHION, ClearanceOutputs
+from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.methods.method import Report
-from hovi.planning.solver.multiplier_iteration import satisfy
+from hovi.planning.solver.multiplier_iteration import minimize_constrained
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline
@@ -32,22 +32,23 @@ from hovi.system.deadline import Deadline
 Array = npt.NDArray[np.float64]
 Bounded = BoundedOutcome[DiscretePath]
 
-ENDED = Stop.TIME_LIMIT, Stop.INTERRUPTED
-"""What ends a search whatever is left to try."""
-WARM_MU = 1e-7, 1e-4
-"""Range of the first barrier parameter of a tightened problem, relative to the mean density."""
+STOPPED = Stop.TIME_LIMIT, Stop.INTERRUPTED
+"""Reasons that end the whole search."""
+WARM_MU_RANGE = 1e-7, 1e-4
+"""Range of the initial barrier parameter of a warm start, relative to the mean density."""
 
 
 @dataclass(eq=False)
 class BoundedSearch:
-    """The problem as it is solved by now, and what has been spent.
+    """The current problem of a search, and the resources used so far.
 
-    problem: its intervals are halved where limits do not hold between their points.
-    guess: what the search began with, on the problem's grid.
-    margins: by which share of its range each bound is tightened, in every interval, shape
-        (2, N, 4 nv + pairs). clearance: distances that are kept, or None.
-    multipliers, unmet: of the equations, and why they cannot be met, or "".
-    last: the problem and the motion in which the last solve ended.
+    problem: on the current grid; its intervals are halved where limits do not hold.
+    guess: the initial guess, on the problem's grid.
+    iterations: steps of all solves.
+    margins: share of its range by which each bound is tightened in each interval, shape
+        (2, N, 4 nv + pairs). clearance: bounded distances, or None.
+    multipliers, unmet: of the constraints, and why they cannot be met, or "".
+    last: the problem and the motion of the last solve.
     """
 
     problem: TrajectoryProblem
@@ -66,32 +67,34 @@ class BoundedSearch:
         distances = self.problem.distances
         self.clearance: ClearanceOutputs | None = None
         if distances is not None:
-            self.clearance = ClearanceOutputs(distances, self.least_distance + CUSHION * SCALE)
+            self.clearance = ClearanceOutputs(
+                distances, self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
+            )
         self.margins = self.no_margins()
 
     @property
     def least_distance(self) -> float:
-        """The distance that counts as held to the tolerance where it is kept exactly, in [m]."""
+        """Margin plus tolerance, in [m]: violated by up to the tolerance, it keeps the margin."""
         assert self.problem.clearance is not None
-        return float(self.problem.clearance.margin) + self.limits.tolerance * SCALE
+        return float(self.problem.clearance.margin) + self.limits.tolerance * DISTANCE_SCALE
 
     def no_margins(self) -> Array:
-        """Bounds where they are, in every interval: (2, N, 4 nv + pairs)."""
+        """Zero margins, shape (2, N, 4 nv + pairs)."""
         pairs = 0 if self.clearance is None else self.clearance.size
         return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
 
     def objective(self, known: Multipliers | None) -> BoundedAction:
-        """The action between the bounds as they are tightened."""
+        """The action with the tightened bounds. known: multipliers of the constraints."""
         return BoundedAction(
             self.problem, self.limits, self.margins, multipliers=known, more=self.clearance
         )
 
     def remaining_options(self) -> Options:
-        """The options with the time that is left."""
+        """The options with the remaining time as time limit."""
         return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
 
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
-        """By the interior point at the quadrature points, in rounds where there are equations."""
+        """Solve with bounds at the quadrature points, in rounds if there are constraints."""
         if not self.problem.constrained:
             return self._minimized(self.objective(None), path, self.remaining_options(), start)
 
@@ -100,11 +103,11 @@ class BoundedSearch:
             objective, options = self.objective(known), self.remaining_options()
             options = dataclasses.replace(options, decrease=max(decrease, options.decrease))
             outcome = self._minimized(objective, x, options, start)
-            mu = WARM_MU[1] * mean_density(outcome, objective)
+            mu = WARM_MU_RANGE[1] * mean_density(outcome, objective)
             start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
             return outcome
 
-        rounds = satisfy(self.problem, path, minimize_round, self.multipliers)
+        rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
         self.multipliers, self.unmet = rounds.multipliers, rounds.reason
         return rounds.result
 
@@ -118,7 +121,7 @@ class BoundedSearch:
         return outcome
 
     def forces(self, outcome: Bounded) -> list[PointTerms]:
-        """What limits and equations exert, with what the equations' penalties exert besides."""
+        """Multipliers of limits and constraints, penalty terms of the constraints included."""
         known = self.multipliers
         if known is not None:
             action = self.objective(known).action
@@ -141,12 +144,12 @@ class BoundedSearch:
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
-        """A path for sampling, without its momenta."""
+        """A path as a trajectory without momenta, for sampling."""
         momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
         return Trajectory(self.problem.grid, path, momenta, self.problem.scene)
 
     def excess(self, path: DiscretePath) -> Array:
-        """Excess over lower and upper bounds in every interval, (2, N, 4 nv + pairs)."""
+        """Excess over lower and upper bounds in every interval, shape (2, N, 4 nv + pairs)."""
         trajectory = self.trajectory(path)
         excess = excess_along(trajectory, self.limits)
         sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
@@ -154,23 +157,23 @@ class BoundedSearch:
             return sides
         least = self.least_distance
         approach = approach_along(trajectory, self.clearance.distances, least)
-        short = (least - approach.distance) / SCALE
+        short = (least - approach.distance) / DISTANCE_SCALE
         return np.concatenate([sides, np.stack([short, np.full_like(short, -np.inf)])], axis=2)
 
     def worst(self, path: DiscretePath) -> str:
-        """Which limit or distance is violated most, by joint or pair and time."""
+        """The limit or distance that is violated most: joint or pair, and time."""
         trajectory = self.trajectory(path)
         if self.clearance is not None:
             sides, first = self.excess(path), self.limits.lower.size
             if sides[:, :, first:].max() >= sides[:, :, :first].max():
                 distances, least = self.clearance.distances, self.least_distance
                 approach = approach_along(trajectory, distances, least)
-                margin = least - self.limits.tolerance * SCALE
+                margin = least - self.limits.tolerance * DISTANCE_SCALE
                 return approach_sentence(trajectory, distances, approach, margin)
         sentence = worst_sentence(trajectory, self.limits, self.problem.robot)
         return sentence + static_sentence(self.problem, self.limits)
 
 
 def mean_density(outcome: Bounded, objective: BoundedAction) -> float:
-    """The objective over the weight of all points."""
+    """|objective| / sum of all weights: its mean density."""
     return max(abs(outcome.outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))

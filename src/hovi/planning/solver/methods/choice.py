@@ -1,4 +1,4 @@
-"""Which method solves a problem: the first that suits it."""
+"""The choice of a method: the first one that supports the problem."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.methods.trust_region import TrustRegion
 
 METHODS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian(), InteriorPoint())
-"""From the one that costs least; every problem is suited by one of them."""
+"""In order of cost; every problem is supported by one of them."""
 
 
 def method_for(problem: TrajectoryProblem) -> Method:
-    """The first method that suits a problem."""
+    """The first method that supports a problem."""
     return next(method for method in METHODS if method.suits(problem))

@@ -1,4 +1,4 @@
-"""A first motion between the bounds at the quadrature points, or the reason why there is none."""
+"""A feasible motion at the quadrature points, or the reason for infeasibility."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.methods.bounded_search import (
-    ENDED,
+    STOPPED,
     Bounded,
     BoundedSearch,
     mean_density,
@@ -24,23 +24,23 @@ from hovi.planning.solver.multiplier_iteration import first_multipliers
 from hovi.planning.solver.penalized_action import PenalizedAction
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
-"""Penalties of violated limits, relative to the mean density, where the interior point fails."""
+"""Penalties of violated limits, relative to the mean density, if the interior point fails."""
 PENALTY_STEPS = 150
-"""Steps with each penalty."""
+"""Maximum number of steps with each penalty."""
 BUMPED_GUESSES = 3
-"""Perturbed guesses that are tried before limits are called infeasible."""
+"""Number of perturbed guesses that are tried before limits are reported as infeasible."""
 STAGE_DEPTH = 0.04
-"""Depth by which a motion is moved out of obstacles at a time, in [m]."""
-MOST_STAGES = 8
-"""Most times that it is."""
+"""Depth by which a motion is moved out of obstacles in one stage, in [m]."""
+MAX_STAGES = 8
+"""Maximum number of stages."""
 STAGE_STEPS = 80
-"""Steps of each, whose result is only a guess."""
+"""Maximum number of steps per stage, whose result is only a guess."""
 SMALL_VIOLATION = 1e-3
-"""Violation, as a share of the range, from which the interior point is tried again."""
+"""Violation, as a share of the range, below which the interior point is tried again."""
 
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
-    """What the guess leads to at the quadrature points, and why there is no motion, or ""."""
+    """A motion from the guess within bounds at the points, and the reason if there is none."""
     path = search.guess
     if search.clearance is not None:
         path = _moved_out_of_obstacles(search, path, search.clearance)
@@ -53,29 +53,29 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
 def _moved_out_of_obstacles(
     search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
 ) -> DiscretePath:
-    """A guess: the least action without obstacles, moved out of them little by little.
+    """A guess: the motion of least action without obstacles, moved out of them in stages.
 
-    A guess that runs deep into obstacles is pushed out on other sides at other times.
+    In one stage a motion deep in an obstacle would leave it on different sides at different times.
     """
     options, search.clearance = search.options, None
     path = _without_obstacles(search, path)
     approach = approach_along(search.trajectory(path), wanted.distances, wanted.least)
     depth = wanted.least - float(approach.distance.min())
-    stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MOST_STAGES))
+    stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))
     search.options = dataclasses.replace(options, max_iterations=STAGE_STEPS)
     for share in np.arange(1, stages) / stages:
         least = wanted.least - (1.0 - share) * depth
         search.clearance = ClearanceOutputs(wanted.distances, least)
         outcome = search.solve(path)
         path = outcome.x
-        if outcome.stop in ENDED:
+        if outcome.stop in STOPPED:
             break
     search.options, search.clearance = options, wanted
     return path
 
 
 def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePath:
-    """The motion that knows of no obstacle, or the guess where none is found."""
+    """The motion without obstacles, or the guess if none is found."""
     if search.limits.bounded.any():
         outcome = search.solve(path)
         return outcome.x if outcome.feasible else path
@@ -88,7 +88,7 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
 
 
 def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
-    """More tries, from motions that violate little, or the reason why there is none."""
+    """Further attempts from motions of small violation; or the reason for infeasibility."""
     constrained = search.problem.constrained
     known = first_multipliers(search.problem, outcome.x) if constrained else None
     objective = search.objective(known)
@@ -96,13 +96,13 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     least = np.inf
     for guess in _guesses(search):
         path, violation, stop = _penalized(search, objective, guess, density)
-        if stop in ENDED:
+        if stop in STOPPED:
             outcome.stop = stop
             return outcome, ""
         if violation <= SMALL_VIOLATION:
             search.multipliers = None
             again = search.solve(path)
-            if again.feasible or again.stop in ENDED:
+            if again.feasible or again.stop in STOPPED:
                 return again, ""
         if violation < least:
             least, outcome.x = violation, path
@@ -111,7 +111,7 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
 
 
 def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
-    """The guess, and perturbations of it."""
+    """The guess, then perturbations of it."""
     yield search.guess
     problem = search.problem
     T = problem.grid.duration
@@ -123,13 +123,13 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
 def _penalized(
     search: BoundedSearch, objective: BoundedAction, path: DiscretePath, density: float
 ) -> tuple[DiscretePath, float, Stop]:
-    """A motion of little violation, by penalties that grow, its violation, and why it ended."""
+    """A motion of small violation, by growing penalties; its violation, and why it stopped."""
     for penalty in PENALTIES:
         penalized = PenalizedAction(objective, penalty * density)
         options = dataclasses.replace(search.remaining_options(), max_iterations=PENALTY_STEPS)
         result = minimize(penalized, path, options, None)
         path = result.x
         search.iterations += result.iterations
-        if result.stop in ENDED:
+        if result.stop in STOPPED:
             break
     return path, penalized.violation(path), result.stop

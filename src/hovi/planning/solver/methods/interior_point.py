@@ -1,4 +1,4 @@
-"""Motions between limits and around obstacles: an interior point, tightened between its points."""
+"""Motions with limits and obstacles: an interior-point method with tightened bounds."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
-from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.tightening import tightened, usable
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.interruption import record_interrupt
 
 
 class InteriorPoint(Method):
-    """A primal-dual interior point, with rounds of multipliers where equations have to be met.
+    """A primal-dual interior-point method, within an augmented Lagrangian for constraints.
 
-    First the quadrature points are brought between the bounds, then bounds are tightened and
+    First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
     """
 
     def suits(self, problem: TrajectoryProblem) -> bool:
-        """Problems with limits or obstacles, with or without equations."""
+        """Problems with limits or obstacles, with or without equality constraints."""
         return problem.limited
 
     def minimize(
@@ -32,23 +32,23 @@ class InteriorPoint(Method):
         path: DiscretePath,
         options: Options,
         report: Report | None = None,
-    ) -> Answer:
-        """See Method.minimize; the guess may violate everything, and intervals may be split."""
+    ) -> MethodResult:
+        """See Method.minimize; the guess may violate the limits, and intervals may be split."""
         limits = problem.limits or no_limits(problem.robot)
         reason = contradiction(problem, limits)
         if reason:
             value = problem.ld.action(path)
-            return Answer(problem, path, value, Status.INFEASIBLE, _infeasible(reason))
+            return MethodResult(problem, path, value, Status.INFEASIBLE, _infeasible(reason))
         search = BoundedSearch(problem, limits, options, report, path)
         try:
             return _searched(search)
-        except KeyboardInterrupt:  # between two solves, each of which hears its own
+        except KeyboardInterrupt:  # between two solves, which handle their own
             record_interrupt()
             return _interrupted(search)
 
 
-def _searched(search: BoundedSearch) -> Answer:
-    """All stages."""
+def _searched(search: BoundedSearch) -> MethodResult:
+    """Run all stages."""
     outcome, reason = feasible_motion(search)
     reason, excess = reason or search.unmet, 0.0
     if not reason and usable(outcome):
@@ -65,15 +65,15 @@ def _searched(search: BoundedSearch) -> Answer:
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
     forces = search.forces(outcome)
-    return Answer(problem, x, value, status, message, nit, n_neg, search.history, forces)
+    return MethodResult(problem, x, value, status, message, nit, n_neg, search.history, forces)
 
 
-def _interrupted(search: BoundedSearch) -> Answer:
-    """Where the last solve ended, and nothing else."""
+def _interrupted(search: BoundedSearch) -> MethodResult:
+    """The motion of the last solve."""
     problem, path = search.last
     value, nit = problem.ld.action(path), search.iterations
     status, message = _unfinished(Stop.INTERRUPTED, nit, value)
-    return Answer(problem, path, value, status, message, nit, history=search.history)
+    return MethodResult(problem, path, value, status, message, nit, history=search.history)
 
 
 def _infeasible(reason: str) -> str:
@@ -83,8 +83,8 @@ def _infeasible(reason: str) -> str:
 def _unfinished(stop: Stop, nit: int, cost: float) -> tuple[Status, str]:
     status, reason = unfinished(stop)
     return status, (
-        f"{reason} after {nit} steps, before a motion within the limits was found to be a minimum; "
-        f"the motion is the best so far, of cost {cost:.10g}."
+        f"{reason} after {nit} steps, before a minimum within the limits was found; the motion is "
+        f"the best so far, of cost {cost:.10g}."
     )
 
 

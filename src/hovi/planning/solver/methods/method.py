@@ -1,4 +1,4 @@
-"""A way to minimise the action of a trajectory problem, and what it answers."""
+"""The interface of methods that minimise the action, and their result."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ Report = Callable[[int, float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """Where a method ended.
+class MethodResult:
+    """The result of a method.
 
     problem: as solved; a method may split intervals. path, cost: the motion and its action.
-    status, message: what happened, in a word and in a sentence.
-    nit: steps. n_neg: negative eigenvalues of the action's Hessian; -1 where it was not counted.
-    history: what each step did.
-    forces: what limits and equations exert at the quadrature points; None without any.
-    jets: (q, v, a) of the path at the quadrature points, where they are known already.
+    status, message: the outcome, as a word and in a sentence.
+    nit: steps. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
+    history: one record per step.
+    forces: multipliers of limits and constraints at the quadrature points; None without any.
+    jets: (q, v, a) of the path at the quadrature points, if they were computed.
     """
 
     problem: TrajectoryProblem
@@ -42,11 +42,11 @@ class Answer:
 
 
 class Method(ABC):
-    """A way to minimise the action, for the problems that it suits."""
+    """A method that minimises the action, for some kinds of problems."""
 
     @abstractmethod
     def suits(self, problem: TrajectoryProblem) -> bool:
-        """Whether the method can meet all that the problem asks for."""
+        """Whether the method supports the problem's limits, obstacles and constraints."""
 
     @abstractmethod
     def minimize(
@@ -55,10 +55,10 @@ class Method(ABC):
         path: DiscretePath,
         options: Options,
         report: Report | None = None,
-    ) -> Answer:
+    ) -> MethodResult:
         """A motion of least action, from a guess.
 
         path: the guess, on the problem's grid and with its boundary data.
-        options: tolerances and budgets. report: see Report.
-        A KeyboardInterrupt inside its iterations ends the method with the best motion so far.
+        options: tolerances, and limits on steps and time. report: see Report.
+        A KeyboardInterrupt during the iterations ends the method with the best motion so far.
         """

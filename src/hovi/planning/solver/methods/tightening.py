@@ -1,4 +1,4 @@
-"""Limits between the points: bounds are tightened and intervals halved until all of them hold."""
+"""Limits between the points: tighten bounds and halve intervals until all limits hold."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy.typing as npt
 from hovi.discrete.guess import stretched
 from hovi.optimize.trust_region import Stop
 from hovi.planning.solver.methods.bounded_search import (
-    ENDED,
-    WARM_MU,
+    STOPPED,
+    WARM_MU_RANGE,
     Bounded,
     BoundedSearch,
     mean_density,
@@ -18,44 +18,44 @@ from hovi.planning.solver.methods.feasibility import feasible_motion
 
 Array = npt.NDArray[np.float64]
 
-MOST_ROUNDS = 40
-"""Times that limits are tightened or intervals halved before giving up."""
-ROUNDS_PER_GRID = 9
-"""Times that limits are tightened on one grid."""
-MOST_HALVINGS = 14
-"""Times that intervals are halved when limits do not hold between their points."""
+MAX_ROUNDS = 40
+"""Maximum number of rounds, each of which tightens bounds or halves intervals."""
+MAX_ROUNDS_PER_GRID = 9
+"""Maximum number of rounds on one grid."""
+MAX_HALVINGS = 14
+"""Maximum number of rounds that halve intervals."""
 HALVING_EXCESS = 0.05
-"""Excess, as a share of the range, beyond which intervals are halved instead of tightened."""
+"""Excess, as a share of the range, above which intervals are halved at once."""
 NEIGHBOR_EXCESS = 0.01
-"""Excess beyond which an interval is halved together with the worst."""
-OVERSHOOT = 1.5
-"""How much further than the excess a bound is tightened: motions lean on what is left to them."""
-EXTRA_MARGIN = 5.0
-"""By what a bound is tightened besides, in tolerances, so that the last rounds are few."""
+"""Excess, as a share of the range, above which an interval is halved along with the worst."""
+TIGHTENING_FACTOR = 1.5
+"""Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
+EXTRA_TIGHTENING = 5.0
+"""Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
-"""Unused share of a range beyond which a bound that was tightened is relaxed again."""
-LARGEST_MARGIN = 0.45
-"""Share of its range by which a bound is tightened at most."""
+"""Unused share of a range above which a tightened bound is relaxed again."""
+MAX_MARGIN = 0.45
+"""Maximum share of its range by which a bound is tightened."""
 
 
 def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, float]:
     """Tighten bounds where the interpolant exceeds them, and solve again, until they hold.
 
-    Returns the last outcome, why there is no motion, or "", and the largest excess.
+    Returns the last outcome, the reason for infeasibility or "", and the largest excess.
     """
     on_grid, halvings, reason = 0, 0, ""
     tolerance = search.limits.tolerance
-    for rounds in range(MOST_ROUNDS + 1):
+    for rounds in range(MAX_ROUNDS + 1):
         sides = search.excess(outcome.x)
         excess = float(sides.max())
-        if excess <= tolerance or rounds == MOST_ROUNDS:
+        if excess <= tolerance or rounds == MAX_ROUNDS:
             break
         on_grid += 1
-        finer = halvings < MOST_HALVINGS
-        coarse = excess > HALVING_EXCESS or (finer and on_grid > ROUNDS_PER_GRID)
+        finer = halvings < MAX_HALVINGS
+        coarse = excess > HALVING_EXCESS or (finer and on_grid > MAX_ROUNDS_PER_GRID)
         again = None if coarse else _solved_tighter(search, outcome, sides)
-        lost = again is None or not (usable(again) or again.stop in ENDED)
-        if lost and finer:
+        failed = again is None or not (usable(again) or again.stop in STOPPED)
+        if failed and finer:
             halvings, on_grid = halvings + 1, 0
             again, reason = _solved_on_halves(search, sides)
         if again is None:
@@ -65,35 +65,37 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
             break
     if not reason and excess > tolerance and outcome.stop in (Stop.STATIONARY, Stop.DIVERGED):
         reason = (
-            f"{search.worst(outcome.x)}, between the points where limits are imposed; use more "
-            "intervals"
+            f"{search.worst(outcome.x)}, between the quadrature points, at which limits are "
+            "imposed; use more intervals"
         )
     return outcome, reason, excess
 
 
 def usable(outcome: Bounded) -> bool:
-    """Whether it tells which intervals to halve: between bounds at the points, if unfinished."""
+    """Whether the motion is within bounds at the points, even if not a minimum yet."""
     return outcome.feasible and outcome.stop in (Stop.STATIONARY, Stop.ITERATION_LIMIT)
 
 
 def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bounded:
-    """Solve again with the bounds tightened by what the interpolant exceeds them."""
-    tighter = np.where(sides > 0, OVERSHOOT * sides + EXTRA_MARGIN * search.limits.tolerance, 0.0)
+    """Solve again with the bounds tightened in proportion to the excess of the interpolant."""
+    tighter = np.where(
+        sides > 0, TIGHTENING_FACTOR * sides + EXTRA_TIGHTENING * search.limits.tolerance, 0.0
+    )
     unused = np.isfinite(sides) & (sides < -UNUSED_MARGIN)
     looser = np.where(unused, sides + 0.5 * UNUSED_MARGIN, 0.0)
-    search.margins = np.clip(search.margins + tighter + looser, 0.0, LARGEST_MARGIN)
+    search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
-    share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU))
+    share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
     mu = share * mean_density(outcome, objective)
     start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
     return search.solve(outcome.x, start)
 
 
 def _solved_on_halves(search: BoundedSearch, sides: Array) -> tuple[Bounded, str]:
-    """Solve again with the intervals halved in which a limit is exceeded, and their neighbours.
+    """Solve again with those intervals halved in which a limit is exceeded, and their neighbours.
 
-    From the first guess: a motion that far exceeds a limit between the points lives in the gaps
-    between them, and leads the interior point astray on a finer grid.
+    From the initial guess: a motion that exceeds limits far between the points is an artifact of
+    the coarse grid and a bad guess on a finer one.
     """
     grid = search.problem.grid
     by_interval = sides.max(axis=(0, 2))

@@ -1,4 +1,4 @@
-"""Motions between fixed or free ends, without limits or equations: a trust-region Newton method."""
+"""Motions without limits or equality constraints: a trust-region Newton method."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Answer, Method, Report
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.status import chart_sentence, status_of
 
 
 class TrustRegion(Method):
-    """Newton's method with exact Hessians in a trust region, until only rounding is left."""
+    """Newton's method with exact Hessians in a trust region, down to rounding errors."""
 
     def suits(self, problem: TrajectoryProblem) -> bool:
-        """Problems without limits and equations."""
+        """Problems without limits or equality constraints; ends may be free."""
         return not (problem.limited or problem.constrained)
 
     def minimize(
@@ -27,13 +27,13 @@ class TrustRegion(Method):
         path: DiscretePath,
         options: Options,
         report: Report | None = None,
-    ) -> Answer:
+    ) -> MethodResult:
         """See Method.minimize."""
         objective = ActionObjective(problem)
         outcome = minimize(objective, path, dataclasses.replace(options, exact=True), report)
         n_neg = 0 if outcome.convex else negative_eigenvalues(objective, outcome)
         status, message = status_of(problem, outcome, n_neg)
-        return Answer(
+        return MethodResult(
             problem,
             outcome.x,
             outcome.value,
@@ -47,7 +47,7 @@ class TrustRegion(Method):
 
 
 def negative_eigenvalues(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
-    """n_neg from the exact Hessian, -1 where there is none."""
+    """n_neg of the exact Hessian; -1 if the value is not finite."""
     if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
         return -1
     definite = objective.model(outcome.x, None, None).factor(0.0) is not None
