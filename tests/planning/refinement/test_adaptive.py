@@ -1,4 +1,4 @@
-"""Plans to a tolerance: the true error is below it and near its estimate, or the plan says why."""
+"""Plans to a tolerance: the true error is below it and near its estimate, or a reason is given."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def accuracy_of(solution: Solution) -> Accuracy:
 
 
 def true_error(solution: Solution, frame: str | None = None) -> float:
-    """In the tolerance's unit, against a motion with half the steps and six modes more."""
+    """The error in the tolerance's unit, relative to half the steps and six more modes."""
     problem, grid = solution.problem, solution.trajectory.grid
     assert problem is not None
     tables = tuple(galerkin(scheme.inner_modes + 6) for scheme in grid.schemes)
@@ -70,7 +70,7 @@ def test_the_true_error_is_below_the_tolerance_and_near_its_estimate(
     assert accuracy.reached
     assert true <= accuracy.tolerance.size
     assert true <= 10 * accuracy.error
-    if accuracy.error > 1e-12:  # below, rounding has a part in both
+    if accuracy.error > 1e-12:  # below, rounding affects both
         assert true >= accuracy.error / 10
 
 
@@ -81,14 +81,14 @@ def test_the_error_of_another_frame(task: Task) -> None:
     assert true_error(solution, frame) <= 1e-5
 
 
-def test_less_is_done_for_less(task: Task) -> None:
+def test_a_larger_tolerance_takes_less_work(task: Task) -> None:
     rounds = [accuracy_of(planned(task, tolerance)).rounds for tolerance in (1e-2, 1e-5, 1e-11)]
     points = [each[-1].points for each in rounds]
     assert points == sorted(points)
     assert points[0] < points[-1]
 
 
-def test_the_solution_knows_its_grid_and_its_error(task: Task) -> None:
+def test_the_solution_reports_its_grid_and_its_error(task: Task) -> None:
     solution = planned(task, 1e-7)
     assert solution.problem is not None
     assert solution.problem.grid is solution.trajectory.grid
@@ -109,16 +109,16 @@ def test_a_second_plan_is_the_same(task: Task) -> None:
 # Where it ends early
 
 
-def test_rounding_is_not_passed_over(arm_scene: Scene) -> None:
+def test_no_error_below_rounding_is_claimed(arm_scene: Scene) -> None:
     found = plan(arm_scene, HANG, State(REACH_Q, REACH_V), 1.0, limits="none", tolerance=1e-16)
     accuracy = accuracy_of(found)
     assert found.success
     assert not accuracy.reached
     assert accuracy.error >= ROUNDING
-    assert "stopped early: rounding leaves no smaller error" in found.message
+    assert "stopped early: rounding allows no smaller error" in found.message
 
 
-def test_a_time_limit_is_named_with_what_was_reached(arm_scene: Scene) -> None:
+def test_a_time_limit_is_reported_with_the_error_so_far(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 4, galerkin(0)))
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
     first = solve(problem)
@@ -131,7 +131,7 @@ def test_a_time_limit_is_named_with_what_was_reached(arm_scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("finished", [0, 1])
-def test_an_interrupt_returns_what_is_known(
+def test_an_interrupt_returns_the_best_candidate(
     arm_scene: Scene, monkeypatch: pytest.MonkeyPatch, finished: int
 ) -> None:
     estimates = 0
@@ -155,8 +155,8 @@ def test_an_interrupt_returns_what_is_known(
 
 
 @pytest.mark.long
-def test_a_minimum_that_moves_away_is_not_given_its_small_estimate(arm_scene: Scene) -> None:
-    # fifty seconds: every finer grid leads further down a long valley
+def test_the_estimate_of_a_minimum_that_moves_away_is_corrected(arm_scene: Scene) -> None:
+    # with fifty seconds every finer grid leads further down a long valley
     options = {"limits": "none", "intervals": 60, "tolerance": 1e-6}
     found = plan(arm_scene, HANG, -HANG, 50.0, **options)  # type: ignore[arg-type]
     accuracy = accuracy_of(found)
@@ -169,7 +169,7 @@ def test_a_minimum_that_moves_away_is_not_given_its_small_estimate(arm_scene: Sc
     assert abs(finer.cost / found.cost - 1) <= 10 * found.error_estimate
 
 
-def test_no_error_is_claimed_for_what_is_no_minimum(arm_scene: Scene) -> None:
+def test_no_error_is_claimed_without_a_minimum(arm_scene: Scene) -> None:
     goal = State(REACH_Q, REACH_V)
     options = {"limits": "none", "max_iterations": 2, "continuation": False}
     found = plan(arm_scene, HANG, goal, 1.0, tolerance=1e-6, **options)  # type: ignore[arg-type]
@@ -205,13 +205,13 @@ def test_a_sharp_turn_gets_the_short_intervals() -> None:
     assert np.median(sharp[short]) > 1.5 * np.median(sharp[~short])
 
 
-def test_every_grid_is_told(arm_scene: Scene) -> None:
-    told: list[Round] = []
+def test_every_round_is_reported(arm_scene: Scene) -> None:
+    rounds: list[Round] = []
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(1)))
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    found = solve_to_tolerance(problem, Tolerance(1e-8), told=told.append)
-    assert tuple(told) == accuracy_of(found).rounds
-    assert len(told) >= 2
+    found = solve_to_tolerance(problem, Tolerance(1e-8), on_round=rounds.append)
+    assert tuple(rounds) == accuracy_of(found).rounds
+    assert len(rounds) >= 2
 
 
 def test_many_starts_are_ranked_with_their_errors(arm_scene: Scene) -> None:
@@ -275,7 +275,7 @@ def test_motions_under_limits(arm_scene: Scene, tolerance: float) -> None:
     assert np.abs(found.trajectory.sample(t).v).max() <= 5.0 * (1 + 1e-5)
 
 
-def test_the_tolerance_of_limits_is_not_passed_over(arm_scene: Scene) -> None:
+def test_no_error_below_the_tolerance_of_limits_is_claimed(arm_scene: Scene) -> None:
     limits = {"base": "none", "v": 5.0, "tolerance": 1e-4}
     goal = State(REACH_Q, REACH_V)
     found = plan(arm_scene, HANG, goal, 1.0, limits=limits, intervals=8, tolerance=1e-5)

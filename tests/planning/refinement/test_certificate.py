@@ -1,4 +1,4 @@
-"""Certificates: every statement against an independent number, and reasons where there is none."""
+"""Certificates: every check against an independent number, and reasons for missing ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from samples.paper_arm import HANG, REACH_Q, REACH_V, effort
 
 GOAL = State(REACH_Q, REACH_V)
 HAMILTONIAN = 55.452
-"""Of the reach in one second, by other means."""
+"""Reference values of the reach in one second, computed independently."""
 
 
 def reach(scene: Scene, **options: object) -> Solution:
@@ -82,7 +82,7 @@ def test_the_planned_torques_lead_from_node_to_node(arm_scene: Scene, scheme: st
 
 
 def test_a_replay_sees_torques_of_another_scene(fine: Solution, two_link: Robot) -> None:
-    # the same motion, claimed for an arm with armature: its own torques are right for it
+    # the same motion of an arm with armature, whose own torques are right for it
     heavy = Scene(two_link, effects=[Gravity(9.8), Armature([0.1, 0.1])])
     moved = dataclasses.replace(fine.trajectory, scene=heavy)
     assert replay_dynamics(moved).angle < 1e-9
@@ -102,7 +102,7 @@ def test_a_motion_that_is_not_optimal_is_replayed_just_as_well(arm_scene: Scene)
     assert replay_dynamics(stopped.trajectory).angle < 1e-8
 
 
-def test_what_effects_add_is_simulated_too(two_link: Robot) -> None:
+def test_effects_are_part_of_the_replay(two_link: Robot) -> None:
     effects = [Gravity(9.8), Armature([0.05, 0.02]), ViscousFriction([0.4, 0.3])]
     scene = Scene(two_link, effects=effects)
     assert replay_dynamics(reach(scene).trajectory).angle < 1e-8
@@ -120,7 +120,7 @@ def test_torques_of_passive_joints_are_not_applied(two_link: Robot) -> None:
         plan(acrobot, HANG, goal, 1.5, limits="none", intervals=N).trajectory for N in (16, 64)
     )
     misses = [replay_dynamics(motion).angle for motion in (coarse, fine)]
-    assert misses[0] > 1e-9  # between the points the passive joint is not free of torque
+    assert misses[0] > 1e-9  # between the points the passive torque is not zero
     assert misses[1] < 0.01 * misses[0]
 
 
@@ -177,7 +177,7 @@ def test_a_plan_to_a_tolerance_brings_its_estimate_along(arm_scene: Scene) -> No
     assert certificate.action == pytest.approx(solution.cost, rel=1e-14)
 
 
-def test_what_is_not_known_under_limits_is_not_claimed(arm_scene: Scene) -> None:
+def test_checks_that_are_unknown_under_limits_are_missing(arm_scene: Scene) -> None:
     limited = reach(arm_scene, limits={"base": "none", "v": 6.0})
     certificate = certify(limited, estimate=False)
     assert (certificate.errors, certificate.hamiltonian, certificate.residual) == (None,) * 3
@@ -186,10 +186,10 @@ def test_what_is_not_known_under_limits_is_not_claimed(arm_scene: Scene) -> None
     assert certificate.replay.angle < 1e-8
 
 
-def test_a_motion_without_its_scene_and_an_unknown_frame_are_refused(fine: Solution) -> None:
+def test_a_solution_without_problem_and_an_unknown_frame_are_refused(fine: Solution) -> None:
     with pytest.raises(InputError, match="has no frame 'tipp'"):
         certify(fine, frame="tipp")
-    with pytest.raises(InputError, match="does not know its problem"):
+    with pytest.raises(InputError, match="has no problem"):
         certify(dataclasses.replace(fine, problem=None))
 
 

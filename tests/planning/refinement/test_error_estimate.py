@@ -1,4 +1,4 @@
-"""Error estimates against solutions that are better by orders, and those against SciPy."""
+"""Error estimates against far more accurate solutions, which are checked with SciPy."""
 
 from __future__ import annotations
 
@@ -121,8 +121,8 @@ def test_the_estimate_is_the_error_of_six_joints(
     assert_close(estimate, true_error(solution, ur5_reference), 2.0)
 
 
-def test_one_more_mode_would_not_do(ur5_scene: Scene, ur5_reference: Solution) -> None:
-    # the costs of one and of two inner modes are off by the same: their difference says nothing
+def test_one_more_mode_would_not_suffice(ur5_scene: Scene, ur5_reference: Solution) -> None:
+    # with one and with two inner modes the costs have the same error, so the difference is useless
     costs = [
         solve(
             ur5_problem(ur5_scene, Grid.uniform(1.5, 16, galerkin(r))), ur5_reference.trajectory
@@ -148,7 +148,7 @@ def test_unequal_intervals_of_unequal_degree_are_estimated_too(
     assert [s.inner_modes for s in finer.problem.grid.schemes] == [r + MORE_MODES for r in degrees]
 
 
-def test_what_the_intervals_contribute_sums_up_to_the_error_of_the_cost(
+def test_the_contributions_of_the_intervals_add_up_to_the_error_of_the_cost(
     arm_scene: Scene, reach_reference: Solution
 ) -> None:
     grid = Grid.uniform(1.0, 12, galerkin(2))
@@ -159,7 +159,7 @@ def test_what_the_intervals_contribute_sums_up_to_the_error_of_the_cost(
 
 
 def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:
-    # at rest without gravity nothing has to be done
+    # at rest without gravity no torque is needed
     scene = Scene(arm_scene.robot)
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(0)))
     still = solve(TrajectoryProblem(ld, State(HANG), State(HANG)))
@@ -168,10 +168,10 @@ def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:
     assert (estimate.cost, estimate.angle, estimate.largest_tau) == (0.0, 0.0, 0.0)
 
 
-# What is measured
+# Measured quantities
 
 
-def test_turning_and_sliding_joints_are_told_apart() -> None:
+def test_errors_of_revolute_and_sliding_joints_are_separate() -> None:
     def joint(number: int, kind: str) -> str:
         mass = '<mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
         return (
@@ -185,7 +185,7 @@ def test_turning_and_sliding_joints_are_told_apart() -> None:
     np.testing.assert_array_equal(robot.sliding, [True, False])
 
 
-def test_lengths_of_bases_are_told_from_their_angles() -> None:
+def test_errors_of_floating_bases_separate_lengths_and_angles() -> None:
     slides = {base: load_robot(with_arm(base)).sliding for base in BASES}
     assert slides["free-flyer"].tolist() == [True] * 3 + [False] * 5 + [True]
     assert slides["planar"].tolist() == [True] * 2 + [False] * 3 + [True]
@@ -214,12 +214,12 @@ def test_an_unknown_frame_and_another_duration_are_refused(
         true_error(longer, reach_reference)
 
 
-def test_what_is_not_a_minimum_has_no_estimate(reach_reference: Solution) -> None:
+def test_only_minima_have_an_estimate(reach_reference: Solution) -> None:
     stopped = dataclasses.replace(reach_reference, success=False)
-    with pytest.raises(InputError, match="errors of minima are estimated"):
+    with pytest.raises(InputError, match="only errors of minima can be estimated"):
         estimate_error(stopped)
     unknown = dataclasses.replace(reach_reference, problem=None)
-    with pytest.raises(InputError, match="does not know its problem"):
+    with pytest.raises(InputError, match="has no problem"):
         estimate_error(unknown)
 
 

@@ -1,4 +1,4 @@
-"""Where grids become finer, and by what."""
+"""hp refinement: which intervals get more modes and which are split."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.planning.refinement.hp_refinement import DECAY, Demand, decay, refined
+from hovi.planning.refinement.hp_refinement import DECAY_RANGE, Demand, decay, refined
 from hovi.schemes import galerkin
 from hovi.schemes.polynomials import interval_rows
 
@@ -28,7 +28,7 @@ def projected(grid: Grid, singularity: float) -> DiscretePath:
 
 
 def test_the_decay_is_that_of_the_ellipse_of_analyticity() -> None:
-    # poles at 0.5 +- 0.3 i of one interval [0, 1]: y = 0.6 half lengths beside its middle
+    # poles at 0.5 +- 0.3 i for the interval [0, 1]: y = 0.6 half lengths from its middle
     grid = Grid.uniform(1.0, 1, galerkin(14))
     y = 0.3 / 0.5
     assert decay(grid, projected(grid, 0.3))[0] == pytest.approx(np.sqrt(1 + y * y) - y, rel=0.05)
@@ -41,13 +41,13 @@ def test_intervals_away_from_a_singularity_decay_faster() -> None:
     assert rho[0] < 0.2 < rho[4]
 
 
-def test_a_scheme_without_enough_coefficients_is_not_believed_to_decay() -> None:
+def test_too_few_coefficients_give_the_slowest_decay() -> None:
     grid = Grid(np.full(2, 0.5), (galerkin(0), galerkin(4)))
     path = DiscretePath(np.zeros((3, 1)), np.zeros((3, 1)), np.ones((2, 2, 1)), np.ones((2, 4, 1)))
-    assert decay(grid, path)[0] == DECAY[1]
+    assert decay(grid, path)[0] == DECAY_RANGE[1]
 
 
-def test_smooth_intervals_get_modes_and_others_are_cut() -> None:
+def test_smooth_intervals_get_modes_and_others_are_split() -> None:
     grid = Grid.uniform(1.0, 4, galerkin(2))
     finer = refined(grid, np.array([0.1, 0.1, 0.9, 0.1]), [Demand(np.full(4, 1e-4), 2)])
     np.testing.assert_allclose(finer.steps[:2], 0.25)
@@ -65,8 +65,8 @@ def test_a_grid_that_meets_its_demands_stays_as_it_is() -> None:
     assert all(new.inner_modes >= old.inner_modes for new, old in pairs(same, grid))
 
 
-def test_what_is_foreseen_is_what_was_demanded() -> None:
-    # one interval of decay 0.3 that has to fall by 1e-6 in a quantity of twice the order
+def test_the_predicted_error_meets_the_demand() -> None:
+    # one interval of decay 0.3 that needs a reduction by 1e-6 in a quantity of twice the order
     grid = Grid.uniform(1.0, 1, galerkin(2))
     finer = refined(grid, np.array([0.3]), [Demand(np.array([1e-6]), 2)])
     assert finer.intervals == 1
@@ -82,7 +82,7 @@ def test_the_curve_between_the_nodes_needs_more_than_the_nodes() -> None:
     assert curve.inner_modes > nodes.inner_modes
 
 
-def test_what_nothing_cures_is_cut_into_four() -> None:
+def test_infeasible_demands_split_the_interval_into_four() -> None:
     grid = Grid.uniform(1.0, 2, galerkin(2))
     finer = refined(grid, np.array([0.97, 0.05]), [Demand(np.array([1e-12, 1.0]), 2)])
     np.testing.assert_allclose(finer.steps, [0.125, 0.125, 0.125, 0.125, 0.5])
@@ -101,7 +101,7 @@ def test_a_grid_has_one_scheme_or_two() -> None:
         assert len(finer.groups) <= 2
 
 
-def test_many_joints_are_worth_a_second_scheme_and_few_are_not() -> None:
+def test_a_second_scheme_pays_for_many_joints_only() -> None:
     grid = Grid.uniform(1.0, 64, galerkin(2))
     factor = np.where(np.arange(64) < 60, 1.0, 1e-7)
     rho = np.where(np.arange(64) < 60, 0.1, 0.3)
@@ -109,14 +109,14 @@ def test_many_joints_are_worth_a_second_scheme_and_few_are_not() -> None:
     assert groups == [1, 2]
 
 
-def test_what_is_left_sums_up_in_the_cost_and_is_the_largest_along_the_curve() -> None:
+def test_remaining_errors_are_averaged_for_the_cost_and_maximal_for_the_curve() -> None:
     factor = np.array([1e-2, 1e-4])
     change = np.array([0.1, 0.1])
-    assert Demand(factor, 2).left(change) == pytest.approx((1e-2 / 1e-2 + 1e-2 / 1e-4) / 2)
-    assert Demand(factor, 1).left(change) == pytest.approx(0.1 / 1e-4)
+    assert Demand(factor, 2).remaining(change) == pytest.approx((1e-2 / 1e-2 + 1e-2 / 1e-4) / 2)
+    assert Demand(factor, 1).remaining(change) == pytest.approx(0.1 / 1e-4)
 
 
-def test_an_interval_that_nothing_helps_is_cut_into_four() -> None:
+def test_an_interval_without_decay_is_split_into_four() -> None:
     grid = Grid.uniform(1.0, 3, galerkin(2))
     demand = Demand(np.array([1.0, 1e-12, 1.0]), 2)
     finer = refined(grid, np.array([0.1, 0.97, 0.1]), [demand])

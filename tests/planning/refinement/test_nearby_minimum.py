@@ -1,4 +1,4 @@
-"""A minimum nearby is found with few Hessians, and it is the optimiser's."""
+"""A nearby minimum is found with few Hessians and agrees with the optimiser's."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def finer(solution: Solution) -> TrajectoryProblem:
 
 
 def approached(solution: Solution, problem: TrajectoryProblem) -> NearbyMinimum | None:
-    """From a solution's own curve on the finer grid."""
+    """The nearby minimum on the finer grid, from the solution's own curve."""
     assert solution.problem is not None
     path = solution.trajectory.path
     objective, start = ActionObjective(problem), prolonged(path, problem.grid)
@@ -73,7 +73,7 @@ def test_it_is_the_optimisers_minimum(ur5: Solution) -> None:
     assert solution.nit >= found.steps
 
 
-def test_its_value_tells_the_difference_of_costs(ur5: Solution) -> None:
+def test_its_value_gives_the_difference_of_costs(ur5: Solution) -> None:
     problem = finer(ur5)
     found = approached(ur5, problem)
     assert found is not None
@@ -106,10 +106,10 @@ def test_far_from_a_minimum_nothing_is_found(arm_scene: Scene) -> None:
     assert nearby_minimum(objective, start, objective.model(start, None, None)) is None
 
 
-# Torques carried over
+# Interpolated torques
 
 
-def test_efforts_carried_to_the_same_points_are_the_torques_there(ur5: Solution) -> None:
+def test_efforts_interpolated_to_the_same_points_are_the_torques_there(ur5: Solution) -> None:
     assert ur5.problem is not None
     ld = ur5.problem.ld
     (carried,) = interpolated_slopes(ld, ur5.trajectory.path, ld)

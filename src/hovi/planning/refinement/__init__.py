@@ -1,1 +1,1 @@
-"""How accurate a solution is, which grid is next, and the certificate."""
+"""Error estimates, grid refinement to a tolerance, and the certificate of a plan."""

@@ -1,4 +1,4 @@
-"""Solve to a tolerance: start coarse, estimate the error, refine where it is, and stop in time."""
+"""Adaptive solve to a tolerance: estimate the error and refine the grid until it is met."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hovi.planning.refinement.candidate import Candidate, least_error
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
-from hovi.planning.refinement.next_grid import moved_to, next_grid
+from hovi.planning.refinement.next_grid import interpolated_to, next_grid
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
@@ -31,29 +31,29 @@ from hovi.system.interruption import (
     record_interrupt,
 )
 
-Told = Callable[[Round], None]
-"""What is told how far a search is."""
+OnRound = Callable[[Round], None]
+"""Called after every round of a refinement."""
 
-FIRST_INTERVALS = 60
-"""The most that a search begins with."""
-ROUNDS = 14
-"""Grids that are tried."""
-STALLED = 2
-"""Rounds without a smaller error after which rounding, or the motion, sets the limit."""
-MOST_POINTS = 400_000
-"""Quadrature points of the finest grid."""
+MAX_FIRST_INTERVALS = 60
+"""Maximum number of intervals of the first grid."""
+MAX_ROUNDS = 14
+"""Maximum number of grids."""
+MAX_STALLED_ROUNDS = 2
+"""Consecutive rounds without an error smaller by half after which the refinement ends."""
+MAX_POINTS = 400_000
+"""Number of quadrature points of a grid above which no finer one is tried."""
 
 
 def first_grid(duration: float, intervals: int, smooth: bool = True) -> Grid:
-    """The grid to begin with: galerkin-2 on the intervals, or two thirds of them with more modes.
+    """The first grid: galerkin-2 on the intervals, or galerkin-4 on two thirds of them.
 
-    These have as many quadrature points, and smaller errors where the motion is smooth; and their
-    modes tell how fast they decay.
-    duration: T, in [s]. intervals: those beyond FIRST_INTERVALS do not count. smooth: whether
-        nothing is known that makes kinks, as limits and via points do.
+    Both have as many quadrature points. With more modes the errors of smooth motions are smaller,
+    and the decay of the modes can be estimated.
+    duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
+        motion has no kinks, which limits and via points cause.
     Raises InputError as Grid.uniform does.
     """
-    number = min(intervals, FIRST_INTERVALS)
+    number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
         return Grid.uniform(duration, number, galerkin(2))
     return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4))
@@ -67,13 +67,13 @@ def solve_to_tolerance(
     *,
     max_iterations: int = 500,
     time_limit: float | None = None,
-    told: Told | None = None,
+    on_round: OnRound | None = None,
 ) -> Solution:
-    """A minimum whose estimated error is within a tolerance, on a grid that is just fine enough.
+    """A minimum whose estimated error is within a tolerance, on a grid just fine enough.
 
-    problem: on the grid to begin with. guess, max_iterations: as for `solve`.
-    time_limit: of everything, in [s]. told: called with every grid that was solved on.
-    The solution's `accuracy` says what was reached, and why not more where it was not.
+    problem: on the first grid. guess, max_iterations: as for `solve`.
+    time_limit: in total, in [s]. on_round: called after every grid.
+    The solution's `accuracy` reports the estimated error, and why the tolerance was not reached.
     """
     deadline = Deadline(time_limit)
     first = solve(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
@@ -82,7 +82,7 @@ def solve_to_tolerance(
         tolerance,
         max_iterations=max_iterations,
         time_limit=deadline.seconds_left,
-        told=told,
+        on_round=on_round,
     )
 
 
@@ -93,25 +93,25 @@ def refine_to_tolerance(
     *,
     max_iterations: int = 500,
     time_limit: float | None = None,
-    told: Told | None = None,
+    on_round: OnRound | None = None,
 ) -> Solution:
-    """The same motion within a tolerance; arguments as for `solve_to_tolerance`."""
-    return _Search(tolerance, max_iterations, Deadline(time_limit), told).run(solution)
+    """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`."""
+    return _Search(tolerance, max_iterations, Deadline(time_limit), on_round).run(solution)
 
 
 @dataclass(eq=False)
 class _Search:
-    """The rounds of a search, which share budgets."""
+    """The rounds of a refinement, with their common limits on steps and time."""
 
     tolerance: Tolerance
     max_iterations: int
     deadline: Deadline
-    told: Told | None
+    on_round: OnRound | None
     rounds: list[Round] = field(default_factory=list)
     best: Candidate = field(init=False)
 
     def run(self, solution: Solution) -> Solution:
-        """Refine until the error is small enough, or something ends it."""
+        """Refine until the error is within the tolerance, or no further progress is possible."""
         self.best = Candidate(solution, self.tolerance)
         try:
             reason = self._refine(solution)
@@ -121,11 +121,11 @@ class _Search:
         return self._finished(self.best, reason)
 
     def _refine(self, solution: Solution) -> str:
-        """The rounds; returns why they ended early, or ""."""
-        candidate = self.best = self._judged(solution)
+        """Run the rounds; returns why they ended early, or ""."""
+        candidate = self.best = self._evaluated(solution)
         stalled = 0
-        while not candidate.enough:
-            reason = self._ended(candidate, stalled)
+        while not candidate.within_tolerance:
+            reason = self._stop_reason(candidate, stalled)
             if reason:
                 return reason
             previous, candidate = candidate, self._next(candidate)
@@ -138,8 +138,8 @@ class _Search:
         self.best = candidate
         return ""
 
-    def _judged(self, solution: Solution) -> Candidate:
-        """A solution with what is known of its error, as a round of its own."""
+    def _evaluated(self, solution: Solution) -> Candidate:
+        """A solution with its estimated error, recorded as a round."""
         raise_if_interrupted()
         began = time.perf_counter()
         candidate = Candidate.of(solution, self.tolerance)
@@ -149,12 +149,12 @@ class _Search:
         error, steps = candidate.error, solution.nit
         done = Round(grid.intervals, points, solution.cost, error, steps, seconds)
         self.rounds.append(done)
-        if self.told is not None:
-            self.told(done)
+        if self.on_round is not None:
+            self.on_round(done)
         return candidate
 
-    def _ended(self, candidate: Candidate, stalled: int) -> str:
-        """Why no finer grid is tried, or ""."""
+    def _stop_reason(self, candidate: Candidate, stalled: int) -> str:
+        """Why no finer grid is tried; "" if one is."""
         raise_if_interrupted()
         solution = candidate.solution
         if not solution.success:
@@ -165,45 +165,45 @@ class _Search:
         assert solution.problem is not None
         if cost and candidate.error <= least_error(solution.problem):
             limited = solution.problem.limited
-            what = "the limits' tolerance leaves" if limited else "rounding leaves"
-            return f"{what} no smaller error"
-        if stalled >= STALLED:
-            return f"the last {STALLED} grids brought no smaller error"
-        if len(self.rounds) >= ROUNDS:
-            return f"{ROUNDS} grids were tried"
-        if self.rounds[-1].points > MOST_POINTS:
+            bound = "the tolerance of limits" if limited else "rounding"
+            return f"{bound} allows no smaller error"
+        if stalled >= MAX_STALLED_ROUNDS:
+            return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
+        if len(self.rounds) >= MAX_ROUNDS:
+            return f"the maximum of {MAX_ROUNDS} grids was reached"
+        if self.rounds[-1].points > MAX_POINTS:
             return f"a grid has {self.rounds[-1].points:,} points"
         return ""
 
     def _next(self, candidate: Candidate) -> Candidate:
-        """The next grid, from the finer solution, or that itself."""
+        """The solution on the next grid, which may be that of the finer solution."""
         problem, finer = candidate.solution.problem, candidate.finer
         assert problem is not None
         grid = next_grid(candidate)
         if finer is None:
-            return self._judged(self._solved(problem.on(grid), candidate.solution.trajectory))
+            return self._evaluated(self._solved(problem.on(grid), candidate.solution.trajectory))
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
         else:
             fine = problem.on(grid)
-            solution = _near(finer, fine)
-        return self._judged(solution or self._solved(fine, moved_to(finer, fine)))
+            solution = _solved_nearby(finer, fine)
+        return self._evaluated(solution or self._solved(fine, interpolated_to(finer, fine)))
 
     def _solved(self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath) -> Solution:
-        """By the optimiser."""
+        """Solve with the remaining time."""
         steps = self.max_iterations
         left = self.deadline.seconds_left
         return solve(problem, guess, max_iterations=steps, time_limit=left)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
-        """The solution with what is known of its accuracy."""
+        """The chosen solution with its accuracy."""
         solution, finer, known = chosen.solution, chosen.finer, chosen.error_of_cost
         if finer is None and not reason:
-            reason = "no finer solution was found nearby"
+            reason = "no nearby solution was found on a finer grid"
         if chosen.contradicted > 0:
             finer = None
-            reason = f"{reason}, and the minimum moves when the grid becomes finer"
+            reason = f"{reason}, and on a finer grid the solver reached another minimum"
         reached = bool(chosen.error <= self.tolerance.size)
         accuracy = Accuracy(
             self.tolerance,
@@ -218,12 +218,12 @@ class _Search:
         if solution.success:
             message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"
             message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
-        told = {**solution.trajectory.metadata, "error_estimate": known}
+        metadata = {**solution.trajectory.metadata, "error_estimate": known}
         if interrupted() and not reached:
             solution = dataclasses.replace(solution, success=False, status=Status.INTERRUPTED)
         return dataclasses.replace(
             solution,
-            trajectory=dataclasses.replace(solution.trajectory, metadata=told),
+            trajectory=dataclasses.replace(solution.trajectory, metadata=metadata),
             message=f"{message.removesuffix('.')}; {accuracy}",
             nit=steps,
             error_estimate=known,
@@ -235,11 +235,11 @@ class _Search:
         return self.tolerance.frame
 
 
-def _near(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:
-    """A solution next to a finer one on another grid; None where it takes the optimiser."""
+def _solved_nearby(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:
+    """The minimum on another grid near a finer solution; None if it needs a full solve."""
     if problem.limited or problem.constrained:
         return None
     efforts = interpolated_slopes(finer.problem.ld, finer.path, problem.ld)
-    objective, start = ActionObjective(problem), moved_to(finer, problem)
+    objective, start = ActionObjective(problem), interpolated_to(finer, problem)
     found = nearby_minimum(objective, start, objective.model_with(start, efforts, None))
     return None if found is None else found.solution()

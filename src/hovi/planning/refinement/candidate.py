@@ -1,4 +1,4 @@
-"""What is known of a solution's error, in the unit of a tolerance, and whether that is enough."""
+"""A solution with its estimated error, in the unit of a tolerance."""
 
 from __future__ import annotations
 
@@ -20,84 +20,87 @@ from hovi.planning.solver.solver import Solution
 
 Array = npt.NDArray[np.float64]
 
-ACCEPTED = 0.8
-"""Share of the tolerance that an estimated error may have."""
-CANCELLED = 20.0
-"""How many times the tolerance the contributions of the intervals may sum up to where they
-cancel in the cost."""
-UNSTEADY = 0.1
-"""Error of the cost that a spread of the nodal Hamiltonian speaks of, as a share of the spread."""
-ROUNDING = 1e-14
-"""Relative error of the cost that rounding may leave: no smaller one is claimed."""
-CAUTION = 1.5
-"""Factor on the difference from a finer solution under limits, which is not better by orders."""
-BLUR = 10.0
-"""Relative error of the cost that limits leave, in units of their tolerance: bounds are drawn in
-by some tolerances, and may be exceeded by one."""
-CONTRADICTED = 10.0
-"""Ratio of the difference of costs on two grids and their errors beyond which it is no error: the
-motion went on to another minimum."""
+ACCEPTED_SHARE = 0.8
+"""Largest accepted estimate, as a share of the tolerance."""
+CANCELLATION_LIMIT = 20.0
+"""Largest accepted sum of the intervals' |contributions| to the cost's error, in tolerances."""
+HAMILTONIAN_ERROR_SHARE = 0.1
+"""Relative error of the cost that is inferred from the nodal Hamiltonian, over its spread."""
+ROUNDING_FLOOR = 1e-14
+"""Smallest estimate of the relative error of the cost."""
+LIMITED_SAFETY_FACTOR = 1.5
+"""Factor on estimates under limits, where the finer solution is not better by orders."""
+LIMIT_COST_FLOOR = 10.0
+"""Smallest estimate of the relative error of the cost under limits, in their tolerance: bounds
+are tightened by several tolerances and may be exceeded by one."""
+CONTRADICTION_RATIO = 10.0
+"""Ratio of the difference of costs on two grids to their estimated errors above which the solver
+is taken to have reached another minimum."""
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A solution with what is known of its error.
+    """A solution with its estimated error.
 
-    finer: the solution next to it, where there is one. error: in the tolerance's unit; not a
-        number where nothing is known.
-    whole: as the error, with contributions to the cost that do not cancel, and by the Hamiltonian.
-    contradicted: relative difference of the cost on the next grid, where it is far more than the
-        error.
+    finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit;
+        NaN if unknown.
+    uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
+        error inferred from the Hamiltonian.
+    contradicted: relative difference from the cost on the next grid if it is far larger than the
+        estimates, else 0.
     """
 
     solution: Solution
     tolerance: Tolerance
     finer: FinerSolution | None = None
     error: float = np.nan
-    whole: float = np.nan
+    uncancelled: float = np.nan
     contradicted: float = 0.0
 
     @classmethod
     def of(cls, solution: Solution, tolerance: Tolerance) -> Self:
-        """A solution with what can be found out about its error."""
+        """A solution with the estimate of its error."""
         finer = finer_than(solution) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
         if tolerance.quantity is Quantity.COST:
             return cls(solution, tolerance, finer, *_errors_of_cost(solution, finer, tolerance))
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
-        error *= CAUTION if finer.problem.limited else 1.0
+        error *= LIMITED_SAFETY_FACTOR if finer.problem.limited else 1.0
         return cls(solution, tolerance, finer, error, error)
 
     @property
-    def enough(self) -> bool:
-        """Whether the error is within the tolerance, by what is known."""
-        return self.finer is not None and _within(self.error, self.whole, self.tolerance)
+    def within_tolerance(self) -> bool:
+        """Whether the estimated error is within the tolerance."""
+        return self.finer is not None and _accepted(self.error, self.uncancelled, self.tolerance)
 
     @property
     def error_of_cost(self) -> float | None:
-        """The relative error of the cost; None where it is not known."""
+        """The relative error of the cost; None if unknown."""
         if self.finer is None:
             return None
         return max(error_of_cost(self.solution, self.finer), self.contradicted)
 
     def contradicts(self, earlier: Candidate) -> bool:
-        """Whether this finer grid's cost is another by far more than both errors."""
+        """Whether the cost differs from that of an earlier grid by far more than both errors."""
         if earlier.finer is None:
             return False
         errors = error_of_cost(earlier.solution, earlier.finer)
         if self.finer is not None:
             errors += error_of_cost(self.solution, self.finer)
-        return relative_difference(earlier.finer.cost, self.solution.cost) > CONTRADICTED * errors
+        return (
+            relative_difference(earlier.finer.cost, self.solution.cost)
+            > CONTRADICTION_RATIO * errors
+        )
 
     def corrected(self, later: Candidate) -> Candidate:
-        """This one where its minimum moved away on the next grid, with what that says of it."""
-        moved = relative_difference(self.solution.cost, later.solution.cost)
-        known = moved if self.tolerance.quantity is Quantity.COST else np.nan
-        return dataclasses.replace(self, error=known, contradicted=moved)
+        """This candidate with the difference from the cost on the next grid as its error."""
+        difference = relative_difference(self.solution.cost, later.solution.cost)
+        error = difference if self.tolerance.quantity is Quantity.COST else np.nan
+        return dataclasses.replace(self, error=error, contradicted=difference)
 
     def better_than(self, other: Candidate) -> bool:
-        """Whether it is to be preferred: a minimum to none, then the smaller error."""
+        """Whether this one is preferred: minima first, then the smaller error."""
         if self.solution.success != other.solution.success:
             return self.solution.success
         return bool(np.isnan(other.error) or self.error < other.error)
@@ -106,46 +109,49 @@ class Candidate:
 def _errors_of_cost(
     solution: Solution, finer: FinerSolution, tolerance: Tolerance
 ) -> tuple[float, float]:
-    """The error, and the whole."""
+    """The fields `error` and `uncancelled`."""
     error = error_of_cost(solution, finer)
-    whole = max(error, float(contributions(finer).sum()))
-    if _within(error, whole, tolerance):  # else a finer grid is tried anyway
-        whole = max(whole, _unsteady(solution))
-    return error, whole
+    uncancelled = max(error, float(contributions(finer).sum()))
+    if _accepted(error, uncancelled, tolerance):  # else a finer grid is needed anyway
+        uncancelled = max(uncancelled, _hamiltonian_error(solution))
+    return error, uncancelled
 
 
-def _within(error: float, whole: float, tolerance: Tolerance) -> bool:
-    return error <= ACCEPTED * tolerance.size and whole <= CANCELLED * tolerance.size
+def _accepted(error: float, uncancelled: float, tolerance: Tolerance) -> bool:
+    return (
+        error <= ACCEPTED_SHARE * tolerance.size
+        and uncancelled <= CANCELLATION_LIMIT * tolerance.size
+    )
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
-    """Relative; 0 where there is no cost, and else not below what rounding or limits leave."""
+    """Relative error of the cost, not below `least_error`; 0 for zero cost with zero error."""
     error = relative_difference(finer.known, finer.cost)
     if finer.known == 0:
         return error
     problem = solution.problem
     assert problem is not None
-    error *= CAUTION if problem.limited else 1.0
+    error *= LIMITED_SAFETY_FACTOR if problem.limited else 1.0
     return max(error, least_error(problem))
 
 
 def least_error(problem: TrajectoryProblem) -> float:
-    """The smallest error of the cost that is claimed, relative."""
+    """The smallest relative error of the cost that can be estimated."""
     if not problem.limited:
-        return ROUNDING
-    return BLUR * (TOLERANCE if problem.limits is None else problem.limits.tolerance)
+        return ROUNDING_FLOOR
+    return LIMIT_COST_FLOOR * (TOLERANCE if problem.limits is None else problem.limits.tolerance)
 
 
 def contributions(finer: FinerSolution) -> Array:
-    """What each interval adds to the error of the cost, relative, without its sign."""
+    """|contribution| of each interval to the relative error of the cost, shape (N,)."""
     return np.asarray(np.abs(finer.gains) / max(abs(finer.cost), np.finfo(float).tiny))
 
 
-def _unsteady(solution: Solution) -> float:
-    """What the nodal Hamiltonian says of the error, relative; 0 where it is not constant."""
+def _hamiltonian_error(solution: Solution) -> float:
+    """Relative error inferred from the nodal Hamiltonian; 0 where that need not be constant."""
     assert solution.problem is not None
     try:
         spread = nodal_hamiltonian(solution.problem, solution.trajectory).spread
     except InputError:
         return 0.0
-    return UNSTEADY * spread
+    return HAMILTONIAN_ERROR_SHARE * spread

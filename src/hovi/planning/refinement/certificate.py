@@ -1,4 +1,4 @@
-"""certify: what can be said for a plan, each statement with the number behind it."""
+"""certify: checks of a plan, each with its number."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ T = TypeVar("T")
 
 MORE_POINTS = 6
 """Gauss points that the integral along the interpolant takes besides those of the scheme."""
-PEAK_PLACES = 33
-"""Places of an interval at which torques and velocities are looked at, both ends included."""
+PEAK_SAMPLES = 33
+"""Samples per interval for peak torques and velocities, both ends included."""
 
 
 @dataclass(frozen=True)
 class Peak:
-    """The largest absolute value along a motion, between the nodes too.
+    """The largest absolute value along a motion, also between the nodes.
 
-    value: in [N m] or [rad/s]; newtons and metres per second for sliding joints. joint: the
-    coordinate's name. t: when, in [s].
+    value: in [N m] or [rad/s], or [N] and [m/s] for sliding joints. joint: name of the coordinate.
+    t: time, in [s].
     """
 
     value: float
@@ -44,17 +44,17 @@ class Peak:
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """What is known of a plan; a statement that could not be made is None, with the reason.
+    """Checks of a plan; one that is not available is None, with the reason in `missing`.
 
-    status: what the solve ended in. n_neg: negative eigenvalues of the action's Hessian.
+    status: of the solve. n_neg: negative eigenvalues of the action's Hessian.
     action: the discrete action of L~, which is the plan's cost. integral: of L~ along the
         interpolant, by a finer quadrature.
-    errors: estimates of what separates the plan from the motion that it approximates.
+    errors: estimates of the distance from the motion that the plan approximates.
     hamiltonian: Pontryagin's, at the nodes.
     residual: largest jump of the momenta at an inner node, relative to the largest momentum.
-    torque, velocity: the largest along the motion.
-    replay: the robot driven by the planned torques.
-    missing: why a statement is missing, by its name.
+    torque, velocity: peaks along the motion.
+    replay: forward simulation of the planned torques.
+    missing: reasons for missing checks, by field name.
     """
 
     status: Status
@@ -77,21 +77,21 @@ class Certificate:
 
 @interruptible
 def certify(solution: Solution, frame: str | None = None, *, estimate: bool = True) -> Certificate:
-    """What can be said for a solution.
+    """The certificate of a solution.
 
-    frame: whose errors are told, by default the robot's tip_frame. estimate: whether errors are
-        estimated where the solution does not bring them along, at the price of a solve.
-    Raises InputError when the solution does not know its problem, or for an unknown frame.
+    frame: whose errors are reported, by default the robot's tip_frame. estimate: whether errors
+        are estimated if the solution has no estimate, which takes another solve.
+    Raises InputError if the solution has no problem, or for an unknown frame.
     """
     expect(solution, Solution, "what `plan` returned")
     problem, trajectory = solution.problem, solution.trajectory
     if problem is None:
-        raise InputError("this solution does not know its problem; plan again instead.")
+        raise InputError("this solution has no problem; call plan again instead.")
     name = problem.robot.tip_frame if frame is None else frame
-    problem.robot.frame_position(name, trajectory.q[:1])  # an unknown frame speaks first
+    problem.robot.frame_position(name, trajectory.q[:1])  # raises for an unknown frame
     missing: dict[str, str] = {}
 
-    def stated(name: str, statement: Callable[[], T]) -> T | None:
+    def checked(name: str, statement: Callable[[], T]) -> T | None:
         try:
             return statement()
         except InputError as reason:
@@ -104,12 +104,12 @@ def certify(solution: Solution, frame: str | None = None, *, estimate: bool = Tr
         n_neg=solution.n_neg,
         action=problem.ld.action(trajectory.path),
         integral=cost_integral(problem, trajectory),
-        errors=stated("errors", lambda: _errors(solution, frame, estimate)),
-        hamiltonian=stated("hamiltonian", lambda: nodal_hamiltonian(problem, trajectory)),
-        residual=stated("residual", lambda: momentum_jump(problem, trajectory)),
+        errors=checked("errors", lambda: _errors(solution, frame, estimate)),
+        hamiltonian=checked("hamiltonian", lambda: nodal_hamiltonian(problem, trajectory)),
+        residual=checked("residual", lambda: momentum_jump(problem, trajectory)),
         torque=torque,
         velocity=velocity,
-        replay=stated("replay", lambda: replay_dynamics(trajectory, frame)),
+        replay=checked("replay", lambda: replay_dynamics(trajectory, frame)),
         missing=missing,
     )
 
@@ -126,13 +126,13 @@ def cost_integral(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
 
 
 def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
-    """How far the discrete Euler-Lagrange equations are from zero at the inner nodes.
+    """Relative residual of the discrete Euler-Lagrange equations at the inner nodes.
 
-    The largest |F+ L_d - F- L_d| of p and of p~, each relative to the largest of its kind: it
-    grows like eps/h^3 with rounding. Raises InputError where multipliers have a part in it.
+    The largest |F+ L_d - F- L_d| of p and of p~, each relative to the largest of its kind; rounding
+    contributes like eps/h^3. Raises InputError if multipliers contribute to the equations.
     """
     if problem.limited or problem.constrained:
-        raise InputError("the multipliers of limits or equations have a part in it")
+        raise InputError("multipliers of limits or constraints contribute to it")
     D = problem.ld.derivatives(trajectory.path)
     jump = np.abs(D[:-1, 2:] + D[1:, :2]).max(axis=(0, 2), initial=0.0)
     sizes = np.abs(D).reshape(len(D), 2, 2, -1).max(axis=(0, 1, 3))
@@ -144,18 +144,18 @@ def _errors(solution: Solution, frame: str | None, estimate: bool) -> MotionErro
     if known is not None and (frame is None or frame == known.frame):
         return known
     if not estimate:
-        raise InputError("not estimated, since that takes another solve: plan with a tolerance")
+        raise InputError("not estimated, as it takes another solve; plan with a tolerance")
     found = estimate_error(solution, frame)
     if found is None:
-        raise InputError("no finer solution was found nearby to compare with")
+        raise InputError("no nearby solution was found on a finer grid")
     return found
 
 
 def _peaks(trajectory: Trajectory) -> tuple[Peak, Peak]:
-    """The largest torque and velocity from samples of every interval."""
+    """The largest torque and velocity, from samples of every interval."""
     N = trajectory.grid.intervals
-    k = np.repeat(np.arange(N), PEAK_PLACES)
-    s = np.tile(np.linspace(0.0, 1.0, PEAK_PLACES), N)
+    k = np.repeat(np.arange(N), PEAK_SAMPLES)
+    s = np.tile(np.linspace(0.0, 1.0, PEAK_SAMPLES), N)
     motion = trajectory.sample_intervals(k, s)
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     return _peak(motion.tau, trajectory, t), _peak(motion.v, trajectory, t)

@@ -1,11 +1,11 @@
-"""The error of a solution, from a finer solution next to it.
+"""The error of a solution, estimated by comparison with a nearby solution on a finer grid.
 
-The finer solution is on the same grid with two more inner modes per interval. Under limits it is on
-the grid with every interval halved: where a limit begins to bind the motion has a kink, and more
-inner modes alone would show little of the error that it makes.
+The finer grid has the same intervals with two more inner modes each. Under limits it has every
+interval halved instead: where a limit becomes active the motion has a kink, whose error more inner
+modes would hardly reveal.
 
-Prolonged to the finer grid a solution is already near: one or two Newton steps lead to the finer
-one. On the way the Hessian of the first step tells what each interval would gain alone.
+Prolonged to the finer grid the solution is near the finer one, and one or two Newton steps suffice.
+The Hessian of the first step gives the contribution of each interval to the error of the cost.
 """
 
 from __future__ import annotations
@@ -32,13 +32,12 @@ Array = npt.NDArray[np.float64]
 
 
 def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
-    """How far a solution is from the motion that it approximates, over the whole motion.
+    """The estimated error of a solution, over the whole motion.
 
-    It is compared with the solution nearby on the same intervals with two more inner modes each,
-    whose own error is smaller by orders where the motion is resolved.
-    frame: whose origin is followed, by default the robot's tip_frame.
-    None where no such solution was found nearby: nothing is known of the error then.
-    Raises InputError for what is no minimum.
+    Compared with the nearby solution on a finer grid, whose own error is smaller by orders of
+    magnitude where the motion is resolved.
+    frame: whose origin is compared, by default the robot's tip_frame.
+    None if no such solution was found. Raises InputError unless the solution is a minimum.
     """
     finer = finer_than(solution)
     return None if finer is None else estimate_against(solution, finer, frame)
@@ -47,7 +46,7 @@ def estimate_error(solution: Solution, frame: str | None = None) -> MotionError 
 def estimate_against(
     solution: Solution, finer: FinerSolution, frame: str | None = None
 ) -> MotionError:
-    """The error of a solution from a finer one that is known already; frame as above."""
+    """The error of a solution relative to a given finer one; frame as above."""
     costs = finer.known, finer.cost
     return deviation(solution.trajectory, finer.trajectory, costs, frame)
 
@@ -56,9 +55,12 @@ def finer_than(solution: Solution) -> FinerSolution | None:
     """The finer solution that `estimate_error` compares with."""
     problem = solution.problem
     if problem is None:
-        raise InputError("this solution does not know its problem; plan again instead.")
+        raise InputError("this solution has no problem; call plan again instead.")
     if not solution.success:
-        raise InputError(f"errors of minima are estimated, and this ended in {solution.status}.")
+        raise InputError(
+            f"only errors of minima can be estimated, and this solve ended in {solution.status}; "
+            "plan again with more time or another initial guess."
+        )
     return finer_solution(problem, solution.trajectory.path)
 
 
@@ -66,13 +68,13 @@ def finer_than(solution: Solution) -> FinerSolution | None:
 class FinerSolution:
     """A solution of a problem on a finer grid.
 
-    problem: on the finer grid; its intervals may be fewer or more where limits split them.
+    problem: on the finer grid; limits may have split its intervals.
     path: its solution, up to a small share of its distance from the coarser one. cost: its
-        discrete action. known: that of the coarser solution.
-    gains: L_d of every interval of the coarser solution less what it would be with the finer
-        interval's modes between the same end data, shape (N,). Their sum is the difference of
-        costs to first order: what an interval contributes to the error.
-    finish: gives the finer solution in full; None where that fails.
+        discrete action. known: the cost of the coarser solution.
+    gains: L_d of each interval of the coarser solution minus L_d with the modes of the finer grid
+        and the same end data, shape (N,): the interval's contribution to the error of the cost.
+        Their sum is the difference of costs to first order.
+    finish: returns the converged finer solution; None if that fails.
     """
 
     problem: TrajectoryProblem
@@ -84,12 +86,12 @@ class FinerSolution:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion, for sampling: without its momenta."""
+        """The motion without momenta, for sampling."""
         return motion(self.problem, self.path)
 
 
 def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
-    """The finer solution next to a solution of a problem; None where none was found nearby."""
+    """The solution on a finer grid near a given one; None if none was found."""
     if problem.limited:
         halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
         curve = stretched(motion(problem, path), problem.grid.duration)
@@ -116,9 +118,9 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
 def _solved(
     fine: TrajectoryProblem, start: DiscretePath, problem: TrajectoryProblem, path: DiscretePath
 ) -> FinerSolution | None:
-    """By the optimiser, which may split intervals for limits.
+    """The finer solution by a full solve, which may split intervals for limits.
 
-    Gains are then half the integral of the squared difference of the torques.
+    Its gains are half the integral of the squared difference of the torques.
     """
     solution = solve(fine, start)
     if not solution.success or solution.problem is None:
@@ -133,7 +135,7 @@ def _solved(
 
 
 def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
-    """A path as a trajectory, without its momenta, for sampling."""
+    """A path as a trajectory without momenta, for sampling."""
     momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
     return Trajectory(problem.grid, path, momenta, problem.scene)
 
@@ -147,13 +149,13 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
 
 
 def _gains(expansion: Expansion, values: Array) -> Array:
-    """L_d of the coarse path, less the extremum of the finer L_d over the inner modes alone."""
+    """L_d of the coarse path, minus the extremum of the finer L_d over the inner modes alone."""
     N, m, n = expansion.gradient.shape
     size = (m - 4) * n
     g = expansion.gradient[:, 4:].reshape(N, size, 1)
     H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, size, size)
-    # modes that an interval does not have are rows of zeros
+    # inner modes that an interval does not have are rows of zeros
     absent = np.asarray(~H.any(axis=2))
     H = H + absent[:, :, None] * np.eye(size)
-    fall = 0.5 * np.sum(g * np.linalg.solve(H, g), axis=(1, 2))
-    return np.asarray(values - expansion.values + fall)
+    decrease = 0.5 * np.sum(g * np.linalg.solve(H, g), axis=(1, 2))
+    return np.asarray(values - expansion.values + decrease)

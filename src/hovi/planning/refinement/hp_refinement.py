@@ -1,8 +1,8 @@
-"""Where a grid has to be finer: more inner modes where it is smooth, more intervals elsewhere.
+"""hp refinement: more inner modes where the motion is smooth, shorter intervals elsewhere.
 
-How fast the Legendre coefficients of an interval's acceleration decay says which of the two pays:
-they fall like rho^j, where 1/rho is the size of the ellipse of analyticity around the interval.
-More modes lower the error by rho per mode; cutting the interval makes rho itself smaller.
+The choice depends on the decay of the Legendre coefficients of an interval's acceleration: they
+decrease like rho^j, with 1/rho the size of the ellipse of analyticity around the interval. More
+modes reduce the error by a factor of rho per mode; splitting the interval reduces rho itself.
 """
 
 from __future__ import annotations
@@ -20,29 +20,29 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
-DECAY = 0.02, 0.97
-"""Range of the decay that is believed."""
+DECAY_RANGE = 0.02, 0.97
+"""Range to which estimates of rho are clipped."""
 PIECES = np.array([1, 2, 3, 4])
-"""Pieces into which an interval may be cut at a time."""
-DEGREES = np.array([2, 3, 4, 5, 6, 8, 10, 12])
-"""Inner modes that intervals may be given."""
-PADDING = 0.05
-"""What an interval costs besides its quadrature points, in points per square of the columns of the
-most flexible scheme: the Hessians of all intervals are stored and factored with as many."""
-GROUP = 900.0
-"""What a scheme costs besides, since its intervals are evaluated on their own: in points, for one
-joint. A point's cost grows like the square of the joints, this does not."""
-HOPELESS = 1000
-"""Pieces that stand for a number of modes that cannot meet the demands."""
-CUT = 900.0
-"""What it costs to read the motion at new nodes, in points, for one joint."""
+"""Numbers of pieces into which an interval may be split."""
+MODES = np.array([2, 3, 4, 5, 6, 8, 10, 12])
+"""Numbers of inner modes that an interval may have."""
+HESSIAN_COST = 0.05
+"""Cost of an interval's Hessian, in points per square of the columns of the largest scheme, with
+which the Hessians of all intervals are stored and factored."""
+SCHEME_COST = 900.0
+"""Fixed cost of a second scheme, whose intervals are evaluated separately, in points for one joint.
+The cost of a point grows like the square of the number of joints; this one is constant."""
+INFEASIBLE_PIECES = 1000
+"""Number of pieces that marks a number of modes with which the demands cannot be met."""
+SPLIT_COST = 900.0
+"""Fixed cost of interpolating the motion at new nodes, in points for one joint."""
 
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """By which factor an error has to fall in each interval.
+    """The factor by which an error has to be reduced in each interval.
 
-    factor: shape (N,), 1 or more where nothing has to be done.
+    factor: shape (N,); 1 or more where no reduction is needed.
     power: 1 for the curve between the nodes, 2 for the cost and the nodes, whose order is twice
         that of the acceleration.
     """
@@ -50,19 +50,20 @@ class Demand:
     factor: Array
     power: int
 
-    def left(self, change: Array | float) -> float:
-        """What is left to be done once the acceleration's error falls by `change`: 1 is just met.
+    def remaining(self, change: Array | float) -> float:
+        """Ratio of predicted and demanded error once the acceleration's error changes by `change`.
 
-        The cost sums the intervals up; of the curve the largest counts.
+        At most 1 if the demand is met: the mean over the intervals for the cost, the maximum for
+        the curve.
         """
-        left = change**self.power / self.factor
-        return float(np.mean(left) if self.power == 2 else np.max(left))
+        ratio = change**self.power / self.factor
+        return float(np.mean(ratio) if self.power == 2 else np.max(ratio))
 
 
 def decay(grid: Grid, path: DiscretePath) -> Array:
-    """rho of each interval, from its last four Legendre coefficients of a, shape (N,).
+    """rho of each interval, from the last four Legendre coefficients of a, shape (N,).
 
-    Coefficients of even and odd degree are taken in pairs, over all joints.
+    Coefficients are taken in pairs of an even and an odd degree, over all joints.
     """
     z0, z1 = path.z[:, 0], path.z[:, 1]
     ends = np.stack([z1, 2 * np.sqrt(3) * (z0 - z1 / 2)], axis=1)
@@ -71,22 +72,22 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
     for scheme, index in grid.groups:
         last = sizes[index, : 2 + scheme.inner_modes][:, -4:]
         if last.shape[1] < 4:
-            rho[index] = DECAY[1]
+            rho[index] = DECAY_RANGE[1]
             continue
         low, high = np.hypot(last[:, 0], last[:, 1]), np.hypot(last[:, 2], last[:, 3])
         rho[index] = np.sqrt(high / np.maximum(low, np.finfo(float).tiny))
-    return np.clip(rho, *DECAY)
+    return np.clip(rho, *DECAY_RANGE)
 
 
 def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) -> Grid:
-    """The cheapest grid that is foreseen to meet every demand, of one scheme or of two.
+    """The cheapest grid that is predicted to meet every demand, with one scheme or two.
 
-    rho: decay of each interval. joints: degrees of freedom of what moves.
-    An interval whose demands nothing meets is cut into four.
+    rho: decay of each interval. joints: degrees of freedom of the robot.
+    An interval whose demands no choice meets is split into four.
     """
-    degrees = np.array([scheme.inner_modes for scheme in grid.schemes])
-    more = np.maximum(DEGREES, degrees[:, None])  # (N, D)
-    pieces = _pieces(degrees, more, rho, demands)
+    current = np.array([scheme.inner_modes for scheme in grid.schemes])
+    more = np.maximum(MODES, current[:, None])  # (N, D)
+    pieces = _pieces(current, more, rho, demands)
     low, high = _cheapest(more, pieces, 1.0 / joints**2)
     kept, N = np.array([low, high]), np.arange(grid.intervals)
     choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
@@ -95,44 +96,44 @@ def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) 
     return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(modes, cut)))
 
 
-def _pieces(degrees: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:
-    """Into how many pieces each interval is cut with each number of modes, (N, D).
+def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:
+    """Pieces into which each interval is split with each number of modes, shape (N, D).
 
-    Where no number of pieces meets the demands, but another of modes does, out of all proportion.
+    INFEASIBLE_PIECES where no number of pieces meets the demands but another number of modes does.
     """
     after = (more[:, :, None] + 2) * np.log(_decay_of_pieces(rho))[:, None]  # (N, D, S)
-    change = after - ((degrees + 2) * np.log(rho))[:, None, None]
+    change = after - ((current + 2) * np.log(rho))[:, None, None]
     meets: Mask = np.ones(change.shape, dtype=bool)
     for demand in demands:
         wanted = np.log(np.minimum(demand.factor, 1.0))
         meets &= demand.power * change <= wanted[:, None, None] + 1e-12
     possible: Mask = np.any(meets, axis=2)
-    pieces = np.where(possible, PIECES[np.argmax(meets, axis=2)], HOPELESS)
-    hopeless = ~possible.any(axis=1)
-    pieces[hopeless] = PIECES[-1]
+    pieces = np.where(possible, PIECES[np.argmax(meets, axis=2)], INFEASIBLE_PIECES)
+    infeasible = ~possible.any(axis=1)
+    pieces[infeasible] = PIECES[-1]
     return pieces
 
 
 def _cheapest(more: Index, pieces: Index, share: float) -> tuple[int, int]:
-    """Places in DEGREES of the two numbers of modes that cost the least together; they may agree.
+    """Indices in MODES of the cheapest pair of numbers of modes, which may be equal.
 
-    share: what a group or a cut costs for these joints, as a share of what it does for one.
+    share: fixed costs for this number of joints, relative to those for one joint.
     """
-    low, high = np.triu_indices(len(DEGREES))
+    low, high = np.triu_indices(len(MODES))
     points = pieces * (more + 2)
-    taken = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
+    count = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
     work = np.minimum(points[:, low], points[:, high]).sum(axis=0)
-    work = work + PADDING * taken.sum(axis=0) * (more.max(axis=0)[high] + 4) ** 2
-    work += share * (GROUP * (low != high) + CUT * (taken > 1).any(axis=0))
+    work = work + HESSIAN_COST * count.sum(axis=0) * (more.max(axis=0)[high] + 4) ** 2
+    work += share * (SCHEME_COST * (low != high) + SPLIT_COST * (count > 1).any(axis=0))
     best = int(np.argmin(work))
     return int(low[best]), int(high[best])
 
 
 def _decay_of_pieces(rho: Array) -> Array:
-    """rho after cutting into PIECES, shape (N, S).
+    """rho after splitting into PIECES, shape (N, S).
 
     For a singularity beside the middle of the interval, at a distance of y half lengths,
-    1/rho = y + sqrt(1 + y^2); cutting into s pieces makes it s y.
+    1/rho = y + sqrt(1 + y^2); splitting into s pieces changes y to s y.
     """
     y = 0.5 * (1 / rho - rho)[:, None] * PIECES
     return np.asarray(np.sqrt(1 + y**2) - y)

@@ -1,4 +1,4 @@
-"""Limits that a motion stays far from: it is the motion without them, and as accurate as that."""
+"""Inactive limits: a motion far from its limits can be refined without them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
-FAR = 0.01
-"""Share of every range that such a motion leaves to the nearest bound."""
+MIN_DISTANCE = 0.01
+"""Smallest distance of such a motion from every bound, as a share of the range."""
 
 
 def far_from_limits(solution: Solution) -> bool:
-    """Whether a minimum is limited by nothing that it comes near to."""
+    """Whether a minimum has limits, no obstacles, and is far from every limit."""
     limits = _limits_alone(solution.problem)
     return (
         solution.success
         and limits is not None
-        and float(closeness(solution.trajectory, limits).min()) > FAR
+        and float(closeness(solution.trajectory, limits).min()) > MIN_DISTANCE
     )
 
 
@@ -30,15 +30,15 @@ def without_limits(solution: Solution) -> Solution:
 
 
 def with_limits_again(refined: Solution, limited: Solution) -> Solution | None:
-    """A motion refined without limits as a solution within them; None where it comes near."""
+    """A motion refined without limits as a solution with them; None if it is near a limit."""
     assert limited.problem is not None
     problem = limited.problem.on(refined.trajectory.grid)
-    back = dataclasses.replace(refined, problem=problem)
-    return back if far_from_limits(back) else None
+    restored = dataclasses.replace(refined, problem=problem)
+    return restored if far_from_limits(restored) else None
 
 
 def _limits_alone(problem: TrajectoryProblem | None) -> Limits | None:
-    """The limits of a problem that has nothing to keep away from; None where there are none."""
+    """The limits of a problem without obstacles; None if there are none."""
     if problem is None or problem.distances is not None or not problem.limited:
         return None
     return problem.limits

@@ -1,9 +1,9 @@
-"""R y of a solution's outputs at the points of another grid: what weights the curvature there.
+"""Outputs of a solution interpolated to another grid, as weights of the curvature there.
 
-Outputs, torques for instance, are read at the solution's own quadrature points and interpolated in
-between: a curve of a Galerkin scheme lacks the modes beyond its own, and those vanish at its Gauss
-points. Elsewhere its outputs swing about the right ones, and a Hessian that is weighted with them
-may be indefinite right beside a minimum.
+Outputs such as torques are evaluated at the solution's own quadrature points and interpolated
+between them. A Galerkin curve lacks higher modes, which vanish at its Gauss points; elsewhere its
+outputs oscillate about the true ones, and a Hessian weighted with these may be indefinite close to
+a minimum.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The minimum of the discrete action next to a path that is nearly one, by few Hessians.
+"""The minimum of the discrete action near a path, by Newton's method with reused Hessians.
 
-Newton's method with Hessians that are kept while they serve: from nearby, a gradient and a step
-with the known factors gain as much as a step of the optimiser, and cost less.
+Close to a minimum a gradient and a step with an earlier factorisation make as much progress as a
+full Newton step, and cost less.
 """
 
 from __future__ import annotations
@@ -16,35 +16,35 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, minimum_at
 
-HESSIANS = 5
-"""That may be factored before the search is given up."""
-CORRECTIONS = 2
-"""Further steps with one Hessian."""
-CONTRACTION = 0.3
-"""Ratio of the lengths of successive steps above which the Hessian is renewed instead."""
-NEGLIGIBLE = 0.02
-"""Length of a step, as a share of the whole way, that makes it the last of an approach."""
-ROUNDING = 1e-15
-"""Length of a step, relative to the data, below which nothing is left to gain."""
-POLISHES = 8
-"""Steps with the last Hessian until only rounding is left."""
-SETTLED = 1e-9
-"""Length of a step that may be left where it hardly shrinks any more."""
-LONG = 3e-3
-"""Length of a step after which the Hessian is renewed in any case."""
-FAR = 1e-2
-"""Length of a way beyond which the Hessian at its end serves better than the one before it."""
+MAX_HESSIANS = 5
+"""Maximum number of Hessians that are factored."""
+MAX_CORRECTIONS = 2
+"""Maximum number of further steps with one Hessian."""
+MAX_CONTRACTION = 0.3
+"""Ratio of the lengths of successive steps above which a new Hessian is computed."""
+LAST_STEP_SHARE = 0.02
+"""Length of the last step of an approach, relative to the longest distance covered."""
+ROUNDING_LENGTH = 1e-15
+"""Length of a step, relative to the data, that is due to rounding."""
+MAX_POLISHING_STEPS = 8
+"""Maximum number of steps of the final iteration to rounding."""
+CONVERGED_LENGTH = 1e-9
+"""Largest length of a last step if the steps no longer contract."""
+LONG_STEP = 3e-3
+"""Length of a step after which a new Hessian is computed in any case."""
+MAX_REUSE_DISTANCE = 1e-2
+"""Distance covered with a Hessian above which a new one is computed for the final iteration."""
 
 
 @dataclass(frozen=True, eq=False)
 class NearbyMinimum:
-    """Where an approach ended: near a minimum, to a small share of the way.
+    """The end of an approach to a minimum, up to a small share of the distance covered.
 
-    objective: what is minimised. path: its end. value: the action there, to first order in what
-        is left of the way.
-    model, factor: the last Hessian. way: length of the steps that were taken with it, the last of
-        length `last`.
-    steps: how many were taken in all. began: by the performance counter, in [s].
+    objective: the discrete action. path: the last iterate. value: the action at the minimum, to
+        first order in the remaining distance.
+    model, factor: the last Hessian. distance: sum of the lengths of the steps with it, of which
+        `last` is the last.
+    steps: total number of steps. began: time of the performance counter, in [s].
     """
 
     objective: ActionObjective
@@ -52,17 +52,17 @@ class NearbyMinimum:
     value: float
     model: QuadraticModel
     factor: Factor
-    way: float
+    distance: float
     last: float
     steps: int
     began: float
 
     def solution(self) -> Solution | None:
-        """The minimum, as exact as rounding lets it be; None where that fails."""
+        """The minimum to rounding errors; None if the iteration fails."""
         objective, x, last = self.objective, self.path, self.last
-        model: QuadraticModel | None = self.model if self.way <= FAR else None
+        model: QuadraticModel | None = self.model if self.distance <= MAX_REUSE_DISTANCE else None
         factor, steps, length = self.factor, self.steps, np.inf
-        for _ in range(POLISHES):
+        for _ in range(MAX_POLISHING_STEPS):
             if model is None:
                 model, last = objective.model(x, None, None), np.inf
                 renewed = model.factor(0.0)
@@ -72,17 +72,19 @@ class NearbyMinimum:
             gradient = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
             step = factor.solve(-model.scatter(gradient))
             length = objective.relative_size(x, step, model)
-            if not length <= CONTRACTION * last:
-                if length <= SETTLED:
+            if not length <= MAX_CONTRACTION * last:
+                if length <= CONVERGED_LENGTH:
                     break
                 model = None
                 continue
             x, steps = objective.retract(x, step, model), steps + 1
-            if length <= ROUNDING or (length * length <= ROUNDING * last and last < np.inf):
+            if length <= ROUNDING_LENGTH or (
+                length * length <= ROUNDING_LENGTH * last and last < np.inf
+            ):
                 break
             last = length
-        if not length <= SETTLED or objective.model(x, None, None).factor(0.0) is None:
-            return None  # the exact Hessian tells a minimum, and all that served were near it
+        if not length <= CONVERGED_LENGTH or objective.model(x, None, None).factor(0.0) is None:
+            return None  # only the exact Hessian shows whether this is a minimum
         seconds = time.perf_counter() - self.began
         return minimum_at(objective.problem, x, steps, seconds)
 
@@ -93,43 +95,42 @@ def nearby_minimum(
     model: QuadraticModel,
     known: float | None = None,
 ) -> NearbyMinimum | None:
-    """Newton's method from a path; None where it does not contract at once.
+    """Newton's method from a path; None if it does not contract at once.
 
-    model: the last of the objective, at the path: its curvature is best weighted with
-        interpolated_slopes. Later Hessians are weighted with what the steps foresee.
-    known: a cost whose difference from the minimum's has to come out well.
-    Lengths are those of changes of q and T v: in a flat valley a change of the action says little
-    of them.
+    model: the objective's model at the path, its curvature best weighted with
+        interpolated_slopes. Later Hessians are weighted with predicted outputs.
+    known: a cost whose difference from the minimal cost is to be accurate.
+    Lengths measure changes of q and T v, which in a flat valley change the action only little.
     """
-    began, whole, steps, before = time.perf_counter(), 0.0, 0, np.inf
-    for _ in range(HESSIANS):
+    began, longest, steps, before = time.perf_counter(), 0.0, 0, np.inf
+    for _ in range(MAX_HESSIANS):
         factor = model.factor(0.0)
         if factor is None:
             return None
         value, gradient = objective.expansion.action, model.gradient
-        way, last, gone = 0.0, before, np.zeros_like(gradient)
-        for correction in range(CORRECTIONS + 1):
+        distance, last, total = 0.0, before, np.zeros_like(gradient)
+        for correction in range(MAX_CORRECTIONS + 1):
             step = factor.solve(-gradient)
             length = objective.relative_size(x, step, model)
-            if not length <= (CONTRACTION if correction else 1.0) * last:
+            if not length <= (MAX_CONTRACTION if correction else 1.0) * last:
                 break
-            x, steps, way = objective.retract(x, step, model), steps + 1, way + length
-            whole, gone = max(whole, length), gone + step
-            fall = -0.5 * float(np.vdot(gradient, step))
-            near = length <= max(NEGLIGIBLE * whole, ROUNDING)
-            if near and (known is None or fall <= NEGLIGIBLE * abs(value - known)):
+            x, steps, distance = objective.retract(x, step, model), steps + 1, distance + length
+            longest, total = max(longest, length), total + step
+            decrease = -0.5 * float(np.vdot(gradient, step))
+            near = length <= max(LAST_STEP_SHARE * longest, ROUNDING_LENGTH)
+            if near and (known is None or decrease <= LAST_STEP_SHARE * abs(value - known)):
                 return NearbyMinimum(
-                    objective, x, value - fall, model, factor, way, length, steps, began
+                    objective, x, value - decrease, model, factor, distance, length, steps, began
                 )
             before, last = length if correction == 0 else before, length
-            if length > LONG or correction == CORRECTIONS:
+            if length > LONG_STEP or correction == MAX_CORRECTIONS:
                 break
             after = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
             after = model.scatter(after)
-            # the trapezium rule along the step, which is right to the third order
+            # trapezoidal rule along the step, with an error of third order in its length
             value += 0.5 * float(np.vdot(gradient + after, step))
             gradient = after
-        if way == 0.0:
+        if distance == 0.0:
             return None
-        model = objective.model(x, model, gone)
+        model = objective.model(x, model, total)
     return None

@@ -1,4 +1,4 @@
-"""The next grid of a search, and the motion to begin with on it."""
+"""The next grid of a refinement, and the initial motion on it."""
 
 from __future__ import annotations
 
@@ -15,29 +15,31 @@ from hovi.planning.refinement.hp_refinement import Demand, decay, refined
 
 Array = npt.NDArray[np.float64]
 
-AIM = 0.3
-"""Share of the tolerance that a refined grid aims at."""
-HOPED = 2.5
-"""Ratio of what is foreseen of the finer solution and that aim with which it is tried: it is known
-already, and looking at its error costs little."""
+TARGET_SHARE = 0.3
+"""Error for which a grid is refined, as a share of the tolerance."""
+FINER_GRID_RATIO = 2.5
+"""Ratio of the finer solution's predicted error to that target up to which its grid is the next:
+the solution is known already, and estimating its error is cheap."""
 
 
 def next_grid(candidate: Candidate) -> Grid:
-    """A grid that is foreseen to be just fine enough; the finer solution's where that is."""
+    """A grid that is predicted to be just fine enough, or that of the finer solution."""
     problem, finer = candidate.solution.problem, candidate.finer
     assert problem is not None
     if finer is None:
         return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
     demands, rho = _demands(candidate, finer), _decay(candidate, finer)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
-    # halved everywhere, as under limits, its own error would take twice as many intervals again
-    if same_steps and all(demand.left(rho**MORE_MODES) <= HOPED for demand in demands):
+    # with all intervals halved, as under limits, its own estimate would need twice as many again
+    if same_steps and all(
+        demand.remaining(rho**MORE_MODES) <= FINER_GRID_RATIO for demand in demands
+    ):
         return finer.problem.grid
     grid = refined(problem.grid, rho, demands, problem.robot.nv)
-    return grid.enriched(MORE_MODES) if _same(grid, problem.grid) else grid
+    return grid.enriched(MORE_MODES) if _same_grid(grid, problem.grid) else grid
 
 
-def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
+def interpolated_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
     """The finer solution's curve on another grid of the same problem."""
     grid, path = problem.grid, finer.path
     if np.array_equal(grid.steps, finer.problem.grid.steps):
@@ -51,43 +53,43 @@ def moved_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
 
 
 def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
-    """What each interval has to contribute."""
+    """The reduction of the error that each interval needs."""
     known = contributions(finer)
-    N, aim = len(known), AIM * candidate.tolerance.size
+    N, target = len(known), TARGET_SHARE * candidate.tolerance.size
     if candidate.tolerance.quantity is Quantity.COST:
-        short = max(1.0, candidate.error / max(known.sum(), 1e-300))
-        return [Demand(aim / (N * np.maximum(short * known, 1e-300)), 2)]
+        scale = max(1.0, candidate.error / max(known.sum(), 1e-300))
+        return [Demand(target / (N * np.maximum(scale * known, 1e-300)), 2)]
     return _demands_on_curve(candidate, finer, known)
 
 
 def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) -> list[Demand]:
-    """Of the curve where it is off between good nodes, of everything where the nodes are."""
+    """Reductions for the curve where it is worse than the nearby nodes, and for the nodes."""
     tolerance = candidate.tolerance
     estimate = estimate_against(candidate.solution, finer, tolerance.frame)
     if tolerance.quantity is Quantity.FRAME:
         along, ends = estimate.tip, estimate.tip_at_nodes
     else:
         along, ends = estimate.q.max(axis=1), estimate.q_at_nodes.max(axis=1)
-    aim = AIM * tolerance.size
+    target = TARGET_SHARE * tolerance.size
     nearby = np.maximum(ends[:-1], ends[1:])
     own = np.where(along > 3 * nearby, along, 0.0)
-    nodes = aim / max(float(ends.max()), 1e-300)
+    nodes = target / max(float(ends.max()), 1e-300)
     share = known * len(known) / max(known.sum(), 1e-300)
     return [
-        Demand(aim / np.maximum(own, 1e-300), 1),
+        Demand(target / np.maximum(own, 1e-300), 1),
         Demand(nodes / np.maximum(share, 1e-300), 2),
     ]
 
 
 def _decay(candidate: Candidate, finer: FinerSolution) -> Array:
-    """Of the finer solution, where it has the same intervals; else of the solution itself."""
+    """Decay of the finer solution if it has the same intervals, else of the solution itself."""
     grid = candidate.solution.trajectory.grid
     if np.array_equal(grid.steps, finer.problem.grid.steps):
         return decay(finer.problem.grid, finer.path)
     return decay(grid, candidate.solution.trajectory.path)
 
 
-def _same(one: Grid, other: Grid) -> bool:
+def _same_grid(one: Grid, other: Grid) -> bool:
     same_steps = np.array_equal(one.steps, other.steps)
     return same_steps and all(
         a.name == b.name for a, b in zip(one.schemes, other.schemes, strict=True)

@@ -1,7 +1,7 @@
 """Pontryagin's Hamiltonian at the nodes of a motion: constant along exact solutions.
 
-H = p.v + p~.a - L~, with p and p~ the discrete momenta and a from p~ = dL~/da: all of the nodes'
-own order. With the interpolant's own acceleration its spread would say nothing.
+H = p.v + p~.a - L~, with the discrete momenta p and p~, and a from p~ = dL~/da, all of the order of
+the nodes. The interpolant's acceleration has a lower order, which would dominate the spread of H.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ class NodalHamiltonian:
 
     @property
     def spread(self) -> float:
-        """Largest less smallest value, relative to the scale; 0 where nothing moves."""
+        """Largest minus smallest value, relative to the scale; 0 for zero scale."""
         return float(np.ptp(self.values)) / self.scale if self.scale > 0 else 0.0
 
 
 def nodal_hamiltonian(problem: TrajectoryProblem, trajectory: Trajectory) -> NodalHamiltonian:
     """H at the nodes of a solution.
 
-    Raises InputError where H is not constant, or its acceleration is not known: for a cost or
-    torques that depend on time, under limits, and where equations have to be met.
+    Raises InputError if H is not constant, for a cost or torques that depend on time, or if p~
+    does not determine a, with limits or equality constraints.
     """
     if problem.limited:
-        raise InputError("under limits a does not follow from p~ alone")
+        raise InputError("with limits a does not follow from p~ alone")
     if problem.constrained:
-        raise InputError("where equations are met a does not follow from p~ alone")
+        raise InputError("with equality constraints a does not follow from p~ alone")
     if problem.scene.terms.timed:
         raise InputError("the cost or the torques depend on time, and so does H")
     lagrangian, p = problem.ld.lagrangian, trajectory.momenta

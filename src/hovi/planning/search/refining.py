@@ -110,7 +110,7 @@ class Refinement:
             refine_to_tolerance,
             tolerance=tolerance,
             max_iterations=self.fine.options.max_iterations,
-            told=partial(self._tell, which),
+            on_round=partial(self._report_round, which),
         )
         better = None
         if far_from_limits(known):
@@ -118,7 +118,7 @@ class Refinement:
             better = with_limits_again(free, known)
         return refine(known, time_limit=self.deadline.seconds_left) if better is None else better
 
-    def _tell(self, which: str, done: Round) -> None:
+    def _report_round(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
         self.progress(text, 0.9)
 

@@ -153,4 +153,4 @@ def test_a_residual_torque_is_reported_where_there_are_no_conditions() -> None:
     assert solution.problem is not None
     left = Residuals([np.full((3, 1), 1e-5)], [], 1.0)
     sentence = unmet_sentence(solution.problem, solution.trajectory.path, left)
-    assert "takes 1e-05 of the largest torque" in sentence
+    assert "the remaining torque is 1e-05 of the largest" in sentence
