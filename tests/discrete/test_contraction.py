@@ -1,4 +1,4 @@
-"""Contracted derivatives are those of the sum over the points, written out."""
+"""Contracted derivatives equal the explicit sums over the points."""
 
 from __future__ import annotations
 
@@ -39,14 +39,16 @@ def written_out(
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_contracted_derivatives_are_the_sums_over_points(shape: tuple[int, int, int, int]) -> None:
+def test_contracted_derivatives_equal_the_sums_over_points(
+    shape: tuple[int, int, int, int],
+) -> None:
     batch = random_batch(*shape)
     for found, expected in zip(contract(*batch), written_out(*batch), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_the_upper_triangle_is_the_lower_one_to_the_last_bit(
+def test_hessians_are_bitwise_symmetric(
     shape: tuple[int, int, int, int],
 ) -> None:
     _, hessian = contract(*random_batch(*shape))
@@ -67,7 +69,7 @@ def test_an_interval_has_the_same_bytes_in_every_batch() -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_any_processor_contracts_alike(shape: tuple[int, int, int, int]) -> None:
+def test_all_kernels_agree(shape: tuple[int, int, int, int]) -> None:
     batch = random_batch(*shape)
     fast = contract(*batch)
     slow = tuple(np.empty_like(array) for array in fast)

@@ -1,4 +1,4 @@
-"""L_d and its derivatives: closed forms, finite differences, and batches that change nothing."""
+"""L_d and its derivatives: closed forms, finite differences, independence of batches."""
 
 from __future__ import annotations
 
@@ -62,7 +62,9 @@ def assert_close(found: Array, expected: Array, tolerance: float) -> None:
 @pytest.mark.parametrize("n", [1, 3])
 @pytest.mark.parametrize("h", [1e-3, 0.1, 1.0, 10.0])
 @pytest.mark.parametrize("name", ["galerkin-0", "galerkin-3", "hermite-simpson"])
-def test_l_d_of_the_spline_is_the_exact_discrete_lagrangian(name: str, n: int, h: float) -> None:
+def test_l_d_of_the_spline_equals_the_exact_discrete_lagrangian(
+    name: str, n: int, h: float
+) -> None:
     grid = Grid.uniform(6 * h, 6, by_name(name))
     path = random_path(grid, n)
     path = DiscretePath(path.q, path.v, path.z, 0 * path.inner)
@@ -79,9 +81,7 @@ def test_l_d_of_the_spline_is_the_exact_discrete_lagrangian(name: str, n: int, h
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_l_d_is_the_weighted_sum_of_l_at_the_points_of_the_table(
-    arm_scene: Scene, name: str
-) -> None:
+def test_l_d_is_the_weighted_sum_of_l_at_the_quadrature_points(arm_scene: Scene, name: str) -> None:
     scheme = by_name(name)
     grid = Grid(STEPS, (scheme,) * len(STEPS))
     path = random_path(grid, 2)
@@ -96,7 +96,7 @@ def test_l_d_is_the_weighted_sum_of_l_at_the_points_of_the_table(
 
 
 class Clock(Lagrangian):
-    """L = t^2: a Lagrangian that sees nothing but the time."""
+    """L = t^2: a Lagrangian that depends on time only."""
 
     order = 2
     nq = nv = 1
@@ -125,7 +125,7 @@ def test_every_point_is_evaluated_at_its_own_time(name: str) -> None:
 
 @pytest.mark.parametrize("coordinates", ["nodal", "regular"])
 @pytest.mark.parametrize("name", SCHEMES)
-def test_expansions_are_the_derivatives_in_the_columns_of_an_interval(
+def test_expansions_match_finite_differences_in_all_columns(
     arm_scene: Scene, name: str, coordinates: str
 ) -> None:
     h = 0.3
@@ -148,7 +148,7 @@ def test_expansions_are_the_derivatives_in_the_columns_of_an_interval(
 
 
 @pytest.mark.parametrize("effects", ["gravity", "potential"])
-def test_expansions_are_derivatives_on_a_real_robot(ur5: Robot, effects: str) -> None:
+def test_expansions_match_finite_differences_on_a_real_robot(ur5: Robot, effects: str) -> None:
     more = [JointLimitPotential({"elbow_joint": (-0.1, 0.1)}, 50.0, 0.5)]
     scene = Scene(ur5, [Gravity(), *(more if effects == "potential" else [])])
     h, grid = 0.2, Grid.uniform(0.2, 1, by_name("galerkin-1"))
@@ -167,7 +167,7 @@ def test_expansions_are_derivatives_on_a_real_robot(ur5: Robot, effects: str) ->
 
 
 @pytest.mark.parametrize("name", SCHEMES)
-def test_d1_to_d4_are_the_derivatives_in_q0_v0_q1_v1(arm_scene: Scene, name: str) -> None:
+def test_d1_to_d4_match_finite_differences(arm_scene: Scene, name: str) -> None:
     h = 0.3
     grid = Grid.uniform(h, 1, by_name(name))
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
@@ -246,7 +246,7 @@ def test_multipliers_predict_the_torque_after_a_step(arm_scene: Scene, coordinat
             assert_close(predicted, R * (torque(origin) + slope), 1e-7)
 
 
-def test_multipliers_change_nothing_but_the_hessian(arm_scene: Scene) -> None:
+def test_multipliers_change_only_the_hessian(arm_scene: Scene) -> None:
     grid = mixed_grid()
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     path = random_path(grid, 2)
@@ -260,7 +260,7 @@ def test_multipliers_change_nothing_but_the_hessian(arm_scene: Scene) -> None:
         np.testing.assert_array_equal(expansion.gradient, plain.gradient)
 
 
-def test_a_lagrangian_without_outputs_predicts_none() -> None:
+def test_a_lagrangian_without_outputs_has_no_predictions() -> None:
     grid = mixed_grid()
     ld, path = DiscreteLagrangian(spline(2), grid), random_path(mixed_grid(), 2)
     expansion = ld.expand(path)
@@ -272,9 +272,7 @@ def test_a_lagrangian_without_outputs_predicts_none() -> None:
 
 
 @pytest.mark.parametrize("coordinates", ["nodal", "regular"])
-def test_intervals_together_are_the_intervals_one_by_one(
-    arm_scene: Scene, coordinates: str
-) -> None:
+def test_intervals_together_equal_single_intervals(arm_scene: Scene, coordinates: str) -> None:
     grid = mixed_grid()
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     path = random_path(grid, 2)
@@ -294,7 +292,7 @@ def test_intervals_together_are_the_intervals_one_by_one(
 
 
 @pytest.mark.parametrize("mixed", [False, True])
-def test_more_intervals_than_fit_into_one_batch_are_no_special_case(mixed: bool) -> None:
+def test_more_intervals_than_one_batch_are_supported(mixed: bool) -> None:
     N = CHUNK + 3
     names = ["galerkin-0", "hermite-simpson" if mixed else "galerkin-0"]
     grid = Grid(np.full(N, 0.1), tuple(by_name(names[i % 7 == 0]) for i in range(N)))
@@ -309,7 +307,7 @@ def test_more_intervals_than_fit_into_one_batch_are_no_special_case(mixed: bool)
     np.testing.assert_allclose(expansion.gradient[:, 2:4, 0], slope, rtol=0, atol=1e-11)
 
 
-def test_the_expansion_of_a_path_is_its_own(arm_scene: Scene) -> None:
+def test_expansions_of_different_paths_are_independent(arm_scene: Scene) -> None:
     grid = mixed_grid()
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     one, other = random_path(grid, 2, seed=1), random_path(grid, 2, seed=2)

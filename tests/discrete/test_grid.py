@@ -1,4 +1,4 @@
-"""Grids: times, batches of intervals, and the refusal of numbers that make none."""
+"""Grids: times, batches of intervals, and invalid arguments."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_groups_hold_every_interval_once_with_its_scheme() -> None:
     assert len(grid.groups) == 3
 
 
-def test_schemes_of_one_name_with_different_tables_are_not_mixed_up() -> None:
+def test_schemes_of_one_name_with_different_tables_are_distinguished() -> None:
     one, other = galerkin(0), taylor_midpoint()
     namesake = Scheme(one.name, other.order, other.points, other.weights, other.table)
     grid = Grid(np.ones(2), (one, namesake))
@@ -61,7 +61,7 @@ def test_schemes_of_one_name_with_different_tables_are_not_mixed_up() -> None:
             np.testing.assert_array_equal(scheme.table, grid.schemes[i].table)
 
 
-def test_chosen_intervals_are_cut_in_half() -> None:
+def test_chosen_intervals_are_bisected() -> None:
     grid = Grid(np.array([0.5, 0.25, 1.0]), (galerkin(0), hermite_simpson(), galerkin(2)))
     fine = grid.halved(np.array([True, False, True]))
     np.testing.assert_array_equal(fine.steps, [0.25, 0.25, 0.25, 0.5, 0.5])
@@ -71,7 +71,7 @@ def test_chosen_intervals_are_cut_in_half() -> None:
     np.testing.assert_array_equal(grid.halved(np.zeros(3, dtype=bool)).steps, grid.steps)
 
 
-def test_a_grid_does_not_change_behind_ones_back() -> None:
+def test_a_grid_is_immutable() -> None:
     steps = np.array([0.5, 0.5])
     grid = Grid(steps, (galerkin(0),) * 2)
     steps[0] = 7.0
@@ -83,19 +83,19 @@ def test_a_grid_does_not_change_behind_ones_back() -> None:
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, np.nan, np.inf, -np.inf])
-def test_a_duration_that_is_none_is_refused(duration: float) -> None:
+def test_an_invalid_duration_is_refused(duration: float) -> None:
     with pytest.raises(InputError, match="the duration must be positive and finite"):
         Grid.uniform(duration, 4, galerkin(0))
 
 
 @pytest.mark.parametrize("intervals", [0, -3, 2.5, np.nan, np.inf])
-def test_a_number_of_intervals_that_is_none_is_refused(intervals: Any) -> None:
+def test_an_invalid_number_of_intervals_is_refused(intervals: Any) -> None:
     with pytest.raises(InputError, match="the number of intervals must be 1 or more"):
         Grid.uniform(1.0, intervals, galerkin(0))
 
 
 @pytest.mark.parametrize("bad", [0.0, -0.1, np.nan, np.inf])
-def test_a_step_that_is_none_is_refused(bad: float) -> None:
+def test_an_invalid_step_is_refused(bad: float) -> None:
     with pytest.raises(InputError, match="every step of a grid must be positive and finite"):
         Grid(np.array([0.1, bad, 0.1]), (galerkin(0),) * 3)
 
@@ -106,7 +106,7 @@ def test_every_interval_needs_one_step_and_one_scheme(steps: int, schemes: int) 
         Grid(np.ones(steps), (galerkin(0),) * schemes)
 
 
-def test_steps_are_one_row_of_numbers() -> None:
+def test_steps_must_be_one_dimensional() -> None:
     with pytest.raises(InputError, match="one step and one scheme per interval"):
         Grid(np.ones((2, 2)), (galerkin(0),) * 2)
 

@@ -1,4 +1,4 @@
-"""First guesses: curves that meet their ends, consistent with their own derivatives."""
+"""Initial guesses: curves that meet their ends, with consistent derivatives."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_curve_meets_both_ends(curve: Curve) -> None:
     np.testing.assert_allclose(v, [ENDS[1], ENDS[3]], rtol=0, atol=1e-13)
 
 
-def test_v_and_a_are_the_derivatives_of_q(curve: Curve) -> None:
+def test_v_and_a_are_derivatives_of_q(curve: Curve) -> None:
     for t in np.linspace(0.1, T - 0.1, 7):
         point = np.array([t])
         _, v, a = curve(point)
@@ -91,7 +91,7 @@ def test_the_quintic_starts_and_ends_without_acceleration(two_link: Robot) -> No
     np.testing.assert_allclose(differences, 0.0, atol=1e-11)
 
 
-def test_a_bump_is_zero_with_its_rate_at_both_ends_and_large_between(two_link: Robot) -> None:
+def test_a_bump_vanishes_with_its_rate_at_both_ends(two_link: Robot) -> None:
     base = cubic(two_link, ENDS, T)
     t = np.linspace(0.0, T, 101)
     sizes = []
@@ -125,7 +125,7 @@ def test_a_named_curve_is_its_function(two_link: Robot, name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "hint"), [("cubik", "did you mean 'cubic'"), ("spiral", "valid names are 'cubic'")]
 )
-def test_an_unknown_guess_is_answered_with_the_nearest(
+def test_an_unknown_guess_is_refused_with_the_nearest_name(
     two_link: Robot, name: str, hint: str
 ) -> None:
     with pytest.raises(InputError, match=f"there is no guess '{name}'.*{hint}"):
@@ -136,7 +136,7 @@ def test_an_unknown_guess_is_answered_with_the_nearest(
 
 
 @pytest.mark.parametrize("names", [["galerkin-2"] * 6, ["galerkin-3", "hermite-simpson"] * 3])
-def test_a_path_has_the_curves_nodes_and_the_boundary_to_the_last_bit(
+def test_a_path_has_the_nodes_of_the_curve_and_the_exact_boundary(
     curve: Curve, two_link: Robot, names: list[str]
 ) -> None:
     grid = Grid(T * np.array([1, 2, 3, 4, 5, 6]) / 21, tuple(by_name(name) for name in names))
@@ -151,7 +151,7 @@ def test_a_path_has_the_curves_nodes_and_the_boundary_to_the_last_bit(
         assert not path.inner[k, scheme.inner_modes :].any()
 
 
-def test_z_is_what_the_paper_calls_it(two_link: Robot) -> None:
+def test_z_matches_the_definition_in_the_paper(two_link: Robot) -> None:
     grid = Grid(np.array([0.5, 0.1]), (by_name("galerkin-0"),) * 2)
     q, v = np.random.default_rng(0).normal(size=(2, 3, 2))
     z = regularized(two_link, grid, q, v)
@@ -196,9 +196,7 @@ def test_the_acceleration_between_the_nodes_has_the_order_of_its_polynomial(
 # Motions as guesses
 
 
-def test_a_stretched_motion_passes_the_same_places_at_another_pace(
-    arm_scene: Scene, curve: Curve
-) -> None:
+def test_a_stretched_motion_follows_the_same_path(arm_scene: Scene, curve: Curve) -> None:
     motion = trajectory(curve, Grid.uniform(T, 8, by_name("galerkin-3")), arm_scene)
     slow = stretched(motion, 3 * T)
     t = np.linspace(0.0, T, 31)
@@ -209,7 +207,7 @@ def test_a_stretched_motion_passes_the_same_places_at_another_pace(
     np.testing.assert_allclose(found[2][:-1], a[:-1] / 9, rtol=0, atol=1e-9)
 
 
-def test_a_motion_on_its_own_grid_is_its_own_guess(arm_scene: Scene, curve: Curve) -> None:
+def test_a_motion_on_its_own_grid_is_reproduced(arm_scene: Scene, curve: Curve) -> None:
     grid = Grid.uniform(T, 8, by_name("galerkin-3"))
     motion = trajectory(curve, grid, arm_scene)
     again = path_on_grid(stretched(motion, T), grid, ENDS, arm_scene.robot)
@@ -242,21 +240,21 @@ def test_a_moved_path_is_the_path_plus_a_cubic(arm_scene: Scene, curve: Curve) -
         np.testing.assert_array_equal(x, end)
 
 
-def test_a_path_that_need_not_move_stays_to_the_last_bit(two_link: Robot, curve: Curve) -> None:
+def test_a_path_with_the_same_boundary_is_bitwise_unchanged(two_link: Robot, curve: Curve) -> None:
     path = path_on_grid(curve, UNEQUAL, ENDS, two_link)
     found = moved(path, UNEQUAL, ENDS, two_link)
     for name in ("q", "v", "z", "inner"):
         np.testing.assert_array_equal(getattr(found, name), getattr(path, name))
 
 
-def test_a_path_is_checked_against_its_grid_and_itself(two_link: Robot, curve: Curve) -> None:
+def test_an_inconsistent_path_is_refused(two_link: Robot, curve: Curve) -> None:
     path = path_on_grid(curve, UNEQUAL, ENDS, two_link)
     check_path(path, UNEQUAL, two_link)
     bad = [
         (dataclasses.replace(path, q=path.q[:-1]), r"guess's q must be .* shape \(5, 2\)"),
         (dataclasses.replace(path, v=path.v * np.inf), "guess's v must be finite"),
         (dataclasses.replace(path, inner=path.inner[:, :1]), "guess's inner must be"),
-        (dataclasses.replace(path, z=-path.z), "guess's z is not that of its q and v"),
+        (dataclasses.replace(path, z=-path.z), "guess's z does not match its q and v"),
     ]
     for other, sentence in bad:
         with np.errstate(invalid="ignore"), pytest.raises(InputError, match=sentence):

@@ -1,4 +1,4 @@
-"""The chain rule of charts: finite differences, what is known at the ends, the same bytes."""
+"""The chain rule of charts: finite differences, exact values at the ends, reproducible bytes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SPACES = [
 SIZES = [1e-9, 1.0, 3.0]
 GALERKIN = by_name("galerkin-1")
 AT_END = Scheme("end", 0, np.ones(1), np.ones(1), np.array([[[1.0, 1, 0], [1, 0, 1], [0, 0, 0]]]))
-"""The one point is the far end, with x'' = 0."""
+"""A table whose only point is the end node, with x'' = 0."""
 each_space = pytest.mark.parametrize("space", SPACES, ids=lambda space: str(space.parts))
 each_size = pytest.mark.parametrize("size", SIZES)
 
@@ -42,7 +42,7 @@ class Intervals:
     rest: Array
 
     def moved(self, step: Array) -> Intervals:
-        """These after a step of (q0, h v0, q1, h v1, c), (B, m, n)."""
+        """The intervals after a step of (q0, h v0, q1, h v1, c), (B, m, n)."""
         q0, q1 = (self.space.integrate(q, step[:, i]) for q, i in ((self.q0, 0), (self.q1, 2)))
         rest = self.rest + step[:, [1, 3, *range(4, step.shape[1])]]
         return Intervals(self.space, self.scheme, q0, q1, rest)
@@ -67,7 +67,7 @@ class Intervals:
 
 
 def random_intervals(space: ConfigurationSpace, size: float, scheme: Scheme) -> Intervals:
-    """Intervals along which every orientation turns by the size."""
+    """Intervals in which every orientation rotates by `size`."""
     random = np.random.default_rng(space.nv)
     d = random.normal(size=(len(STEPS), space.nv))
     for factor in space.curved:
@@ -96,7 +96,7 @@ def actions(there: Intervals, here: Intervals, g: Array, H: Array) -> Array:
 
 @each_size
 @each_space
-def test_gradient_and_hessian_are_those_of_finite_differences(
+def test_gradient_and_hessian_match_finite_differences(
     space: ConfigurationSpace, size: float
 ) -> None:
     here = random_intervals(space, size, GALERKIN)
@@ -125,7 +125,7 @@ def test_gradient_and_hessian_are_those_of_finite_differences(
 
 @each_size
 @each_space
-def test_the_far_end_is_a_node(space: ConfigurationSpace, size: float) -> None:
+def test_the_end_of_an_interval_is_its_node(space: ConfigurationSpace, size: float) -> None:
     n = space.nv
     g, H = random_terms(space, AT_END)
     # x'' = 0 is none of the nodal columns, so that nothing is known of the acceleration
@@ -213,7 +213,7 @@ DOORS = [expanded, pulled, pulled_regularly, pushed, rated, rated_locally]
 
 @pytest.mark.parametrize("door", DOORS)
 @each_space
-def test_any_processor_gives_the_same(
+def test_all_kernels_agree(
     space: ConfigurationSpace, door: Callable[..., tuple[Array, ...]]
 ) -> None:
     charts, terms = random_intervals(space, 1.0, GALERKIN).charts, random_terms(space, GALERKIN)

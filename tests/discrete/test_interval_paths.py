@@ -1,4 +1,4 @@
-"""Paths of intervals: what points see is the table's, and steps lead where their columns say."""
+"""Interpolation of paths and steps in interval columns equal their definitions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def random_path(N: int, r: int, n: int) -> tuple[PathArrays, Array, np.random.Ge
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_points_see_what_the_table_says(shape: tuple[int, int, int]) -> None:
+def test_interpolation_matches_the_table(shape: tuple[int, int, int]) -> None:
     path, h, random = random_path(*shape)
     q, v, z, inner = path
     for modes in range(shape[1] + 1):  # of a scheme that has fewer than the path
@@ -39,7 +39,7 @@ def test_points_see_what_the_table_says(shape: tuple[int, int, int]) -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_steps_lead_where_their_columns_say(shape: tuple[int, int, int]) -> None:
+def test_steps_match_their_columns(shape: tuple[int, int, int]) -> None:
     path, h, random = random_path(*shape)
     N, r, n = shape
     _, v, z, inner = path
@@ -63,7 +63,7 @@ def test_steps_lead_where_their_columns_say(shape: tuple[int, int, int]) -> None
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_a_misfit_is_the_largest_gap_of_z(shape: tuple[int, int, int]) -> None:
+def test_a_misfit_is_the_largest_difference_of_z(shape: tuple[int, int, int]) -> None:
     (q, v, z, inner), h, _ = random_path(*shape)
     hh = h[:, None]
     gaps = (
@@ -76,7 +76,7 @@ def test_a_misfit_is_the_largest_gap_of_z(shape: tuple[int, int, int]) -> None:
 
 @pytest.mark.parametrize("part", range(4))
 @pytest.mark.parametrize("what", [np.nan, np.inf, -np.inf])
-def test_a_path_that_is_not_finite_has_no_misfit(part: int, what: float) -> None:
+def test_the_misfit_of_a_non_finite_path_is_nan(part: int, what: float) -> None:
     path, h, _ = random_path(*SHAPES[1])
     path[part].flat[-1] = what
     assert np.isnan(misfit(path, h))

@@ -5,7 +5,7 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.nodal_momenta import carried_momenta
+from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution, solve
@@ -21,7 +21,7 @@ def reach(scene: Scene, intervals: int) -> Solution:
 
 
 @pytest.mark.parametrize("gravity", [True, False])
-def test_they_are_those_of_a_coarser_motion_to_rounding(
+def test_they_match_a_coarser_motion_to_rounding(
     arm_scene: Scene, two_link: Robot, gravity: bool
 ) -> None:
     scene = arm_scene if gravity else Scene(two_link)
@@ -32,7 +32,7 @@ def test_they_are_those_of_a_coarser_motion_to_rounding(
         np.testing.assert_allclose(p[:, row], expected[:, row], rtol=0, atol=2e-12 * size)
 
 
-def test_they_are_within_rounding_of_what_is_evaluated(arm_scene: Scene) -> None:
+def test_they_match_evaluated_momenta_to_rounding(arm_scene: Scene) -> None:
     found = reach(arm_scene, 1000)
     assert found.problem is not None
     evaluated = found.problem.ld.momenta(found.trajectory.path)
@@ -42,10 +42,10 @@ def test_they_are_within_rounding_of_what_is_evaluated(arm_scene: Scene) -> None
 
 def test_momenta_that_jump_are_evaluated() -> None:
     D = np.random.default_rng(0).normal(size=(5, 4, 3))
-    p = carried_momenta(D)
+    p = accumulated_momenta(D)
     np.testing.assert_array_equal(p[:-1], -D[:, :2])
     np.testing.assert_array_equal(p[-1], D[-1, 2:])
 
 
-def test_what_is_not_a_number_is_passed_on() -> None:
-    assert np.isnan(carried_momenta(np.full((3, 4, 2), np.nan))).all()
+def test_nan_is_propagated() -> None:
+    assert np.isnan(accumulated_momenta(np.full((3, 4, 2), np.nan))).all()

@@ -56,7 +56,7 @@ def saved(motion: Trajectory, tmp_path: Path) -> Path:
 
 
 def with_inner_modes(trajectory: Trajectory) -> Trajectory:
-    """The same nodes with an acceleration that is no cubic's and jumps at the nodes."""
+    """The same nodes with a non-cubic acceleration that jumps at the nodes."""
     path = trajectory.path
     inner = np.random.default_rng(3).normal(size=path.inner.shape)
     return dataclasses.replace(trajectory, path=DiscretePath(path.q, path.v, path.z, inner))
@@ -73,7 +73,7 @@ def test_a_cubic_is_sampled_exactly(scene: Scene, scheme: str) -> None:
         np.testing.assert_allclose(got, wanted, rtol=0, atol=2e-14)
 
 
-def test_intervals_may_differ_in_length_and_scheme(scene: Scene) -> None:
+def test_intervals_can_differ_in_length_and_scheme(scene: Scene) -> None:
     steps = np.array([0.3, 0.05, 0.9, 0.4, 0.35])
     trajectory, cubic = cubic_motion(scene, schemes=SCHEMES, steps=steps)
     t = np.random.default_rng(1).uniform(0.0, 2.0, 400)  # in no order
@@ -81,7 +81,7 @@ def test_intervals_may_differ_in_length_and_scheme(scene: Scene) -> None:
         np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-13)
 
 
-def test_v_and_a_are_the_derivatives_of_q(motion: Trajectory) -> None:
+def test_v_and_a_are_derivatives_of_q(motion: Trajectory) -> None:
     s, h = chebyshev_points(8), motion.grid.steps[3]
     q, v, a, _ = motion.sample_intervals(np.full(8, 3), s)
     differentiate = np.polynomial.polynomial
@@ -91,7 +91,7 @@ def test_v_and_a_are_the_derivatives_of_q(motion: Trajectory) -> None:
         np.testing.assert_allclose(derivative, wanted, atol=1e-9)
 
 
-def test_torques_are_those_of_rnea(motion: Trajectory) -> None:
+def test_torques_match_rnea(motion: Trajectory) -> None:
     q, v, a, tau = motion.sample(np.linspace(0.0, 2.0, 40))
     model = motion.robot.model.copy()  # type: ignore[union-attr]
     model.gravity.linear = np.array([0.0, 0.0, -9.8])
@@ -112,12 +112,12 @@ def test_nodes_are_sampled_from_the_right_and_the_end_from_the_left(motion: Traj
     np.testing.assert_allclose(at_nodes.q[-1], motion.q[-1], atol=1e-15)
 
 
-def test_configurations_are_those_of_sample(motion: Trajectory) -> None:
+def test_configurations_match_sample(motion: Trajectory) -> None:
     t = np.linspace(0.0, 2.0, 33)
     np.testing.assert_array_equal(motion.configurations(t), motion.sample(t).q)
 
 
-def test_a_single_time_and_no_time_are_batches(motion: Trajectory) -> None:
+def test_scalar_and_empty_times_are_accepted(motion: Trajectory) -> None:
     assert [x.shape for x in motion.sample(1.0)] == [(1, 2)] * 4
     assert [x.shape for x in motion.sample([])] == [(0, 2)] * 4
 
@@ -128,12 +128,12 @@ def test_times_outside_the_motion_are_refused(motion: Trajectory, t: float) -> N
         motion.sample(t)
 
 
-def test_rounding_at_the_end_is_forgiven(motion: Trajectory) -> None:
+def test_rounding_at_the_end_is_tolerated(motion: Trajectory) -> None:
     q = motion.sample(np.nextafter(2.0, 3.0)).q
     np.testing.assert_array_equal(q, motion.sample(2.0).q)
 
 
-def test_arrays_that_do_not_fit_are_refused(motion: Trajectory) -> None:
+def test_arrays_of_the_wrong_shape_are_refused(motion: Trajectory) -> None:
     with pytest.raises(InputError, match="momenta has shape"):
         dataclasses.replace(motion, momenta=motion.momenta[1:])
     path = dataclasses.replace(motion.path, inner=motion.path.inner[:, :1])
@@ -146,7 +146,7 @@ def test_arrays_that_do_not_fit_are_refused(motion: Trajectory) -> None:
 # Files
 
 
-def test_a_loaded_motion_is_the_saved_one(motion: Trajectory, saved: Path) -> None:
+def test_a_loaded_motion_equals_the_saved_one(motion: Trajectory, saved: Path) -> None:
     loaded, t = Trajectory.load(saved), np.linspace(0.0, 2.0, 77)
     for got, wanted in zip(loaded.sample(t), motion.sample(t), strict=True):
         np.testing.assert_array_equal(got, wanted)
@@ -163,7 +163,7 @@ def test_every_scheme_name_survives(scene: Scene, tmp_path: Path) -> None:
     assert [scheme.name for scheme in loaded.grid.schemes] == names
 
 
-def test_saving_what_was_loaded_gives_the_same_bytes(saved: Path, tmp_path: Path) -> None:
+def test_saving_a_loaded_motion_gives_the_same_bytes(saved: Path, tmp_path: Path) -> None:
     Trajectory.load(saved).save(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == saved.read_bytes()
 
@@ -185,12 +185,12 @@ def test_numpy_opens_the_file_without_pickle(motion: Trajectory, saved: Path) ->
         assert json.loads(file["header"].tobytes())["format"] == "hovi-trajectory"
 
 
-def test_no_path_of_this_machine_is_in_the_file(saved: Path) -> None:
+def test_the_file_contains_no_local_path(saved: Path) -> None:
     assert str(Path.home()).encode() not in saved.read_bytes()
     assert str(Path(__file__).parents[2]).encode() not in saved.read_bytes()
 
 
-def test_a_failed_save_leaves_what_was_there(
+def test_a_failed_save_keeps_the_existing_file(
     motion: Trajectory, saved: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = saved.read_bytes()
@@ -205,7 +205,7 @@ def test_a_failed_save_leaves_what_was_there(
     assert list(saved.parent.iterdir()) == [saved]
 
 
-def test_places_that_cannot_be_written_are_named(motion: Trajectory, tmp_path: Path) -> None:
+def test_paths_that_cannot_be_written_are_reported(motion: Trajectory, tmp_path: Path) -> None:
     with pytest.raises(TrajectoryFileError, match="No such file or directory"):
         motion.save(tmp_path / "no" / "motion.npz")
     with pytest.raises(TrajectoryFileError, match="not a regular file"):
@@ -219,7 +219,7 @@ def test_metadata_that_is_not_json_is_refused(motion: Trajectory, tmp_path: Path
     assert not list(tmp_path.iterdir())
 
 
-def test_a_scheme_that_no_name_brings_back_is_refused(scene: Scene, tmp_path: Path) -> None:
+def test_a_scheme_that_its_name_does_not_restore_is_refused(scene: Scene, tmp_path: Path) -> None:
     trajectory, _ = cubic_motion(scene)
     own = dataclasses.replace(by_name("galerkin-2"), name="mine")
     grid = dataclasses.replace(trajectory.grid, schemes=(own,) * 7)
@@ -290,7 +290,7 @@ BROKEN: dict[str, tuple[Callable[[Entries], object], str]] = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_files_that_do_not_fit_together_are_refused(saved: Path, name: str) -> None:
+def test_inconsistent_files_are_refused(saved: Path, name: str) -> None:
     contents, (change, sentence) = entries(saved), BROKEN[name]
     change(contents)
     rewrite(saved, contents)
@@ -302,18 +302,18 @@ def test_files_that_do_not_fit_together_are_refused(saved: Path, name: str) -> N
 def test_files_of_another_kind_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "motion.npz"
     path.write_bytes(content)
-    with pytest.raises(TrajectoryFileError, match=r"'motion\.npz' is not a whole npz file"):
+    with pytest.raises(TrajectoryFileError, match=r"'motion\.npz' is not a complete npz file"):
         Trajectory.load(path)
 
 
-def test_no_file_and_a_folder_are_refused(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TrajectoryFileError, match="there is no"):
         Trajectory.load(tmp_path / "motion.npz")
     with pytest.raises(TrajectoryFileError, match="that is a folder"):
         Trajectory.load(tmp_path)
 
 
-def test_a_truncated_file_is_refused_wherever_it_ends(saved: Path) -> None:
+def test_a_truncated_file_is_refused(saved: Path) -> None:
     whole = saved.read_bytes()
     for length in np.linspace(0, len(whole) - 1, 40).astype(int):
         saved.write_bytes(whole[:length])
@@ -321,7 +321,7 @@ def test_a_truncated_file_is_refused_wherever_it_ends(saved: Path) -> None:
             Trajectory.load(saved)
 
 
-def test_a_flipped_byte_is_refused_or_does_no_harm(motion: Trajectory, saved: Path) -> None:
+def test_a_flipped_byte_is_refused_or_harmless(motion: Trajectory, saved: Path) -> None:
     whole = saved.read_bytes()
     for place in np.random.default_rng(5).integers(0, len(whole), 150):
         damaged = bytearray(whole)
@@ -351,7 +351,7 @@ def npy(header: str, data: bytes = b"") -> bytes:
 @pytest.mark.parametrize(
     "shape", ["(10**18, 2)", "(1000000000000, 2)", "(-1, 2)", "(3, 2)", "(2,)", "'x'"]
 )
-def test_a_shape_that_the_data_does_not_fill_is_refused(saved: Path, shape: str) -> None:
+def test_a_shape_that_does_not_match_the_data_is_refused(saved: Path, shape: str) -> None:
     header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
     replace_entry(saved, "q.npy", npy(header, b"\0" * 24))
     with pytest.raises(TrajectoryFileError, match="'q'"):
@@ -411,11 +411,11 @@ def test_a_header_with_an_infinite_number_is_refused(saved: Path) -> None:
         Trajectory.load(saved)
 
 
-def test_an_entry_that_is_there_twice_is_refused(saved: Path) -> None:
+def test_a_duplicate_entry_is_refused(saved: Path) -> None:
     with warnings.catch_warnings(), zipfile.ZipFile(saved, "a") as archive:
         warnings.simplefilter("ignore")  # zipfile's own, about the duplicate
         archive.writestr("q.npy", archive.read("q.npy"))
-    with pytest.raises(TrajectoryFileError, match="an entry is there twice"):
+    with pytest.raises(TrajectoryFileError, match="an entry occurs twice"):
         Trajectory.load(saved)
 
 
@@ -444,7 +444,7 @@ def model_motion(two_link: Robot) -> Trajectory:
     return with_inner_modes(cubic_motion(Scene(robot, [Gravity(9.8)]))[0])
 
 
-def test_torques_of_a_bare_model_survive_without_it(
+def test_torques_of_a_given_model_survive_without_it(
     model_motion: Trajectory, tmp_path: Path
 ) -> None:
     path = tmp_path / "motion.npz"
@@ -459,9 +459,7 @@ def test_torques_of_a_bare_model_survive_without_it(
 
 
 @pytest.mark.parametrize("names", [None, ["shoulder"], ["shoulder", 2], "ab"])
-def test_names_that_do_not_fit_are_refused(
-    model_motion: Trajectory, tmp_path: Path, names: Any
-) -> None:
+def test_invalid_names_are_refused(model_motion: Trajectory, tmp_path: Path, names: Any) -> None:
     path = tmp_path / "motion.npz"
     model_motion.save(path)
     contents = entries(path)
@@ -471,14 +469,14 @@ def test_names_that_do_not_fit_are_refused(
         Trajectory.load(path)
 
 
-def test_stored_torques_hit_their_points_and_keep_jumps() -> None:
+def test_stored_torques_interpolate_and_reproduce_jumps() -> None:
     values = np.random.default_rng(0).normal(size=(3, 9, 2))
     torque, s = StoredTorque(values), chebyshev_points(9)
     for k in range(3):
         np.testing.assert_array_equal(torque(np.full(9, k), s), values[k])
 
 
-def test_the_whole_duration_may_be_asked_for_on_uneven_grids(scene: Scene) -> None:
+def test_the_full_duration_can_be_sampled_on_nonuniform_grids(scene: Scene) -> None:
     # seven of ten intervals in thirteen pieces: their sum lacks ten units of rounding
     grid = Grid(np.repeat([0.15, 0.15 / 13], [3, 91]), (galerkin(2),) * 94)
     assert grid.duration < 1.5 * (1 - 9 * np.finfo(float).eps)

@@ -1,4 +1,4 @@
-"""Models from example-robot-data, read from their URDF files alone, without meshes."""
+"""Models from example-robot-data, read from their URDF files without meshes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def read_urdf(name: str, free_flyer: bool) -> pin.Model:
 
 @pytest.fixture(scope="session")
 def load_model() -> LoadModel:
-    """load_model(name, free_flyer=False, locked=(), armature=False) -> a model of one's own."""
+    """load_model(name, free_flyer=False, locked=(), armature=False) -> a new model."""
 
     def load(
         name: str, *, free_flyer: bool = False, locked: tuple[str, ...] = (), armature: bool = False

@@ -1,4 +1,4 @@
-"""What effects add, in machine code: the same plan, and a library in the user's cache."""
+"""Compiled effects: the same plan, and a library in the user's cache."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_the_command_plans_with_compiled_effects(
     assert found[1]["nit"] == found[0]["nit"]
 
 
-def test_every_term_of_an_effect_is_compiled_to_the_same_numbers(two_link: Robot) -> None:
+def test_compiled_terms_equal_interpreted_ones(two_link: Robot) -> None:
     named = sample_effects(two_link)
     effects = [named[key] for key in ("moving_base", "dry_friction", "power_cost", "velocity_cost")]
     plain = Scene(two_link, [Gravity(), *effects])

@@ -1,4 +1,4 @@
-"""Compiled functions are the interpreted ones, and nothing is loaded that hovi did not make."""
+"""Compiled functions equal the interpreted ones, and only libraries built by hovi are loaded."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ EFFECTS = [Gravity(9.8), JointLimitPotential({"elbow": (0.0, np.radians(170.0))}
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache folder of the test's own; it does not exist yet."""
+    """A cache folder of the test, which does not exist yet."""
     home = tmp_path / "a cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(home))
     return home
@@ -49,7 +49,7 @@ def libraries(cache: Path) -> list[Path]:
 
 @contextlib.contextmanager
 def new_workers() -> Iterator[None]:
-    """Worker processes that have the test's environment, and leave with it."""
+    """Worker processes with the environment of the test, which end with it."""
     get_reusable_executor().shutdown(wait=True)
     yield
     get_reusable_executor().shutdown(wait=True)
@@ -98,9 +98,7 @@ def test_compiled_inverse_dynamics_equals_the_interpreted_one(two_link: Robot) -
         assert_same(one, other)
 
 
-def test_a_compiled_scene_is_planned_on_in_worker_processes_too(
-    two_link: Robot, cache: Path
-) -> None:
+def test_worker_processes_plan_on_a_compiled_scene(two_link: Robot, cache: Path) -> None:
     def minima(compile: bool) -> tuple[float, ...]:
         scene = Scene(two_link, EFFECTS, compile=compile)
         solution = plan(scene, [0.0, 0.1], [0.4, 0.6], 2.0, intervals=6, starts=3, processes=2)
@@ -122,7 +120,7 @@ def test_a_pickled_scene_and_its_functions_stay_compiled(two_link: Robot) -> Non
     assert copy._torque.function.is_a("External")
 
 
-def test_whether_it_is_compiled_is_described_and_is_no_part_of_a_scene_on_file(
+def test_compilation_is_described_but_not_stored(
     two_link: Robot,
 ) -> None:
     scenes = [Scene(two_link, EFFECTS, compile=compile) for compile in (True, False)]
@@ -130,13 +128,13 @@ def test_whether_it_is_compiled_is_described_and_is_no_part_of_a_scene_on_file(
     assert ["machine code" in scene.describe() for scene in scenes] == [True, False]
 
 
-def test_the_folder_is_the_users_own(cache: Path) -> None:
+def test_the_folder_belongs_to_the_user(cache: Path) -> None:
     compiled(function())
     for folder in (cache, cache / "hovi", cache / "hovi" / "compiled"):
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_a_folder_that_others_may_read_is_closed_to_them() -> None:
+def test_read_permission_of_others_is_removed() -> None:
     folder = library_folder()
     folder.chmod(0o755)
     assert stat.S_IMODE(library_folder().stat().st_mode) == 0o700
@@ -144,7 +142,7 @@ def test_a_folder_that_others_may_read_is_closed_to_them() -> None:
 
 @pytest.mark.parametrize("name", ["hovi", "hovi/compiled"])
 @pytest.mark.parametrize("mode", [0o770, 0o720, 0o702, 0o1777])
-def test_a_folder_that_others_may_write_to_is_refused(cache: Path, name: str, mode: int) -> None:
+def test_a_folder_writable_by_others_is_refused(cache: Path, name: str, mode: int) -> None:
     library_folder()
     (cache / name).chmod(mode)
     with pytest.raises(CompilationError, match=rf"{name} may be written to by others.*chmod 700"):
@@ -152,7 +150,7 @@ def test_a_folder_that_others_may_write_to_is_refused(cache: Path, name: str, mo
     assert libraries(cache) == []
 
 
-def test_a_cache_that_everyone_may_write_to_is_refused(cache: Path) -> None:
+def test_a_cache_writable_by_everyone_is_refused(cache: Path) -> None:
     cache.mkdir()
     cache.chmod(0o777)
     with pytest.raises(CompilationError, match="by everyone"):
@@ -162,7 +160,7 @@ def test_a_cache_that_everyone_may_write_to_is_refused(cache: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["hovi", "hovi/compiled"])
-def test_a_folder_that_is_a_link_is_refused(cache: Path, tmp_path: Path, name: str) -> None:
+def test_a_symbolic_link_as_folder_is_refused(cache: Path, tmp_path: Path, name: str) -> None:
     (cache / name).parent.mkdir(parents=True)
     (tmp_path / "elsewhere").mkdir(mode=0o700)
     (cache / name).symlink_to(tmp_path / "elsewhere")
@@ -170,20 +168,20 @@ def test_a_folder_that_is_a_link_is_refused(cache: Path, tmp_path: Path, name: s
         compiled(function())
 
 
-def test_a_folder_of_somebody_else_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     library_folder()
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     with pytest.raises(CompilationError, match="belongs to another user"):
         compiled(function())
 
 
-def test_a_cache_that_cannot_be_made_gives_a_sentence(cache: Path) -> None:
+def test_a_cache_that_cannot_be_created_is_reported(cache: Path) -> None:
     cache.write_text("a file in the way")
     with pytest.raises(CompilationError, match=r"cannot be made \(.*XDG_CACHE_HOME"):
         compiled(function())
 
 
-def test_a_relative_cache_folder_does_not_count(
+def test_a_relative_cache_folder_is_ignored(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")
@@ -191,9 +189,7 @@ def test_a_relative_cache_folder_does_not_count(
     assert library_folder() == tmp_path / ".cache" / "hovi" / "compiled"
 
 
-def test_what_is_in_the_cache_needs_no_compiler(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_cached_libraries_need_no_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     compiled(function())
     without_compiler(monkeypatch, tmp_path)
     assert value_at_one(compiled(function())) == 2.0
@@ -201,7 +197,7 @@ def test_what_is_in_the_cache_needs_no_compiler(
         compiled(function(3.0))
 
 
-def test_no_compiler_gives_a_sentence(
+def test_a_missing_compiler_is_reported(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     without_compiler(monkeypatch, tmp_path)
@@ -210,7 +206,7 @@ def test_no_compiler_gives_a_sentence(
         plan(scene, [0.0, 0.1], [0.4, 0.6], 2.0)
 
 
-def test_what_is_in_the_cache_is_not_compiled_again(cache: Path) -> None:
+def test_cached_libraries_are_not_compiled_again(cache: Path) -> None:
     compiled(function())
     (library,) = libraries(cache)
     before = library.stat()
@@ -218,14 +214,14 @@ def test_what_is_in_the_cache_is_not_compiled_again(cache: Path) -> None:
     assert library.stat() == before
 
 
-def test_other_functions_are_other_libraries(cache: Path) -> None:
+def test_different_functions_have_different_libraries(cache: Path) -> None:
     assert value_at_one(compiled(function(2.0))) == 2.0
     assert value_at_one(compiled(function(3.0))) == 3.0
     assert len(libraries(cache)) == 2
 
 
 @pytest.mark.parametrize("part", ["FLAGS", "__version__", "_platform"])
-def test_the_name_depends_on_what_went_in(
+def test_the_name_of_a_library_depends_on_its_inputs(
     cache: Path, monkeypatch: pytest.MonkeyPatch, part: str
 ) -> None:
     compiled(function())
@@ -240,7 +236,7 @@ def test_the_name_depends_on_what_went_in(
 
 
 def planted(folder: Path, source: str) -> bytes:
-    """A library of the right name that is none of hovi's."""
+    """A library with the right name that hovi did not build."""
     (folder / "planted.c").write_text(source)
     subprocess.run(
         ["cc", "-shared", "-fPIC", "-o", "planted.so", "planted.c"], cwd=folder, check=True
@@ -289,7 +285,7 @@ def a_compiler(folder: Path, script: str) -> Path:
     return folder
 
 
-def test_a_compiler_that_fails_gives_its_first_complaint(
+def test_a_failing_compiler_is_reported_with_its_first_error(
     cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     script = 'case "$1" in -O*) echo "no such header" >&2; exit 1;; esac'
@@ -300,7 +296,7 @@ def test_a_compiler_that_fails_gives_its_first_complaint(
     assert libraries(cache) == []
 
 
-def test_a_library_that_does_not_load_gives_a_sentence(
+def test_a_library_that_does_not_load_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     script = 'while [ $# -gt 0 ]; do [ "$1" = -o ] && echo rubbish > "$2"; shift; done'
@@ -310,7 +306,7 @@ def test_a_library_that_does_not_load_gives_a_sentence(
         compiled(function())
 
 
-def test_threads_and_processes_may_compile_the_same_at_once(cache: Path) -> None:
+def test_threads_and_processes_can_compile_the_same_function_at_once(cache: Path) -> None:
     with ThreadPoolExecutor(4) as threads:
         assert [value_at_one(f) for f in threads.map(compiled, [function()] * 4)] == [2.0] * 4
     with ProcessPoolExecutor(2, get_context("spawn")) as processes:
@@ -320,7 +316,9 @@ def test_threads_and_processes_may_compile_the_same_at_once(cache: Path) -> None
     assert not list((cache / "hovi" / "compiled").glob("*.tmp"))
 
 
-def test_the_number_of_threads_does_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_are_bitwise_independent_of_the_number_of_threads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     x = ca.SX.sym("x", 2)
     y = x
     for _ in range(1000):

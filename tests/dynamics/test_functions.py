@@ -69,13 +69,13 @@ def test_mass_matrix_is_crba_in_both_triangles(case: Case) -> None:
         assert_equal(case.functions.mass_matrix(q), upper + np.triu(upper, 1).T)
 
 
-def test_generalized_gravity_is_pinocchios(case: Case) -> None:
+def test_generalized_gravity_matches_pinocchio(case: Case) -> None:
     for q, _, _ in case.points:
         gravity = pin.computeGeneralizedGravity(case.model, case.model.createData(), q)
         assert_equal(case.functions.generalized_gravity(q), gravity)
 
 
-def test_kinetic_energy_is_pinocchios_plus_that_of_the_rotors(case: Case) -> None:
+def test_kinetic_energy_matches_pinocchio_plus_rotors(case: Case) -> None:
     # Pinocchio's own count of the armature forgets it at revolute joints with an oblique axis.
     bare = case.model.copy()
     bare.armature = np.zeros(bare.nv)
@@ -85,14 +85,14 @@ def test_kinetic_energy_is_pinocchios_plus_that_of_the_rotors(case: Case) -> Non
         assert_equal(case.functions.kinetic_energy(q, v), kinetic + rotors)
 
 
-def test_potential_energy_is_pinocchios(case: Case) -> None:
+def test_potential_energy_matches_pinocchio(case: Case) -> None:
     data = case.model.createData()
     for q, _, _ in case.points:
         potential = pin.computePotentialEnergy(case.model, data, q)
         assert_equal(case.functions.potential_energy(q), potential)
 
 
-def test_frame_placements_are_pinocchios(case: Case) -> None:
+def test_frame_placements_match_pinocchio(case: Case) -> None:
     data = case.model.createData()
     for index in (1, case.model.nframes // 2, case.model.nframes - 1):
         placement = case.functions.frame_placement(case.model.frames[index].name)
@@ -105,7 +105,7 @@ def test_frame_placements_are_pinocchios(case: Case) -> None:
             assert_equal(p, data.oMf[index].translation)
 
 
-def test_functions_follow_the_gravity_of_the_model_they_are_given(load_model) -> None:
+def test_functions_use_the_gravity_of_their_model(load_model) -> None:
     model = load_model("ur5")
     model.gravity = pin.Motion(np.array([0.0, 0.0, -1.6, 0.0, 0.0, 0.0]))
     functions = symbolic_dynamics.casadi_functions(model)
@@ -131,13 +131,13 @@ def test_functions_survive_pickling(load_model) -> None:
     np.testing.assert_array_equal(before, after)
 
 
-def test_an_unknown_frame_is_refused_with_near_names(load_model) -> None:
+def test_an_unknown_frame_is_refused_with_the_nearest_names(load_model) -> None:
     functions = symbolic_dynamics.casadi_functions(load_model("ur5"))
     with pytest.raises(ModelError, match=r"'tool'.*'tool0'"):
         functions.frame_placement("tool")
 
 
-def test_functions_of_a_model_with_a_mimic_joint_are_those_of_pinocchio() -> None:
+def test_functions_of_a_model_with_a_mimic_joint_match_pinocchio() -> None:
     model = pin.buildModelFromXML(MIMIC_URDF, True)
     functions, data = symbolic_dynamics.casadi_functions(model), model.createData()
     q, v, a = np.array([0.3]), np.array([-0.7]), np.array([1.1])
@@ -157,7 +157,7 @@ def test_functions_of_a_model_with_a_mimic_joint_are_those_of_pinocchio() -> Non
     np.testing.assert_allclose(p.full().ravel(), data.oMf[frame].translation, atol=1e-15)
 
 
-def test_another_version_of_pinocchio_is_named_with_the_cure() -> None:
+def test_another_version_of_pinocchio_is_refused_with_advice() -> None:
     check_version("4.1.0", "4.1.0")
     with pytest.raises(HoviError, match=r"against pin 4\.1\.0, but pin 4\.0\.0.*pip install"):
         check_version("4.0.0", "4.1.0")

@@ -1,4 +1,4 @@
-"""The arrays of a joint tree: what they say of a model, and that compiled code checks them."""
+"""The arrays of a joint tree, and their checks in compiled code."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_joint_rotates_about_and_translates_along_its_z_axis(joint, angular, l
     np.testing.assert_allclose([tree.angular[0], tree.linear[0]], [angular, linear], atol=1e-15)
 
 
-def test_a_joint_of_three_coordinates_becomes_three_of_which_the_last_moves_the_body() -> None:
+def test_a_joint_of_three_coordinates_becomes_a_chain_of_three() -> None:
     model = chain([pin.JointModelTranslation(), pin.JointModelRX()])
     tree = read_joint_tree(model)
     assert tree.parents.tolist() == [-1, 0, 1, 2]
@@ -106,7 +106,7 @@ FLYER = read_joint_tree(with_arm("free-flyer"))
     ],
     ids=str,
 )
-def test_compiled_code_refuses_arrays_that_are_no_tree(tree, change, reason) -> None:
+def test_compiled_code_refuses_inconsistent_arrays(tree, change, reason) -> None:
     with pytest.raises(ValueError, match=reason):
         replace(tree, **change).compiled()
 

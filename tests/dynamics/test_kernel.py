@@ -68,7 +68,7 @@ def assert_kernel_matches_oracle(model: pin.Model, points: int) -> None:
 
 
 @pytest.mark.parametrize(("name", "locked", "n"), ROBOTS)
-def test_expansion_is_what_casadi_differentiates(load_model, name, locked, n) -> None:
+def test_expansion_matches_casadi(load_model, name, locked, n) -> None:
     model = load_model(name, locked=locked, armature=True)
     assert model.nv == n
     assert_kernel_matches_oracle(model, points=5)
@@ -76,12 +76,12 @@ def test_expansion_is_what_casadi_differentiates(load_model, name, locked, n) ->
 
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "locked", "n"), ROBOTS + LARGE_ROBOTS)
-def test_expansion_is_what_casadi_differentiates_at_many_points(load_model, name, locked, n):
+def test_expansion_matches_casadi_at_many_points(load_model, name, locked, n):
     assert_kernel_matches_oracle(load_model(name, locked=locked, armature=True), points=1000)
 
 
 @pytest.mark.parametrize("links", [1, 30])
-def test_expansion_of_chains_is_what_casadi_differentiates(links) -> None:
+def test_expansion_of_chains_matches_casadi(links) -> None:
     assert_kernel_matches_oracle(chain(links), points=2)
 
 
@@ -161,7 +161,7 @@ def core_expansion(core: native.InverseDynamicsKernel, n: int, points: int) -> l
 
 
 @pytest.mark.parametrize("model", [chain(7), random_tree(12, 5, 2)], ids=["chain", "tree"])
-def test_both_instruction_sets_give_the_same_to_rounding(model) -> None:
+def test_both_instruction_sets_agree_to_rounding(model) -> None:
     tree, n = read_joint_tree(model), model.nv
     fast = core_expansion(tree.compiled(), n, 7)
     portable = core_expansion(tree.compiled(portable=True), n, 7)
@@ -204,14 +204,14 @@ def test_a_point_has_the_same_bytes_in_every_batch(load_model, points, portable)
         assert all_points[-points:].tobytes() == last.tobytes()
 
 
-def test_hessians_are_symmetric_to_the_last_bit(load_model) -> None:
+def test_hessians_are_bitwise_symmetric(load_model) -> None:
     kernel = InverseDynamicsKernel(load_model("panda"))
     q, v, a, curvature = random_points(9, 6)
     H = kernel.expand(q, v, a, np.ones(9), curvature)[2]
     np.testing.assert_array_equal(H, H.transpose(0, 2, 1))
 
 
-def test_without_curvature_the_hessian_is_gauss_newtons(load_model) -> None:
+def test_without_curvature_the_hessian_is_gauss_newton(load_model) -> None:
     kernel = InverseDynamicsKernel(load_model("z1"))
     q, v, a, _ = random_points(7, 6)
     weight = np.arange(7.0)
@@ -231,7 +231,7 @@ def test_torque_is_rnea(load_model) -> None:
     np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_several_python_threads_may_share_a_kernel(load_model) -> None:
+def test_python_threads_can_share_a_kernel(load_model) -> None:
     kernel = InverseDynamicsKernel(load_model("ur5"))
     q, v, a, curvature = random_points(6, 50)
     expected = kernel.expand(q, v, a, np.ones(6), curvature)[2]
@@ -266,7 +266,7 @@ def test_strided_and_integer_arrays_are_accepted(load_model) -> None:
     np.testing.assert_array_equal(strided, plain)
 
 
-def test_joints_whose_axes_turn_with_themselves_are_refused() -> None:
+def test_joints_with_axes_that_change_with_their_own_motion_are_refused() -> None:
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelSphericalZYX(), pin.SE3.Identity(), "wrist")
     model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())

@@ -1,4 +1,4 @@
-"""The kernel where configurations are no vectors: Pinocchio's torques, CasADi's derivatives."""
+"""The kernel on manifolds: Pinocchio's torques, CasADi's derivatives."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ POINTS = 6
 
 
 def slanted(model: pin.Model) -> pin.Model:
-    """Gravity points anywhere, and every coordinate has another armature, a base's too."""
+    """A model with gravity in a general direction and a different armature per coordinate."""
     model.gravity.linear = np.array([1.0, 2.0, -9.0])
     model.armature = np.linspace(0.1, 1.0, model.nv)
     return model
 
 
 def slanted_continuous() -> pin.JointModel:
-    """A continuous joint about no axis of its frame, which only a URDF can name."""
+    """A continuous joint about a general axis, which only a URDF can define."""
     joint = (
         '<joint name="j" type="continuous"><parent link="a"/><child link="b"/>'
         '<axis xyz="0.48 -0.6 0.64"/></joint>'
@@ -42,7 +42,7 @@ def slanted_continuous() -> pin.JointModel:
 
 
 def branching(base: pin.JointModel, seed: int) -> pin.Model:
-    """A base with two arms, which fork, of joints that turn without end, turn, screw and slide."""
+    """A base with two branching arms of continuous, revolute, helical and prismatic joints."""
     random = np.random.default_rng(seed)
     kinds = [
         *(slanted_continuous(), pin.JointModelRUBX(), pin.JointModelRY()),
@@ -89,22 +89,22 @@ def assert_kernel_is_rnea(model: pin.Model) -> None:
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_torques_and_derivatives_are_those_of_rnea_on_the_manifold(base: str) -> None:
+def test_torques_and_derivatives_match_rnea_on_the_manifold(base: str) -> None:
     assert_kernel_is_rnea(with_arm(base))
 
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("seed", range(3))
-def test_arms_that_fork_on_a_base_agree_with_rnea(base: str, seed: int) -> None:
+def test_branching_arms_on_a_base_match_rnea(base: str, seed: int) -> None:
     assert_kernel_is_rnea(branching(BASES[base](), seed))
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_a_base_alone_agrees_with_rnea(base: str) -> None:
+def test_a_base_alone_matches_rnea(base: str) -> None:
     assert_kernel_is_rnea(chain([BASES[base]()]))
 
 
-def test_without_curvature_the_hessian_is_gauss_newtons() -> None:
+def test_without_curvature_the_hessian_is_gauss_newton() -> None:
     robot = load_robot(slanted(with_arm("free-flyer")))
     q, v, a, _ = jets(robot, POINTS)
     weight = np.arange(float(robot.nv))
@@ -131,7 +131,7 @@ def test_batches_methods_and_thread_counts_give_the_same_bytes(base: str) -> Non
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_both_instruction_sets_give_the_same_to_rounding(base: str) -> None:
+def test_both_instruction_sets_agree_to_rounding(base: str) -> None:
     robot = load_robot(with_arm(base))
     n, tree = robot.nv, read_joint_tree(robot.model)
     q, v, a, curvature = jets(robot, 7)
@@ -144,7 +144,7 @@ def test_both_instruction_sets_give_the_same_to_rounding(base: str) -> None:
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
 
 
-def test_casadi_torques_bend_along_integrate() -> None:
+def test_casadi_second_derivatives_are_along_integrate() -> None:
     robot = load_robot(chain([pin.JointModelRX(), pin.JointModelSpherical(), pin.JointModelRUBX()]))
     reference, n = casadi_torque(robot), robot.nv
     q = configurations(robot, POINTS)
@@ -163,7 +163,7 @@ def test_casadi_torques_bend_along_integrate() -> None:
     np.testing.assert_allclose(found, second.transpose(2, 0, 1), atol=1e-3)
 
 
-def test_pickled_it_is_the_same() -> None:
+def test_a_kernel_survives_pickling() -> None:
     robot = load_robot(slanted(with_arm("free-flyer")))
     kernel = InverseDynamicsKernel(robot.model)
     q, v, a, _ = jets(robot, 3)

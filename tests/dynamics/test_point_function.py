@@ -1,4 +1,4 @@
-"""A function at many points is the function at each of them."""
+"""Batch evaluation equals evaluation point by point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 
 def sparse_function() -> ca.Function:
-    """A number, a column, and a 2 x 3 matrix with structural zeros that is not symmetric."""
+    """A scalar, a column, and a nonsymmetric 2 x 3 matrix with structural zeros."""
     x, t = ca.SX.sym("x", 2), ca.SX.sym("t")
     matrix = ca.SX(2, 3)
     matrix[0, 1], matrix[1, 0], matrix[1, 2] = x[0] * x[1], ca.sin(x[1]), t
@@ -32,7 +32,7 @@ def by_hand(x: Array, t: Array) -> tuple[Array, Array, Array]:
 
 
 @pytest.mark.parametrize("points", [0, 1, 2, 7, CHUNK, CHUNK + 1, 2 * CHUNK + 5])
-def test_batches_of_any_size_give_the_function_at_every_point(points: int) -> None:
+def test_batches_of_any_size_equal_single_evaluations(points: int) -> None:
     random = np.random.default_rng(points)
     x, t = random.normal(size=(points, 2)), random.normal(size=(points, 1))
     found = PointFunction(sparse_function())(x, t)
@@ -51,7 +51,7 @@ def test_any_memory_layout_is_accepted() -> None:
             np.testing.assert_allclose(result, expected, rtol=1e-6)
 
 
-def test_results_of_an_earlier_call_are_left_alone() -> None:
+def test_results_of_an_earlier_call_are_not_overwritten() -> None:
     function = PointFunction(sparse_function())
     x, t = np.random.default_rng(0).normal(size=(2, 6, 2)), np.ones((6, 1))
     first = function(x[0], t)
@@ -71,7 +71,7 @@ def test_many_batch_sizes_in_turn_give_the_same_results() -> None:
 
 
 def heavy_function() -> ca.Function:
-    """Enough instructions for threads to share a dozen points."""
+    """A function with enough instructions for several threads at a dozen points."""
     x = ca.SX.sym("x", 3)
     y = x
     for _ in range(800):
@@ -80,7 +80,7 @@ def heavy_function() -> ca.Function:
 
 
 @pytest.mark.parametrize("points", [5, 64, 101, CHUNK + 7])
-def test_the_number_of_threads_does_not_change_a_bit(
+def test_results_are_bitwise_independent_of_the_number_of_threads(
     points: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     x = np.random.default_rng(points).normal(size=(points, 3))
@@ -91,7 +91,7 @@ def test_the_number_of_threads_does_not_change_a_bit(
     assert results[0] == results[1] == results[2]
 
 
-def test_threads_share_only_what_is_worth_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_small_batches_use_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     used = {
         (name, points): max(threads for _, threads in PointFunction(function)._parts(points))
@@ -112,7 +112,7 @@ def test_the_parts_of_a_batch_cover_it_once(points: int, monkeypatch: pytest.Mon
     assert all(part.stop - part.start <= CHUNK for part, _ in parts)
 
 
-def test_calls_from_many_threads_do_not_disturb_each_other() -> None:
+def test_concurrent_calls_are_independent() -> None:
     function = PointFunction(heavy_function())
     x = np.random.default_rng(0).normal(size=(40, 3))
     whole = [result.copy() for result in function(x)]

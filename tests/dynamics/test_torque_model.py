@@ -1,4 +1,4 @@
-"""Torques and their derivatives: one answer from CasADi and from Pinocchio's analytic kernel."""
+"""Torques and their derivatives agree between CasADi and the analytic kernel."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def columns(n: int) -> Columns:
 
 
 def drag(symbols: Columns) -> ca.SX:
-    """What no effect says: a torque that couples everything, time included, and is nonlinear."""
+    """A nonlinear torque that couples all variables and time."""
     q, v, a, t = symbols
     return ca.sin(2 * q) * v**2 + ca.cos(t) * a * q + 0.3 * v * ca.sum1(q * a) + t**2
 
@@ -45,7 +45,7 @@ def drag(symbols: Columns) -> ca.SX:
 def models(
     scene: Scene, added: Callable[[Columns], ca.SX] | None
 ) -> tuple[TorqueModel, TorqueModel]:
-    """The analytic model, and the same thing entirely in CasADi."""
+    """The analytic model, and the same model in CasADi."""
     symbols = columns(scene.robot.nv)
     tau = casadi_functions(scene.model).inverse_dynamics(*symbols[:3])
     main = AnalyticTorque(InverseDynamicsKernel(scene.model))
@@ -86,7 +86,7 @@ def test_analytic_and_casadi_derivatives_agree(
             assert_close(found, expected)
 
 
-def test_continuous_joints_on_a_moving_base_have_casadis_derivatives_from_the_kernel() -> None:
+def test_the_kernel_matches_casadi_for_continuous_joints_on_a_moving_base() -> None:
     moved = MovingBase((0.0, "0.1*t**2", "sin(t)"), ("0.3*sin(t)", "-0.2*t", 0.5))
     scene = Scene(load_robot("kinova"), [Gravity(), moved])
     assert scene.analytic
@@ -101,7 +101,7 @@ def test_continuous_joints_on_a_moving_base_have_casadis_derivatives_from_the_ke
 
 
 @pytest.mark.parametrize("added", [None, drag], ids=["RNEA alone", "with an added torque"])
-def test_derivatives_are_those_of_the_torque(
+def test_derivatives_match_finite_differences(
     scene: Scene, added: Callable[[Columns], ca.SX] | None
 ) -> None:
     n = scene.robot.nv
@@ -123,7 +123,7 @@ def test_derivatives_are_those_of_the_torque(
         assert_close(H, gauss_newton + derivative_per_point(pulled_back, x), 1e-9)
 
 
-def test_without_multipliers_the_hessian_is_that_of_the_effort(scene: Scene) -> None:
+def test_without_multipliers_the_hessian_is_of_the_effort(scene: Scene) -> None:
     n = scene.robot.nv
     *jet, t = jets(n, seed=5)
     R = np.arange(1.0, n + 1)
@@ -140,7 +140,7 @@ def test_without_multipliers_the_hessian_is_that_of_the_effort(scene: Scene) -> 
 
 
 @pytest.mark.parametrize("added", [None, drag], ids=["RNEA alone", "with an added torque"])
-def test_every_point_may_have_a_weight_of_its_own(
+def test_weights_can_differ_per_point(
     scene: Scene, added: Callable[[Columns], ca.SX] | None
 ) -> None:
     n = scene.robot.nv
@@ -165,14 +165,14 @@ def test_hessians_are_symmetric(scene: Scene) -> None:
         np.testing.assert_allclose(H, H.transpose(0, 2, 1), rtol=0, atol=1e-13 * np.abs(H).max())
 
 
-def test_time_is_zero_where_it_is_not_given(scene: Scene) -> None:
+def test_time_defaults_to_zero(scene: Scene) -> None:
     q, v, a, _ = jets(scene.robot.nv)
     for model in models(scene, drag):
         zero = model.torque(q, v, a, np.zeros(POINTS))
         np.testing.assert_array_equal(model.torque(q, v, a), zero)
 
 
-def test_a_single_joint_is_no_special_case(pendulum: Robot) -> None:
+def test_a_single_joint_is_supported(pendulum: Robot) -> None:
     scene = Scene(pendulum, [Gravity()])
     for added in (None, drag):
         analytic, casadi = models(scene, added)

@@ -1,4 +1,4 @@
-"""The two-link arm of [ColomboFerraroMartin2016, sec. 5]: its printed torques are ours.
+"""The two-link arm of [ColomboFerraroMartin2016, sec. 5]: its printed torques.
 
 The printed equations add m l^2 / 4 to J_i, so J_i = m_i l_i^2 / 3 is about the centre of mass.
 """

@@ -51,7 +51,7 @@ def points(model: pin.Model, count: int = 6) -> Jet:
 
 
 def earthly(robot: Robot) -> pin.Model:
-    """Pinocchio's model under its usual gravity, without armature."""
+    """Pinocchio's model with its default gravity, without armature."""
     model = robot.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -9.81])
     model.armature = np.zeros(model.nv)
@@ -108,7 +108,7 @@ def test_a_payload_is_a_mass_welded_to_the_urdf(request: pytest.FixtureRequest, 
     assert np.abs(bare - expected).max() > 1
 
 
-def test_armature_is_that_of_the_model(panda: Robot) -> None:
+def test_armature_matches_the_model(panda: Robot) -> None:
     inertia = np.linspace(0.05, 0.2, panda.nv)
     model = earthly(panda)
     model.armature = inertia
@@ -121,7 +121,7 @@ def test_armature_is_that_of_the_model(panda: Robot) -> None:
     assert_close(from_model.inverse_dynamics(q, v, a), expected)
 
 
-def test_gravity_pulls_in_any_direction(ur5: Robot) -> None:
+def test_gravity_acts_in_any_direction(ur5: Robot) -> None:
     model = earthly(ur5)
     model.gravity.linear = 2.0 * np.array([0.6, 0.0, -0.8])
     data = model.createData()
@@ -136,7 +136,7 @@ def test_gravity_pulls_in_any_direction(ur5: Robot) -> None:
 
 @pytest.mark.parametrize("axes", ["world", "frame"])
 @pytest.mark.parametrize(("name", "floats"), [("panda", False), ("kinova", False), ("solo8", True)])
-def test_a_wrench_is_an_external_force_of_rnea(name: str, floats: bool, axes: str) -> None:
+def test_a_wrench_matches_an_external_force_of_rnea(name: str, floats: bool, axes: str) -> None:
     robot = load_robot(name, free_flyer=floats)
     frame = robot.tip_frame
     scene = Scene(
@@ -159,7 +159,7 @@ def test_a_wrench_is_an_external_force_of_rnea(name: str, floats: bool, axes: st
 
 
 @pytest.mark.parametrize("name", ["panda", "kinova"])
-def test_drag_is_the_force_of_its_formula_at_the_frames_jacobian(name: str) -> None:
+def test_drag_matches_its_formula_and_the_frame_jacobian(name: str) -> None:
     robot = load_robot(name)
     frame, model = robot.tip_frame, earthly(load_robot(name))
     effect = Drag(frame, 0.3, 1.2, 0.4, (1.0, "t", -2.0), width=0.05)
@@ -180,7 +180,7 @@ def test_drag_is_the_force_of_its_formula_at_the_frames_jacobian(name: str) -> N
 
 
 def base_motion(t: float) -> pin.SE3:
-    """The motion that MOVED prescribes, written down again."""
+    """The motion that MOVED prescribes, implemented independently."""
     position = np.array([0.2 * np.sin(2 * t), 0.1 * t**2, 0.05 * np.cos(3 * t)])
     return pin.SE3(pin.rpy.rpyToMatrix(0.3 * np.sin(t), -0.2 * t, 0.5 * t), position)
 
@@ -190,19 +190,19 @@ STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105,
 
 
 def slope(f: Callable[[float], Array], t: float, h: float = 0.02) -> Array:
-    """df/dt by differences of eighth order."""
+    """df/dt by finite differences of eighth order."""
     values = [f(t + k * h) for k in range(-4, 5)]
     return np.asarray(np.tensordot(STENCIL, np.stack(values), 1) / h)
 
 
 def base_twist(t: float) -> Array:
-    """Velocity of the base in its own axes."""
+    """Velocity of the base in its own frame."""
     here = base_motion(t)
     return slope(lambda s: pin.log6(here.actInv(base_motion(s))).vector, t)
 
 
 def floating_jet(t: float, q: Array, v: Array, a: Array) -> Jet:
-    """The robot's point on a floating base that follows the motion."""
+    """The state of the robot on a floating base that follows the motion."""
     qb = pin.SE3ToXYZQUAT(base_motion(t))
     return (
         np.concatenate([qb, q]),
@@ -213,7 +213,7 @@ def floating_jet(t: float, q: Array, v: Array, a: Array) -> Jet:
 
 
 @pytest.mark.parametrize("name", ["two_link", "panda", "kinova"])
-def test_a_moving_base_is_a_floating_robot_driven_along(name: str, models: Path) -> None:
+def test_a_moving_base_matches_a_driven_floating_robot(name: str, models: Path) -> None:
     place = models / "two_link.urdf" if name == "two_link" else name
     robot, floating = load_robot(place), load_robot(place, free_flyer=True)
     model = earthly(floating)
@@ -228,7 +228,7 @@ def test_a_moving_base_is_a_floating_robot_driven_along(name: str, models: Path)
 
 
 @pytest.mark.parametrize("effect", ["wrench", "drag"])
-def test_forces_follow_a_moving_base(panda: Robot, effect: str) -> None:
+def test_frame_forces_include_the_moving_base(panda: Robot, effect: str) -> None:
     tip = panda.tip_frame
     acting: dict[str, Effect] = {
         "wrench": Wrench(tip, (3.0, -2.0, 1.0), (0.3, 0.0, 0.2), "frame"),
@@ -243,7 +243,7 @@ def test_forces_follow_a_moving_base(panda: Robot, effect: str) -> None:
     assert_close(found, expected, 1e-8)
 
 
-def test_a_simulation_on_a_moving_base_is_a_driven_floating_robot(
+def test_a_simulation_on_a_moving_base_matches_a_driven_floating_robot(
     two_link: Robot, models: Path
 ) -> None:
     scene = Scene(two_link, [Gravity(), MOVED, ViscousFriction(0.2)])
@@ -267,7 +267,7 @@ def test_a_simulation_on_a_moving_base_is_a_driven_floating_robot(
 
 
 def falling(robot: Robot, resistance: Callable[[Array, Array], Array], y0: Array) -> Array:
-    """(q, v) after a second, by SciPy and Pinocchio's articulated bodies."""
+    """(q, v) after one second, by SciPy and Pinocchio's articulated-body algorithm."""
     model = earthly(robot)
     data = model.createData()
 
@@ -299,7 +299,7 @@ FRICTIONS: dict[str, tuple[Effect, Callable[[Array, Array], Array]]] = {
 
 
 @pytest.mark.parametrize("kind", FRICTIONS)
-def test_an_arm_that_is_resisted_falls_as_scipy_says(two_link: Robot, kind: str) -> None:
+def test_a_resisted_fall_matches_scipy(two_link: Robot, kind: str) -> None:
     effect, resistance = FRICTIONS[kind]
     y0 = np.array([0.2, -0.4, 0.5, 0.3])
     scene = Scene(two_link, [Gravity(), effect])
@@ -320,7 +320,7 @@ def test_an_arm_that_is_resisted_falls_as_scipy_says(two_link: Robot, kind: str)
     ],
     ids=["armature", "constant", "of the angle"],
 )
-def test_what_resists_acceleration_is_part_of_the_mass_matrix(
+def test_torque_terms_in_the_acceleration_are_added_to_the_mass_matrix(
     two_link: Robot, effect: Effect, inertia: Callable[[Array], Array]
 ) -> None:
     model = earthly(two_link)
@@ -341,7 +341,7 @@ def test_what_resists_acceleration_is_part_of_the_mass_matrix(
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7)
 
 
-def test_a_spring_alone_swings_at_its_own_frequency(pendulum: Robot) -> None:
+def test_a_spring_oscillates_at_its_natural_frequency(pendulum: Robot) -> None:
     (joint,) = pendulum.joint_names
     model = earthly(pendulum)
     inertia = float(pin.crba(model, model.createData(), np.zeros(1))[0, 0])
@@ -352,7 +352,7 @@ def test_a_spring_alone_swings_at_its_own_frequency(pendulum: Robot) -> None:
     np.testing.assert_allclose(motion.q[:, 0], expected, atol=1e-9)
 
 
-def test_stops_push_with_the_slope_of_their_potential(two_link: Robot) -> None:
+def test_stops_act_with_the_gradient_of_their_potential(two_link: Robot) -> None:
     ranges, e = {"elbow": (0.0, 1.0), "shoulder": (-0.5, 0.5)}, 1e-6
     stops = Scene(two_link, [JointLimitPotential(ranges, 20.0, 0.3, stops=True)])
     V = Scene(two_link, [JointLimitPotential(ranges, 20.0, 0.3)]).effort_lagrangian().potential
@@ -378,7 +378,7 @@ def test_stops_hold_a_falling_arm(two_link: Robot) -> None:
 # Costs
 
 
-def test_the_cost_of_power_is_what_drives_take_that_give_nothing_back(two_link: Robot) -> None:
+def test_the_power_cost_is_the_energy_of_drives_without_recovery(two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity(), PowerCost((1.0, 3.0), width=1e-3)])
     ends: tuple[Array, Array] = np.zeros(2), np.array([1.0, 0.5])
     solution = plan(scene, *ends, 1.0, limits="none")
@@ -392,7 +392,7 @@ def test_the_cost_of_power_is_what_drives_take_that_give_nothing_back(two_link: 
     assert np.trapezoid(power, t) < 0.9 * np.trapezoid(spent, t)
 
 
-def test_weights_of_joints_are_those_of_the_planner(two_link: Robot) -> None:
+def test_effort_weights_match_those_of_the_planner(two_link: Robot) -> None:
     ends: tuple[Array, Array] = np.zeros(2), np.array([1.0, 0.5])
     plain, weighted = (
         Scene(two_link, [Gravity()]),
@@ -422,7 +422,7 @@ def test_a_heavy_cost_on_distance_follows_its_reference(two_link: Robot) -> None
 # Plans and simulations read the same scene
 
 
-def test_a_plan_arrives_where_it_should_when_it_is_played(two_link: Robot) -> None:
+def test_replayed_torques_reach_the_goal(two_link: Robot) -> None:
     tip = two_link.tip_frame
     effects = [
         Gravity(),
@@ -447,7 +447,7 @@ def test_a_plan_arrives_where_it_should_when_it_is_played(two_link: Robot) -> No
 @pytest.mark.parametrize(
     "limits", [{"base": "none", "v": 2.2}, {"base": "none", "tau": {"shoulder": 14.0}}], ids=str
 )
-def test_limits_hold_whatever_the_cost_is(two_link: Robot, limits: dict[str, Any]) -> None:
+def test_limits_hold_for_any_cost(two_link: Robot, limits: dict[str, Any]) -> None:
     scene = Scene(two_link, [Gravity(), PowerCost(1.0, 0.5), ViscousFriction(0.1)])
     free = plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits="none")
     held = plan(scene, [0.0, 0.0], [1.0, 0.5], 1.0, limits=limits)

@@ -1,4 +1,4 @@
-"""Effects that make no sense are refused in one sentence, from Python and from scene files."""
+"""Invalid effects are refused in one sentence, in Python and in scene files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hovi.effects import (
     ViscousFriction,
     Wrench,
 )
-from hovi.effects.expressions.formula import LONGEST
+from hovi.effects.expressions.formula import MAX_CHARACTERS
 from hovi.errors import SceneError
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.loading import load_robot
@@ -69,7 +69,7 @@ CASES: dict[str, tuple[Effect, str]] = {
     "wrench nowhere": (Wrench("tool1"), "has no frame 'tool1'"),
     "axes": (Wrench(TIP, axes="wrold"), "axes 'wrold': did you mean 'world'"),
     "negative area": (Drag(TIP, -1.0), "area must be finite and 0 or more"),
-    "wind of joints": (Drag(TIP, wind=('q["x"]', 0.0, 0.0)), "brackets only behind q, v and a"),
+    "wind of joints": (Drag(TIP, wind=('q["x"]', 0.0, 0.0)), "brackets only after q, v and a"),
     "base on a joint": (MovingBase(("x", 0.0, 0.0)), "names 'x', which is unknown"),
     "zero weight": (EffortWeight({"panda_joint1": 0.0}), "weight of joint 'panda_joint1' must be"),
     "negative cost": (VelocityCost(-1.0), "velocity_cost': weight of joint 'panda_joint1'"),
@@ -82,7 +82,7 @@ CASES: dict[str, tuple[Effect, str]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_an_effect_that_makes_no_sense_is_refused_in_one_sentence(panda: Robot, case: str) -> None:
+def test_an_invalid_effect_is_refused_in_one_sentence(panda: Robot, case: str) -> None:
     effect, sentence = CASES[case]
     with pytest.raises(SceneError, match=sentence) as refused:
         Scene(panda, [effect])
@@ -97,21 +97,21 @@ FORMULAS = {
     "a name": ("u", "names 'u', which is unknown"),
     "a function": ("sine(t)", "calls 'sine', which is unknown: did you mean 'sin'"),
     "arguments": ("atan2(t)", "calls 'atan2' with 1 arguments; it takes 2"),
-    "keywords": ("sin(x=t)", "holds more than"),
-    "attributes": ("t.__class__", "holds more than"),
-    "calls of calls": ("(sin)(t)(t)", "holds more than"),
-    "strings": ("'t'", "holds more than"),
-    "truth": ("True", "holds more than"),
-    "lambdas": ("(lambda: 1)()", "holds more than"),
-    "a comparison": ("t > 1", "holds more than"),
+    "keywords": ("sin(x=t)", "may contain only"),
+    "attributes": ("t.__class__", "may contain only"),
+    "calls of calls": ("(sin)(t)(t)", "may contain only"),
+    "strings": ("'t'", "may contain only"),
+    "truth": ("True", "may contain only"),
+    "lambdas": ("(lambda: 1)()", "may contain only"),
+    "a comparison": ("t > 1", "may contain only"),
     "a joint's name": ('v["elbwo"]', "the joint 'elbwo', which is unknown: did you mean 'elbow'"),
-    "no joint": ("v", "needs a joint behind 'v', as in v"),
-    "a number for a joint": ("v[0]", "brackets only behind q, v and a"),
-    "an escape": (r"'\d'", "holds more than"),
+    "no joint": ("v", "needs a joint after 'v', as in v"),
+    "a number for a joint": ("v[0]", "brackets only after q, v and a"),
+    "an escape": (r"'\d'", "may contain only"),
     "infinity": ("1e999", "must be a finite number or a formula"),
     "a division by zero": ("1/0", "must be a finite number or a formula"),
     "powers of powers": ("9**9**9**9", "must be a finite number or a formula"),
-    "length": ("+".join("t" * LONGEST), "has at most 2000 characters"),
+    "length": ("+".join("t" * MAX_CHARACTERS), "has at most 2000 characters"),
     "depth": ("(" * 300 + "t" + ")" * 300, "is not arithmetic"),
     "signs": ("-" * 900 + "t", "is nested too deeply|is not arithmetic"),
 }
@@ -124,7 +124,7 @@ def test_a_formula_is_arithmetic_and_nothing_else(two_link: Robot, case: str) ->
         Scene(two_link, [Custom({"elbow": text})])
 
 
-def test_a_formula_means_what_it_says(two_link: Robot) -> None:
+def test_formulas_are_evaluated_correctly(two_link: Robot) -> None:
     text = '-2*sin(pi*t)**2/4 + atan2(q["elbow"], 2) - max(v["shoulder"], +0.1)*abs(a["elbow"])'
     scene = Scene(two_link, [Custom({"shoulder": text})])
     random = np.random.default_rng(0)
@@ -138,13 +138,13 @@ def test_a_formula_means_what_it_says(two_link: Robot) -> None:
     np.testing.assert_array_equal(added[:, 1], 0.0)
 
 
-def test_a_base_that_floats_is_not_moved_as_well() -> None:
+def test_a_floating_base_cannot_be_prescribed() -> None:
     robot = load_robot("solo8", free_flyer=True)
     with pytest.raises(SceneError, match="'root_joint' of robot 'solo8' floats"):
         Scene(robot, [MovingBase()])
 
 
-def test_a_joint_without_a_single_position_has_no_spring() -> None:
+def test_a_joint_with_nq_not_nv_cannot_have_a_spring() -> None:
     robot = load_robot("kinova")
     with pytest.raises(SceneError, match=r"'j2s6s200_joint_1' has no single position"):
         Scene(robot, [JointSprings({"j2s6s200_joint_1": 2.0})])
@@ -206,7 +206,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("case", TABLES)
-def test_a_mistake_in_a_table_is_named_with_its_line(
+def test_an_error_in_a_table_is_reported_with_its_line(
     models: Path, tmp_path: Path, case: str
 ) -> None:
     table, sentence = TABLES[case]
@@ -229,7 +229,7 @@ def test_a_mistake_in_a_table_is_named_with_its_line(
     ],
     ids=["a number", "a list", "a table", "formulas"],
 )
-def test_a_table_may_say_it_in_several_ways(
+def test_tables_accept_all_forms_of_values(
     models: Path, tmp_path: Path, table: str, effect: Any
 ) -> None:
     path = tmp_path / "scene.toml"

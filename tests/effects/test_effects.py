@@ -1,4 +1,4 @@
-"""Effects: gravity is Pinocchio's, the potential of a joint's range is a smooth ramp."""
+"""Gravity is Pinocchio's; the joint limit potential is a smooth ramp."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_the_ramp_is_twice_continuously_differentiable(w: float) -> None:
 
 
 @pytest.mark.parametrize("w", WIDTHS)
-def test_the_ramp_rises_is_convex_and_is_never_below_the_sharp_one(w: float) -> None:
+def test_the_ramp_is_increasing_convex_and_above_the_sharp_ramp(w: float) -> None:
     x = w * np.linspace(-2, 2, 401)
     r, slope, bend = ramp_and_derivatives(w, x)
     assert (r >= np.maximum(x, 0.0) - 1e-15 * w).all()
@@ -100,7 +100,7 @@ def test_the_potential_has_its_slope_outside_the_range_and_is_zero_inside(
     np.testing.assert_allclose(V.value(*jet_with_elbow_at(x)), slope * outside, rtol=1e-13)
 
 
-def test_gradient_and_hessian_of_the_potential_are_its_derivatives(two_link: Robot) -> None:
+def test_gradient_and_hessian_of_the_potential_match_finite_differences(two_link: Robot) -> None:
     effect = JointLimitPotential({"elbow": RANGE, "shoulder": (-1.0, 1.0)}, slope=30.0, width=0.5)
     V = potential_of(two_link, effect)
     random = np.random.default_rng(0)
@@ -134,7 +134,7 @@ def test_a_range_may_be_open_on_one_side(two_link: Robot) -> None:
     np.testing.assert_array_equal(hessian, 0.0)
 
 
-def test_the_right_joint_is_kept_in_range_behind_one_that_turns_without_end() -> None:
+def test_the_potential_acts_on_the_right_joint_after_a_continuous_one() -> None:
     model = pin.Model()
     model.name = "wheel and elbow"
     wheel = model.addJoint(0, pin.JointModelRUBY(), pin.SE3.Identity(), "wheel")  # nq = 2, nv = 1
@@ -147,7 +147,7 @@ def test_the_right_joint_is_kept_in_range_behind_one_that_turns_without_end() ->
         assert float(V([0.6, 0.8, elbow])) == pytest.approx(expected)  # cos, sin, elbow
 
 
-def test_no_range_is_no_potential(two_link: Robot) -> None:
+def test_without_ranges_the_potential_is_zero(two_link: Robot) -> None:
     jet = jet_with_elbow_at(np.array([-50.0, 3.0]))
     bare, empty = Scene(two_link), Scene(two_link, [JointLimitPotential({})])
     expected = bare.effort_lagrangian().evaluate(*jet)
@@ -172,7 +172,7 @@ def test_no_range_is_no_potential(two_link: Robot) -> None:
         ({"ranges": {"elbow": RANGE}, "width": np.inf}, "width must be positive and finite"),
     ],
 )
-def test_numbers_that_make_no_ramp_are_refused(
+def test_invalid_ramp_parameters_are_refused(
     two_link: Robot, values: dict[str, Any], sentence: str
 ) -> None:
     with pytest.raises(SceneError, match=sentence):
@@ -180,13 +180,13 @@ def test_numbers_that_make_no_ramp_are_refused(
 
 
 @pytest.mark.parametrize("joint", ["root_joint", "root_joint[3]"])
-def test_a_joint_with_several_coordinates_has_no_range(joint: str) -> None:
+def test_a_joint_with_several_coordinates_cannot_have_a_range(joint: str) -> None:
     robot = load_robot("simple_humanoid")  # its base floats
     with pytest.raises(SceneError, match=r"no joint 'root_joint.*' with one coordinate"):
         Scene(robot, [JointLimitPotential({joint: RANGE})])
 
 
 @pytest.mark.parametrize("acceleration", [np.nan, np.inf, -np.inf])
-def test_gravity_that_is_no_number_is_refused(two_link: Robot, acceleration: float) -> None:
+def test_non_finite_gravity_is_refused(two_link: Robot, acceleration: float) -> None:
     with pytest.raises(SceneError, match="acceleration must be finite"):
         Scene(two_link, [Gravity(acceleration)])

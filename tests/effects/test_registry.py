@@ -1,4 +1,4 @@
-"""The list of effects: every effect of the folder is public and has a table of its own."""
+"""The list of effects: every effect in the folder is public and has its own table."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import hovi.effects
 from hovi.effects import EFFECTS, REGISTRY, Effect
 
 
-def test_every_effect_of_the_folder_is_listed_and_public() -> None:
+def test_every_effect_in_the_folder_is_listed_and_public() -> None:
     written = {
         value
         for module in pkgutil.iter_modules(hovi.effects.__path__)

@@ -40,9 +40,7 @@ def effort_hessian(L: EffortLagrangian, x: Array) -> Array:
 
 
 @pytest.mark.parametrize("robot", ["two_link", "ur5"])
-def test_w_d_of_the_exact_one_has_the_leading_terms_of_the_proof(
-    request: pytest.FixtureRequest, robot: str
-) -> None:
+def test_w_d_has_the_leading_terms_of_the_proof(request: pytest.FixtureRequest, robot: str) -> None:
     chosen: Robot = request.getfixturevalue(robot)
     L = Scene(chosen, [Gravity()]).effort_lagrangian()
     x, p = start(L)
@@ -65,7 +63,7 @@ def test_w_d_of_the_exact_one_has_the_leading_terms_of_the_proof(
     assert (slopes > 0.7).all()  # O(h) at least, relative to the leading term
 
 
-def test_det_w_d_is_positive_where_the_paper_prints_a_sign(arm: EffortLagrangian) -> None:
+def test_det_w_d_is_positive_unlike_printed_in_the_paper(arm: EffortLagrangian) -> None:
     q, v, a = (ca.SX.sym(c, 1) for c in "qva")
     one = CasadiLagrangian([q, v, a], ca.sumsqr(a) / 2 + ca.sumsqr(v) / 2)
     ld = ExactDiscreteLagrangian(one, 0.01)
@@ -94,7 +92,7 @@ def test_the_first_conjugate_point_of_the_oscillator_is_two_pi(
     assert conjugate_time(oscillator, X0, P0, 5.0) == float("inf")
 
 
-def test_a_step_beyond_it_is_refused(oscillator: CasadiLagrangian) -> None:
+def test_a_step_beyond_a_conjugate_point_is_refused(oscillator: CasadiLagrangian) -> None:
     exact = ExactDiscreteLagrangian(oscillator, 6.2).from_start(X0[None], P0[None])
     # q'''' = -q'': p = -v - jerk and p~ = a are those of A cos t + B sin t + C + D t
     t, (q, v), (p, a) = 6.2, X0[:, 0], P0[:, 0]
@@ -108,7 +106,7 @@ def test_a_step_beyond_it_is_refused(oscillator: CasadiLagrangian) -> None:
         late.joining(X0[None], X0[None] + 0.1)
 
 
-def test_the_arms_own_limit_is_found(arm: EffortLagrangian) -> None:
+def test_the_conjugate_point_of_the_arm_is_found(arm: EffortLagrangian) -> None:
     # held horizontal: a saddle for long durations, so there is a conjugate point
     x, p = legendre(arm, *np.zeros((4, 2)))
     limit = conjugate_time(arm, x, p, 4.0)
@@ -126,9 +124,9 @@ def test_the_tolerance_is_met(arm: EffortLagrangian, tolerance: float) -> None:
     assert np.abs(segment.p1 - best.p1).max() <= 2 * tolerance * np.abs(best.p1).max()
 
 
-def test_what_cannot_be_reached_is_said(arm: EffortLagrangian) -> None:
+def test_an_unreachable_tolerance_is_refused(arm: EffortLagrangian) -> None:
     x, p = start(arm)
-    with pytest.raises(InputError, match="not known to 1e-30"):
+    with pytest.raises(InputError, match="did not converge to 1e-30"):
         ExactDiscreteLagrangian(arm, 0.1, 1e-30).from_start(x, p)
     for h in (0.0, -1.0, np.nan):
         with pytest.raises(InputError, match="a step must be positive"):

@@ -1,4 +1,4 @@
-"""Mechanics on groups: the discrete flow against SciPy, its order, its momenta, its form."""
+"""Mechanics on groups: the discrete flow against SciPy, its order, momenta and symplecticity."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ MOMENTS = [1.0, 2.0, 3.5]
 
 @dataclass(frozen=True)
 class Flywheels(Effect):
-    """A test's effect: A(q) a with A diagonal, of one coordinate that is plain, where there is."""
+    """An effect A(q) a with A diagonal, which depends on one vector coordinate, if there is one."""
 
     sizes: tuple[float, ...]
     place: int | None = None
@@ -117,7 +117,7 @@ def off(motion: object, expected: tuple[Array, Array]) -> float:
 
 
 def gripper() -> pin.Model:
-    """A floating body with a finger that turns and one that slides as that turns."""
+    """A floating body with a revolute finger and a prismatic one that mimics it."""
     model = chain([pin.JointModelFreeFlyer(), pin.JointModelRX(), pin.JointModelPY()])
     return coupled(model, [Coupling("j2", "j1", -0.8, 0.1)])
 
@@ -148,8 +148,8 @@ def test_a_flow_on_groups_has_order_2_r_plus_2(case: str, r: int, counts: tuple[
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * (r + 1), abs=0.3)
 
 
-def test_inertia_of_rotors_and_effects_turns_no_momentum() -> None:
-    """RNEA adds armature * a and nothing else, on a body that turns freely, too."""
+def test_armature_and_effect_inertia_have_no_coadjoint_term() -> None:
+    """RNEA adds armature * a and nothing else, also for a freely rotating body."""
     model = with_arm("spherical")
     model.armature = np.zeros(6)
     wheels = (0.7, 0.1, 1.3, 0.2, 0.1, 0.4)
@@ -159,7 +159,7 @@ def test_inertia_of_rotors_and_effects_turns_no_momentum() -> None:
     assert off(motion, scipys(scene, start, 1.0)) < 1e-9
 
 
-def test_rotors_of_the_model_and_the_same_as_an_effect_move_alike() -> None:
+def test_armature_and_an_equal_effect_give_the_same_motion() -> None:
     sizes = (0.7, 0.1, 1.3)
     robot = load_robot(chain([pin.JointModelSpherical()]))
     rotors, wheels = (Scene(robot, [Gravity(), *more]) for more in ((), (Flywheels(sizes),)))
@@ -169,7 +169,7 @@ def test_rotors_of_the_model_and_the_same_as_an_effect_move_alike() -> None:
     assert off(motions[0], scipys(wheels, start_of(robot), 1.0)) < 1e-5
 
 
-def test_a_continuous_joint_moves_as_its_revolute_twin(models: Path, tmp_path: Path) -> None:
+def test_a_continuous_joint_moves_like_a_revolute_one(models: Path, tmp_path: Path) -> None:
     text = (models / "two_link.urdf").read_text()
     path = tmp_path / "turning.urdf"
     path.write_text(text.replace('type="revolute"', 'type="continuous"'))
@@ -193,8 +193,8 @@ def test_a_continuous_joint_moves_as_its_revolute_twin(models: Path, tmp_path: P
 # Laws of the discrete motion
 
 
-def test_the_momentum_of_a_free_body_stays_in_the_world() -> None:
-    """Noether, however long the steps are; and the energy neither grows nor falls."""
+def test_the_spatial_momentum_of_a_free_body_is_conserved() -> None:
+    """The momentum is conserved at any step size, and the energy does not drift."""
     robot = rigid_body(MOMENTS)
     start = State(robot.neutral(), [0.1, 2.0, -0.1])  # about the middle axis: it tumbles
     motion = simulate(Scene(robot), start, 60.0, intervals=600)
@@ -207,8 +207,8 @@ def test_the_momentum_of_a_free_body_stays_in_the_world() -> None:
     assert np.abs(energy[-100:]).max() < 1.2 * np.abs(energy[:200]).max()
 
 
-def test_the_momenta_of_a_free_robot_stay_in_the_world() -> None:
-    """Three of motion and three of rotation about the world's origin."""
+def test_the_spatial_momenta_of_a_free_robot_are_conserved() -> None:
+    """Three linear momenta and three angular momenta about the origin of the world."""
     robot = load_robot(with_arm("free-flyer"))
     motion = simulate(Scene(robot), start_of(robot), 2.0, torque_inside(robot), intervals=40)
     momenta = []
@@ -219,14 +219,14 @@ def test_the_momenta_of_a_free_robot_stay_in_the_world() -> None:
 
 
 def torque_inside(robot: Robot) -> Torque:
-    """Motors of the arm alone."""
+    """Torques at the joints of the arm only."""
     arm = torque_of(robot)
     return lambda t: arm(t) * (np.arange(robot.nv) >= 6)
 
 
 @pytest.mark.parametrize("base", BASES)
 def test_a_step_on_a_group_is_symplectic(base: str) -> None:
-    """D^T w1 D = w0, with w((a, f), (b, g)) = g.a - f.b + p.[a, b] in the bodies' axes."""
+    """D^T w1 D = w0, with w((a, f), (b, g)) = g.a - f.b + p.[a, b] in the body frames."""
     robot = load_robot(with_arm(base))
     scene = Scene(robot, [Gravity()])
     L, n = mechanics(scene), robot.nv
@@ -261,7 +261,7 @@ def form(robot: Robot, p: Array) -> Array:
     return w
 
 
-def test_a_flow_is_of_any_lagrangian_on_a_group() -> None:
+def test_a_flow_supports_any_lagrangian_on_a_group() -> None:
     robot = rigid_body(MOMENTS)
     L = mechanics(Scene(robot))
     ld = ChartedLagrangian(L, robot.space, galerkin(2, 1), 0.05)
@@ -272,7 +272,7 @@ def test_a_flow_is_of_any_lagrangian_on_a_group() -> None:
     np.testing.assert_allclose(found.energy, found.energy[0], rtol=1e-9)
 
 
-def test_a_step_that_turns_too_far_is_named() -> None:
+def test_a_step_that_rotates_too_far_is_refused() -> None:
     start = State([0, 0, 0, 1], [0.0, 40.0, 0.0])
     with pytest.raises(InputError, match="shorter step"):
         simulate(Scene(rigid_body(MOMENTS)), start, 1.0, intervals=10)
@@ -321,8 +321,8 @@ def test_the_flow_of_optimal_control_has_the_order_of_the_nodes(base: str) -> No
     np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=1e-6)
 
 
-def test_a_plan_is_the_flow_from_its_own_momenta() -> None:
-    """On a group, too: the optimiser and the flow solve the same discrete equations."""
+def test_a_plan_equals_the_flow_from_its_own_momenta() -> None:
+    """The optimizer and the flow solve the same discrete equations on groups as well."""
     robot = load_robot(with_arm("free-flyer"))
     q = configurations(robot, 2, size=0.4)
     scene = Scene(robot, [Gravity()])
@@ -352,7 +352,7 @@ def planned() -> Trajectory:
 
 
 @pytest.mark.parametrize("feedback", FEEDBACKS)
-def test_where_the_world_is_as_planned_a_floating_robot_does_not_stray(
+def test_a_floating_robot_follows_its_plan_without_model_error(
     planned: Trajectory, feedback: str
 ) -> None:
     assert planned.scene is not None
@@ -360,7 +360,7 @@ def test_where_the_world_is_as_planned_a_floating_robot_does_not_stray(
     assert np.abs(tracking.joint_deviation).max() < 1e-5
 
 
-def test_a_feedback_holds_a_floating_robot_in_a_richer_world(planned: Trajectory) -> None:
+def test_feedback_reduces_the_deviation_of_a_floating_robot(planned: Trajectory) -> None:
     assert planned.scene is not None
     robot = planned.scene.robot
     rich = Scene(robot, [Gravity(), ViscousFriction(0.3)])
@@ -380,7 +380,7 @@ def test_a_simulation_is_a_trajectory_between_its_nodes() -> None:
 
 
 @pytest.mark.parametrize("feedback", FEEDBACKS)
-def test_slopes_of_a_feedback_on_groups_are_those_of_finite_differences(
+def test_derivatives_of_feedback_on_groups_match_finite_differences(
     planned: Trajectory, feedback: str
 ) -> None:
     assert planned.scene is not None
@@ -395,7 +395,7 @@ def test_slopes_of_a_feedback_on_groups_are_those_of_finite_differences(
     np.testing.assert_allclose(slope, np.stack([by_q, by_v], axis=2), rtol=1e-7, atol=1e-6)
 
 
-def test_the_command_plays_a_plan_of_a_floating_robot(
+def test_the_command_executes_a_plan_of_a_floating_robot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = tmp_path / "leap.toml"

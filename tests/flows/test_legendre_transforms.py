@@ -112,7 +112,9 @@ def fl(jet: Array) -> Array:
     return np.array([np.array(x).ravel() for x in p(*jet)])
 
 
-def test_the_legendre_transform_of_the_arm_is_that_of_its_energies(arm: EffortLagrangian) -> None:
+def test_the_legendre_transform_of_the_arm_matches_the_derivation_by_hand(
+    arm: EffortLagrangian,
+) -> None:
     x, p = legendre(arm, *JET)
     np.testing.assert_array_equal(x, JET[:2])
     assert relative(p, fl(JET)) < 1e-13
@@ -128,7 +130,7 @@ def test_theorem_1_the_legendre_transforms_agree(arm: EffortLagrangian) -> None:
     assert relative(legendre(arm, *end)[1], p1) < 1e-10
 
 
-def test_the_flow_of_the_euler_lagrange_equations_is_hamiltons_under_fl() -> None:
+def test_fl_maps_the_euler_lagrange_flow_to_hamiltons() -> None:
     _, end = solution(H)
     x, p = pontryagin(H)
     assert relative(end[:2], x) < 1e-11
@@ -136,7 +138,7 @@ def test_the_flow_of_the_euler_lagrange_equations_is_hamiltons_under_fl() -> Non
 
 
 @pytest.mark.parametrize("form", get_args(Form))
-def test_theorem_3_the_discrete_hamiltonian_flow_of_the_exact_one_is_hamiltons(
+def test_theorem_3_the_exact_discrete_hamiltonian_flow_is_hamiltons(
     arm: EffortLagrangian, form: Form
 ) -> None:
     exact = ExactDiscreteLagrangian(arm, H)
@@ -169,7 +171,7 @@ def test_theorem_2_its_diagram_commutes(ld: SegmentLagrangian) -> None:
         assert relative(momenta, r) < 1e-11
 
 
-def test_its_corollary_three_forms_of_the_flow_are_one(ld: SegmentLagrangian) -> None:
+def test_its_corollary_the_three_forms_of_the_flow_are_equal(ld: SegmentLagrangian) -> None:
     x0, p0 = JET[:2], fl(JET)
     flows = [discrete_hamiltonian_flow(ld, x0, p0, form) for form in get_args(Form)]
     for x1, p1 in flows[1:]:
@@ -190,7 +192,7 @@ def test_a_motion_solves_the_discrete_euler_lagrange_equations(ld: SegmentLagran
     assert np.abs(euler_lagrange_residual(ld, x0, x1, x2 + 0.01)).max() > 1e-3 * scale
 
 
-def test_batches_are_the_points_one_by_one(ld: SegmentLagrangian) -> None:
+def test_batches_equal_single_points(ld: SegmentLagrangian) -> None:
     rng = np.random.default_rng(0)
     x0 = JET[:2] + 0.1 * rng.normal(size=(3, 2, 2))
     p0 = fl(JET) + 0.1 * rng.normal(size=(3, 2, 2))

@@ -1,4 +1,4 @@
-"""Variational orders by the paper's definition, and the orders of the flow that follow."""
+"""Variational orders by the definition of the paper, and the resulting orders of the flow."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ DURATION = {2: 0.4, 6: 0.1}  # the arm with six joints is far less stable
 
 @cache
 def reference(lagrangian: EffortLagrangian) -> tuple[Array, Array, Array, Array]:
-    """A start, and where the exact flow carries it."""
+    """A start, and its image under the exact flow."""
     duration = DURATION[lagrangian.nv]
     x, p = legendre(lagrangian, *jets(lagrangian.nv, 0.25)[:, 0])
     motion = flow(SchemeLagrangian(lagrangian, galerkin(6), duration / 8), x, p, 8, force=True)
@@ -173,7 +173,7 @@ def test_the_flow_from_momenta_has_the_order_of_its_discrete_lagrangian(
 
 
 @pytest.mark.parametrize("name", ["taylor-midpoint", "galerkin-0"])
-def test_a_flow_started_from_two_exact_nodes_may_be_wrong_at_every_step_length(
+def test_a_flow_from_two_exact_nodes_can_fail_at_every_step_size(
     arm: EffortLagrangian, name: str
 ) -> None:
     # with the Taylor scheme the error does not shrink with h: start from Legendre momenta

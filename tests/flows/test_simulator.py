@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Drag(Effect):
-    """A test's effect: d = c v + b sin(t) v sqrt(1 + v^2)."""
+    """An effect d = c v + b sin(t) v sqrt(1 + v^2)."""
 
     viscous: float = 0.3
     pulsing: float = 0.2
@@ -47,7 +47,7 @@ class Drag(Effect):
 
 @dataclass(frozen=True)
 class Lagging(Effect):
-    """A test's effect that depends on the acceleration as no inertia does."""
+    """An effect that depends on the acceleration other than as an inertia."""
 
     key: ClassVar[str] = "lagging"
 
@@ -100,7 +100,7 @@ def test_a_simulation_has_order_2_r_plus_2_with_torques_and_drag(
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * (r + 1), abs=0.3)
 
 
-def test_a_robot_of_six_joints_falls_as_articulated_bodies_do(ur5: Robot) -> None:
+def test_the_fall_of_six_joints_matches_aba(ur5: Robot) -> None:
     scene, start = Scene(ur5, [Gravity()]), State(np.full(6, 0.3), np.full(6, -0.2))
     motion = simulate(scene, start, 0.5, intervals=50, inner_modes=2)
     expected = reference(scene, start, 0.5, None)
@@ -108,7 +108,7 @@ def test_a_robot_of_six_joints_falls_as_articulated_bodies_do(ur5: Robot) -> Non
     np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=1e-7)
 
 
-def test_work_of_the_torques_is_the_change_of_energy(arm_scene: Scene) -> None:
+def test_the_work_of_the_torques_equals_the_change_of_energy(arm_scene: Scene) -> None:
     motion = simulate(arm_scene, START, 1.0, torque, intervals=400)
     power = np.sum(torque(motion.t) * motion.v, axis=1)
     work = np.trapezoid(power, motion.t)
@@ -132,7 +132,7 @@ def test_a_simulation_can_be_saved_and_replayed(arm_scene: Scene, tmp_path: Path
     assert np.abs(sample.tau).max() < 1e-2  # of the cubic between the nodes
 
 
-def test_what_cannot_be_simulated_is_refused(arm_scene: Scene, two_link: Robot) -> None:
+def test_invalid_simulations_are_refused(arm_scene: Scene, two_link: Robot) -> None:
     with pytest.raises(InputError, match="duration must be positive"):
         simulate(arm_scene, START, 0.0)
     with pytest.raises(InputError, match="intervals must be 1 or more"):
@@ -174,7 +174,7 @@ def test_the_command_prints_one_object(
     np.testing.assert_array_equal(Trajectory.load(out).q[-1], report["q"])
 
 
-def test_the_command_speaks(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_a_report(scene_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", str(scene_file), "--duration", "0.2", "--intervals", "7"]) == 0
     printed = capsys.readouterr().out
     assert "0.2 s in 7 steps of order 4" in printed
@@ -185,7 +185,7 @@ def test_the_command_speaks(scene_file: Path, capsys: pytest.CaptureFixture[str]
     assert main(["simulate", str(scene_file), "--out", "x.txt"]) == 2
 
 
-def test_a_limit_that_is_passed_is_told(
+def test_a_violated_limit_is_reported(
     models: Path, scene_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out, narrow = tmp_path / "fall.npz", tmp_path / "narrow.urdf"

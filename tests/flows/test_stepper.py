@@ -1,4 +1,4 @@
-"""The discrete flow: what it conserves, how well it is conditioned, and when it refuses."""
+"""The discrete flow: conservation laws, conditioning, and refusals."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ def test_the_condition_of_a_step_tends_to_its_limit_on_the_arm(
 
 
 @pytest.mark.parametrize("h", [1e-2, 1e-4, 1e-6, 1e-8])
-def test_steps_keep_their_digits_as_h_tends_to_zero(arm: EffortLagrangian, h: float) -> None:
+def test_steps_are_accurate_as_h_tends_to_zero(arm: EffortLagrangian, h: float) -> None:
     # w1 is the mean acceleration, w0 its slope: neither loses eps/h^2 as differences would
     x, p = legendre(arm, *JET)
     segment = SchemeLagrangian(arm, galerkin(2), h).from_start(x[None], p[None])
@@ -203,7 +203,7 @@ def test_a_horizon_beyond_the_flows_own_instability_is_refused(arm_scene: Scene)
     assert np.median(growth) == pytest.approx(3.75, abs=0.1)
 
 
-def test_a_swing_up_is_replayed_from_its_momenta_as_far_as_they_carry(arm_scene: Scene) -> None:
+def test_a_swing_up_is_replayed_from_its_momenta_until_it_is_unstable(arm_scene: Scene) -> None:
     # what eps of the start becomes in ten seconds is 5e-7 rad; the plan's momenta have some more
     grid = Grid.uniform(10.0, 100, galerkin(1))
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
@@ -240,7 +240,7 @@ def test_the_pendulum_without_torque_stays_without_torque(pendulum: Robot) -> No
 # Details
 
 
-def test_compensated_sums_lose_nothing() -> None:
+def test_compensated_sums_are_exact() -> None:
     total, lost = np.array([1.0]), np.zeros(1)
     for _ in range(10_000):
         total, lost = compensated(total, np.array([1e-17]), lost)
@@ -265,7 +265,7 @@ def test_a_degenerate_scheme_has_no_flow(arm: EffortLagrangian, name: str) -> No
         flow(SchemeLagrangian(arm, by_name(name), 0.1), x, p, 5)
 
 
-def test_what_does_not_fit_is_refused(arm: EffortLagrangian) -> None:
+def test_invalid_arguments_are_refused(arm: EffortLagrangian) -> None:
     x, p = legendre(arm, *JET)
     ld = SchemeLagrangian(arm, galerkin(0), 0.1)
     with pytest.raises(InputError, match=r"p0 needs 2 rows of 2 .* got shape \(1, 2\)"):

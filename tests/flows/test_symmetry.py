@@ -1,4 +1,4 @@
-"""Symmetries: generators against hand, invariance, and what a discrete motion conserves."""
+"""Symmetries: known generators, invariance, and conservation along discrete motions."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def cart(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 
 
 def turn(q: ca.SX) -> ca.SX:
-    """The plane turned about the origin: xi = (-y, x)."""
+    """Rotation of the plane about the origin: xi = (-y, x)."""
     return ca.vertcat(-q[1], q[0])
 
 
 def central(k: int) -> CasadiLagrangian:
-    """A Lagrangian of order k in the plane that rotations leave alone."""
+    """A rotationally invariant Lagrangian of order k in the plane."""
     jet = [ca.SX.sym(f"q{j}", 2) for j in range(k + 1)]
     radius = ca.sumsqr(jet[0])
     L = ca.sumsqr(jet[-1]) / 2 * (1 + radius) - ca.sqrt(1 + radius)
@@ -61,7 +61,7 @@ def central(k: int) -> CasadiLagrangian:
 
 @pytest.mark.parametrize("k", [1, 2, 3])
 @pytest.mark.parametrize("r", [0, 2])
-def test_noether_a_users_generator_is_conserved_along_any_discrete_motion(k: int, r: int) -> None:
+def test_noether_user_defined_symmetries_are_conserved(k: int, r: int) -> None:
     symmetry, L = Symmetry(turn, 2), central(k)
     rng = np.random.default_rng(k)
     x, p = 0.5 * rng.normal(size=(2, k, 2))
@@ -101,7 +101,7 @@ def test_the_lift_is_the_derivative_of_the_generator_along_a_curve() -> None:
     assert symmetry.momentum(x2, p)[0] == pytest.approx(expected, rel=1e-14)
 
 
-def test_turning_a_robot_about_its_first_axis_moves_the_first_joint(
+def test_rotating_a_robot_about_its_first_axis_moves_the_first_joint(
     panda: Robot, two_link: Robot
 ) -> None:
     points = np.random.default_rng(0).normal(size=(3, 2, 7))
@@ -139,7 +139,7 @@ def test_noether_for_a_cart_under_gravity(cart: Robot) -> None:
     np.testing.assert_allclose(J, J[0], rtol=0, atol=1e-12 * np.abs(J).max())
 
 
-def test_what_gravity_or_the_joints_do_not_leave_free_is_refused(panda: Robot, cart: Robot) -> None:
+def test_motions_that_are_no_symmetries_are_refused(panda: Robot, cart: Robot) -> None:
     heavy = Scene(panda, [Gravity()])
     with pytest.raises(SceneError, match="changes under a rotation"):
         base_rotation(heavy, [1, 0, 0])

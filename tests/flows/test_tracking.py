@@ -1,4 +1,4 @@
-"""Plans played on scenes with more effects, open loop and with feedback."""
+"""Plans executed on scenes with more effects, open loop and with feedback."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def planned(simple: Scene) -> Trajectory:
 
 
 def by_scipy(tracking: Tracking) -> Array:
-    """(q, v) at the end, from the same torques by SciPy and articulated bodies."""
+    """(q, v) at the end under the same torques, by SciPy and ABA."""
     scene, drive = tracking.simulation.scene, tracking.controller
     model, data = scene.model, scene.model.createData()
 
@@ -64,9 +64,7 @@ def by_scipy(tracking: Tracking) -> Array:
 
 
 @pytest.mark.parametrize("feedback", FEEDBACKS)
-def test_a_plan_is_played_as_scipy_plays_it(
-    rich: Scene, planned: Trajectory, feedback: str
-) -> None:
+def test_open_loop_execution_matches_scipy(rich: Scene, planned: Trajectory, feedback: str) -> None:
     tracking = play(rich, planned, feedback, inner_modes=2, intervals=96)
     motion = tracking.simulation
     found = np.concatenate([motion.q[-1], motion.v[-1]])
@@ -74,7 +72,7 @@ def test_a_plan_is_played_as_scipy_plays_it(
 
 
 @pytest.mark.parametrize("feedback", FEEDBACKS)
-def test_where_the_world_is_as_planned_nothing_strays(
+def test_without_model_error_there_is_no_deviation(
     simple: Scene, planned: Trajectory, feedback: str
 ) -> None:
     tracking = play(simple, planned, feedback)
@@ -82,7 +80,7 @@ def test_where_the_world_is_as_planned_nothing_strays(
     assert tracking.tip_deviation.max() < 1e-4
 
 
-def test_feedback_holds_what_open_loop_loses(rich: Scene, planned: Trajectory) -> None:
+def test_feedback_reduces_the_deviation_of_open_loop(rich: Scene, planned: Trajectory) -> None:
     off = [play(rich, planned, feedback).tip_deviation for feedback in FEEDBACKS]
     firm = play(rich, planned, "pd", bandwidth=40.0)
     assert off[0][-1] > 0.05
@@ -92,7 +90,7 @@ def test_feedback_holds_what_open_loop_loses(rich: Scene, planned: Trajectory) -
 
 
 @pytest.mark.parametrize("feedback", FEEDBACKS)
-def test_the_slope_of_a_feedback_is_its_derivative(
+def test_derivatives_of_feedback_match_finite_differences(
     simple: Scene, planned: Trajectory, feedback: str
 ) -> None:
     drive = controller(planned, feedback, simple, 7.0)
@@ -121,7 +119,7 @@ def test_computed_torque_decays_at_its_bandwidth(simple: Scene, planned: Traject
 
 
 @pytest.mark.parametrize(("r", "counts"), [(0, (200, 400)), (1, (40, 80))])
-def test_energy_is_balanced_by_work_to_the_integrators_order(
+def test_the_energy_balance_has_the_order_of_the_integrator(
     rich: Scene, planned: Trajectory, r: int, counts: tuple[int, int]
 ) -> None:
     wrong = []
@@ -146,9 +144,7 @@ def test_a_plan_of_another_robot_is_refused(planned: Trajectory, ur5: Robot, sim
         play(simple, planned, "pd", bandwidth=0.0)
 
 
-def test_torques_of_a_plan_without_a_scene_are_played_open_loop(
-    simple: Scene, planned: Trajectory
-) -> None:
+def test_a_plan_without_a_scene_is_executed_open_loop(simple: Scene, planned: Trajectory) -> None:
     from hovi.discrete.stored_torque import StoredTorque
 
     stored = StoredTorque.fit(
@@ -220,7 +216,7 @@ def test_the_command_reports_the_deviation(
         (["--plan", "nowhere.npz"], "no trajectory file 'nowhere.npz'"),
     ],
 )
-def test_the_command_refuses_in_a_sentence(
+def test_the_command_refuses_in_one_sentence(
     files: tuple[str, str],
     capsys: pytest.CaptureFixture[str],
     arguments: list[str],
@@ -241,7 +237,7 @@ def test_open_loop_is_a_controller(planned: Trajectory) -> None:
     assert not slope.any()
 
 
-def test_joints_without_a_motor_get_no_torque(models: Path) -> None:
+def test_passive_joints_get_no_torque(models: Path) -> None:
     task = load_task(models / "cart_pole_swing_up.toml")
     plan = plan_task(task).trajectory
     drive = controller(plan, "pd", task.scene, 10.0)
@@ -258,7 +254,7 @@ def test_joints_without_a_motor_get_no_torque(models: Path) -> None:
         controller(plan, "computed-torque", Scene(load_robot("ur5"), passive=names), 10.0)
 
 
-def test_a_solution_is_no_trajectory(simple: Scene) -> None:
+def test_a_solution_is_not_accepted_as_a_trajectory(simple: Scene) -> None:
     solution = plan(simple, START, GOAL, 1.0)
     with pytest.raises(InputError, match="expected a Trajectory, got a Solution; give the traj"):
         play(simple, solution)  # type: ignore[arg-type]

@@ -204,7 +204,7 @@ def test_an_effect_that_touches_what_it_does_not_say_is_refused(two_link: Robot)
         def describe(self) -> str:
             return "secret"
 
-    with pytest.raises(SceneError, match=r"'secret' adds to the torque without saying so"):
+    with pytest.raises(SceneError, match=r"'secret' adds to the torque without declaring it"):
         Scene(two_link, [Secret()]).inverse_dynamics(*points(two_link))
 
 
@@ -286,7 +286,7 @@ def test_an_effect_that_is_not_registered_is_in_no_file(two_link: Robot) -> None
     jet = points(two_link)[:3]
     added = scene.inverse_dynamics(*jet) - Scene(two_link).inverse_dynamics(*jet)
     np.testing.assert_allclose(added[:, 0], 0.2 * np.sin(12 * jet[0][:, 0]), atol=1e-13)
-    with pytest.raises(SceneError, match="'cogging' is not registered, so that no file can hold"):
+    with pytest.raises(SceneError, match="'cogging' is not registered, so it cannot be stored"):
         scene.to_dict()
 
 

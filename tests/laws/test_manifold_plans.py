@@ -127,8 +127,8 @@ def test_v_and_a_of_a_guess_of_many_turns_are_those_of_its_q(base: str) -> None:
 def test_turns_that_are_none_are_refused() -> None:
     robot, free = load_robot("kinova"), load_robot(with_arm("free-flyer"))
     for bad, who, words in (
-        ({"j2s6s200_joint_2": 1}, robot, "no joint 'j2s6s200_joint_2' that makes full turns"),
-        ({"j2s6s200_joint_1": 0.5}, robot, "takes a whole number"),
+        ({"j2s6s200_joint_2": 1}, robot, "no joint 'j2s6s200_joint_2' that can make full turns"),
+        ({"j2s6s200_joint_1": 0.5}, robot, "takes an integer"),
         ({"j0": 1}, free, "three numbers of whole length"),
         ({"j0": [0.5, 0.0, 0.0]}, free, "three numbers of whole length"),
     ):

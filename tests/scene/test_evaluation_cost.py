@@ -1,4 +1,4 @@
-"""The account of a scene: what is simulated, what is left out, what each effect costs."""
+"""The description of a scene: what is simulated, what is left out, what each effect costs."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def test_a_scene_with_five_effects_on_panda_plans_and_simulates(rich: Task) -> N
     np.testing.assert_allclose(motion.q[-1], rich.goal.q, atol=2e-2)
 
 
-def test_the_account_of_five_effects_is_right(rich: Task) -> None:
+def test_the_account_of_five_effects_is_correct(rich: Task) -> None:
     text = rich.scene.describe()
     simulated, rest = text.split("left out:")
     for effect in rich.scene.effects:
         assert f"  {effect.describe()}\n" in simulated
-    assert "nothing that the URDF holds" in rest  # its damping is named
+    assert "nothing in the URDF" in rest  # its damping is an effect
     bare = rich.scene.graph().n_instructions()
     for effect in rich.scene.effects:
         added = bare - rich.scene.without(effect.key).graph().n_instructions()
@@ -81,5 +81,5 @@ def test_a_scene_without_effects_has_a_cost_too(two_link: Robot) -> None:
     assert line.startswith("cost: ")
 
 
-def test_a_robot_whose_joints_are_no_vectors_has_an_account() -> None:
+def test_a_robot_on_a_manifold_has_an_account() -> None:
     assert "gravity" in Scene(load_robot("kinova"), [Gravity()]).describe().split("cost:")[1]

@@ -1,4 +1,4 @@
-"""Lagrangians at batches of points: values by hand, derivatives by finite differences."""
+"""Lagrangians at batches of points: analytic values, derivatives by finite differences."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ POINTS = 6
 
 
 def potential(robot: Robot) -> JointLimitPotential:
-    """A ramp so wide that every random point is in or near its bend."""
+    """A ramp so wide that every random point is in or near its smooth part."""
     ranges = {joint: (-0.5 - 0.1 * i, 0.4) for i, joint in enumerate(robot.coordinate_names)}
     return JointLimitPotential(ranges, slope=20.0, width=1.5)
 
@@ -41,7 +41,7 @@ def lagrangian(request: pytest.FixtureRequest) -> EffortLagrangian:
 
 
 def jets(n: int, order: int = 2, points: int = POINTS) -> Array:
-    """Points of the jet side by side, (P, (k + 1) n)."""
+    """The jet at P points as rows, (P, (k + 1) n)."""
     return np.random.default_rng(n).normal(size=(points, (order + 1) * n))
 
 
@@ -50,7 +50,7 @@ def gradient(L: Lagrangian, x: Array) -> Array:
 
 
 def assert_consistent(L: Lagrangian, x: Array) -> None:
-    """evaluate gives the value, its derivative, and the derivative of that."""
+    """evaluate returns the value and its first and second derivatives."""
     jet = np.split(x, L.order + 1, axis=1)
     value, slope, hessian = L.evaluate(*jet)
     assert slope.shape == (len(x), L.order + 1, L.nv)
@@ -64,7 +64,7 @@ def assert_consistent(L: Lagrangian, x: Array) -> None:
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * scale)
 
 
-def test_the_effort_of_the_arm_is_the_one_derived_by_hand(arm_scene: Scene) -> None:
+def test_the_effort_of_the_arm_matches_the_derivation_by_hand(arm_scene: Scene) -> None:
     jet = np.split(jets(2, points=50), 3, axis=1)
     expected = [effort(*point) for point in zip(*jet, strict=True)]
     L = arm_scene.effort_lagrangian()
@@ -72,13 +72,13 @@ def test_the_effort_of_the_arm_is_the_one_derived_by_hand(arm_scene: Scene) -> N
     np.testing.assert_allclose(L.evaluate(*jet)[0], expected, rtol=1e-12)
 
 
-def test_gradient_and_hessian_of_an_effort_are_its_derivatives(
+def test_gradient_and_hessian_of_an_effort_match_finite_differences(
     lagrangian: EffortLagrangian,
 ) -> None:
     assert_consistent(lagrangian, jets(lagrangian.nv))
 
 
-def test_the_value_weighs_the_square_of_every_torque(lagrangian: EffortLagrangian) -> None:
+def test_the_value_is_the_weighted_square_of_the_torques(lagrangian: EffortLagrangian) -> None:
     jet = np.split(jets(lagrangian.nv), 3, axis=1)
     tau = lagrangian.torques.torque(*jet)
     value = 0.5 * tau**2 @ lagrangian.weight
@@ -87,7 +87,7 @@ def test_the_value_weighs_the_square_of_every_torque(lagrangian: EffortLagrangia
     np.testing.assert_allclose(lagrangian.value(*jet), value, rtol=1e-13)
 
 
-def test_the_finer_seam_gives_the_same_derivatives(lagrangian: EffortLagrangian) -> None:
+def test_torque_and_hessian_give_the_same_derivatives(lagrangian: EffortLagrangian) -> None:
     n, R = lagrangian.nv, lagrangian.weight
     jet = np.split(jets(n), 3, axis=1)
     tau, J = lagrangian.torque(*jet)
@@ -102,7 +102,7 @@ def test_the_finer_seam_gives_the_same_derivatives(lagrangian: EffortLagrangian)
     np.testing.assert_allclose(hessian, expected.reshape(hessian.shape), atol=1e-13 * scale)
 
 
-def test_a_multiplier_takes_the_place_of_the_torque_in_the_curvature_only(
+def test_a_multiplier_replaces_the_torque_in_the_curvature_only(
     lagrangian: EffortLagrangian,
 ) -> None:
     n, R = lagrangian.nv, lagrangian.weight
@@ -117,7 +117,7 @@ def test_a_multiplier_takes_the_place_of_the_torque_in_the_curvature_only(
     np.testing.assert_allclose(lifted[2], plain[2] + change, rtol=0, atol=1e-12 * scale)
 
 
-def test_efforts_of_any_time_are_the_same_where_nothing_depends_on_it(
+def test_time_has_no_influence_without_time_dependent_effects(
     lagrangian: EffortLagrangian,
 ) -> None:
     jet = np.split(jets(lagrangian.nv), 3, axis=1)
@@ -126,7 +126,7 @@ def test_efforts_of_any_time_are_the_same_where_nothing_depends_on_it(
         np.testing.assert_array_equal(now, then)
 
 
-def test_sizes_are_those_of_the_robot(lagrangian: EffortLagrangian) -> None:
+def test_dimensions_match_the_robot(lagrangian: EffortLagrangian) -> None:
     robot = lagrangian.scene.robot
     assert (lagrangian.nq, lagrangian.nv, lagrangian.order) == (robot.nq, robot.nv, 2)
 

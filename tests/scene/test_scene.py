@@ -1,4 +1,4 @@
-"""A scene simulates what was named: RNEA with the scene's own gravity and armature."""
+"""A scene simulates its effects only: RNEA with the scene's own gravity and armature."""
 
 from __future__ import annotations
 
@@ -64,14 +64,14 @@ def test_inverse_dynamics_is_rnea(
     np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_gravity_is_9_81_unless_a_scene_says_otherwise(two_link: Robot) -> None:
+def test_gravity_is_9_81_by_default(two_link: Robot) -> None:
     jet = random_points(two_link.model)
     tau = Scene(two_link, [Gravity()]).inverse_dynamics(*jet)
     np.testing.assert_allclose(tau, rnea(two_link, 9.81, *jet), atol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "free_flyer"), [("finger_edu", True), ("kinova", False)])
-def test_joints_that_are_no_vectors_have_torques_too(name: str, free_flyer: bool) -> None:
+def test_torques_on_manifolds_match_rnea(name: str, free_flyer: bool) -> None:
     robot = load_robot(name, free_flyer=free_flyer)
     assert robot.nq != robot.nv
     scene = Scene(robot, [Gravity()])
@@ -81,14 +81,14 @@ def test_joints_that_are_no_vectors_have_torques_too(name: str, free_flyer: bool
     np.testing.assert_allclose(tau, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
-def test_lists_of_numbers_are_points(two_link: Robot) -> None:
+def test_lists_are_accepted_as_points(two_link: Robot) -> None:
     scene = Scene(two_link)
     tau = scene.inverse_dynamics([[0, 1]], [[1, 2]], [[3, 4]], t=[0])
     jet = (np.array([row], dtype=float) for row in ([0, 1], [1, 2], [3, 4]))
     np.testing.assert_array_equal(tau, scene.inverse_dynamics(*jet))
 
 
-def test_the_scene_has_a_model_of_its_own(two_link: Robot) -> None:
+def test_the_scene_has_its_own_model(two_link: Robot) -> None:
     robot = with_armature(two_link)
     robot.model.gravity.linear = np.array([1.0, 2.0, 3.0])
     scene = Scene(robot, [Gravity(5.0)])
@@ -102,7 +102,7 @@ def test_the_scene_has_a_model_of_its_own(two_link: Robot) -> None:
 # Lagrangians
 
 
-def test_the_effort_weighs_every_joint_alike_unless_told(two_link: Robot) -> None:
+def test_effort_weights_are_one_by_default(two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity()])
     jet = random_points(two_link.model)
     tau = scene.inverse_dynamics(*jet)
@@ -114,12 +114,12 @@ def test_the_effort_weighs_every_joint_alike_unless_told(two_link: Robot) -> Non
 @pytest.mark.parametrize(
     "weight", [[1.0], [1.0, 1.0, 1.0], [1.0, 0.0], [1.0, -2.0], [np.nan, 1.0], [1.0, np.inf], 2.0]
 )
-def test_a_weight_that_is_none_is_refused(two_link: Robot, weight: Any) -> None:
+def test_an_invalid_weight_is_refused(two_link: Robot, weight: Any) -> None:
     with pytest.raises(SceneError, match="weight needs 2 positive numbers"):
         Scene(two_link).effort_lagrangian(weight)
 
 
-def test_a_robot_on_which_nothing_can_be_planned_has_no_effort() -> None:
+def test_a_robot_that_does_not_support_planning_has_no_effort() -> None:
     robot = load_robot(half_turning())
     with pytest.raises(ModelError, match=r"'last' mimics.*lock one"):
         Scene(robot, [Gravity()]).effort_lagrangian()
@@ -128,12 +128,12 @@ def test_a_robot_on_which_nothing_can_be_planned_has_no_effort() -> None:
 # What a scene is
 
 
-def test_an_effect_is_named_once(two_link: Robot) -> None:
+def test_duplicate_effects_are_refused(two_link: Robot) -> None:
     with pytest.raises(SceneError, match="the effect 'gravity' is named twice"):
         Scene(two_link, [Gravity(9.8), POTENTIAL, Gravity(9.81)])
 
 
-def test_a_scene_does_not_change(two_link: Robot) -> None:
+def test_a_scene_is_immutable(two_link: Robot) -> None:
     effects: list[Effect] = [Gravity()]
     scene = Scene(two_link, effects)
     effects.append(POTENTIAL)
@@ -157,7 +157,7 @@ def assert_same_scene(scene: Scene, copy: Scene) -> None:
 
 
 @pytest.mark.parametrize("effects", [[], [Gravity(9.8)], [Gravity(), POTENTIAL]])
-def test_a_scene_is_json_and_back(two_link: Robot, effects: list[Effect]) -> None:
+def test_a_scene_survives_json(two_link: Robot, effects: list[Effect]) -> None:
     scene = Scene(two_link, effects)
     text = json.dumps(scene.to_dict())
     copy = Scene.from_dict(json.loads(text))
@@ -169,7 +169,7 @@ def test_a_scene_is_json_and_back(two_link: Robot, effects: list[Effect]) -> Non
     assert json.dumps(copy.to_dict()) == text
 
 
-def test_a_pickled_scene_is_the_same_scene(two_link: Robot, panda: Robot) -> None:
+def test_a_scene_survives_pickling(two_link: Robot, panda: Robot) -> None:
     for scene in (Scene(two_link, [Gravity(9.8), POTENTIAL]), Scene(panda, [Gravity()])):
         scene.inverse_dynamics(*random_points(scene.model))  # what is cached does not travel
         assert_same_scene(scene, pickle.loads(pickle.dumps(scene)))
@@ -181,7 +181,7 @@ def test_an_unknown_effect_of_a_stored_scene_is_refused(two_link: Robot) -> None
         Scene.from_dict(data)
 
 
-def test_the_account_names_what_is_simulated_and_what_is_left_out(two_link: Robot) -> None:
+def test_the_description_lists_what_is_simulated_and_what_is_left_out(two_link: Robot) -> None:
     model = two_link.model.copy()
     model.damping, model.friction = np.array([0.0, 0.3]), np.array([0.1, 0.2])
     model.armature = np.array([0.5, 0.0])
@@ -197,8 +197,8 @@ def test_the_account_names_what_is_simulated_and_what_is_left_out(two_link: Robo
     assert "gravity" not in left_out.split("derivatives:")[0]
 
 
-def test_the_account_says_whose_derivatives_are_used(two_link: Robot) -> None:
-    assert "Pinocchio's analytic ones" in Scene(two_link).describe()
-    assert "Pinocchio's analytic ones" in Scene(load_robot("kinova")).describe()
+def test_the_description_says_which_derivatives_are_used(two_link: Robot) -> None:
+    assert "analytic (C++)" in Scene(two_link).describe()
+    assert "analytic (C++)" in Scene(load_robot("kinova")).describe()
     text = Scene(load_robot(chain([pin.JointModelRX(), pin.JointModelSpherical()]))).describe()
-    assert "CasADi's, since there are no analytic second ones for 'j1'" in text
+    assert "CasADi's, since there are no analytic second derivatives for 'j1'" in text

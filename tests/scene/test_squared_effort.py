@@ -1,4 +1,4 @@
-"""Squares of residuals, their gradients and their linear predictions are the sums written out."""
+"""Squares of residuals, their gradients and linear predictions equal the explicit sums."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_weighted_square_is_the_sum_over_points(shape: tuple[int, int, int]) -
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 @pytest.mark.parametrize("pulled", [False, True])
-def test_gradients_of_squares_are_jacobians_times_forces(
+def test_gradients_of_squares_match_the_explicit_product(
     shape: tuple[int, int, int], pulled: bool
 ) -> None:
     r, R, J = random_residuals(*shape)

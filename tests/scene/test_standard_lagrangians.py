@@ -1,4 +1,4 @@
-"""Ready-made Lagrangians against Pinocchio and by hand."""
+"""Standard Lagrangians against Pinocchio and analytic formulas."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def scene(request: pytest.FixtureRequest) -> Scene:
     return Scene(request.getfixturevalue(request.param), [Gravity()])
 
 
-def test_the_euler_lagrange_equations_of_mechanics_are_rnea(scene: Scene) -> None:
+def test_the_euler_lagrange_equations_of_mechanics_match_rnea(scene: Scene) -> None:
     # d/dt dL/dv - dL/dq = L_vq v + L_vv a - L_q = tau
     n = scene.robot.nv
     q, v, a = np.random.default_rng(0).normal(size=(3, 5, n))
@@ -56,7 +56,7 @@ def test_a_riemannian_cubic_squares_the_covariant_acceleration(scene: Scene) -> 
         assert values[i] == pytest.approx(covariant @ M @ covariant / 2, rel=1e-8)
 
 
-def test_geodesics_cost_nothing(scene: Scene) -> None:
+def test_geodesics_have_zero_cost(scene: Scene) -> None:
     free = Scene(scene.robot)
     q, v = np.random.default_rng(2).normal(size=(2, 3, scene.robot.nv))
     zero = np.zeros_like(q)
@@ -74,18 +74,18 @@ def test_a_spline_is_half_the_square_of_the_last_derivative(k: int) -> None:
     np.testing.assert_allclose(L.value(*jet), np.sum(jet[-1] ** 2, axis=1) / 2, rtol=1e-15)
 
 
-def test_what_makes_no_lagrangian_is_refused() -> None:
+def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(InputError, match="n >= 1 and k >= 1"):
         spline(0)
     halfway = Scene(load_robot(half_turning()))
     for ready_made in (mechanics, riemannian_cubic):
-        with pytest.raises(ModelError, match="cannot be planned on"):
+        with pytest.raises(ModelError, match="does not support planning"):
             ready_made(halfway)
 
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("make", [mechanics, riemannian_cubic])
-def test_derivatives_on_groups_are_those_along_the_group(
+def test_derivatives_are_along_the_group(
     make: Callable[[Scene], CasadiLagrangian], base: str
 ) -> None:
     robot = load_robot(with_arm(base))
@@ -107,7 +107,7 @@ def test_derivatives_on_groups_are_those_along_the_group(
         np.testing.assert_allclose(hessian[:, 1:, :, j], bent, rtol=1e-7, atol=1e-7)
 
 
-def test_the_cubic_of_a_floating_robot_squares_the_force_that_it_takes() -> None:
+def test_the_cubic_of_a_floating_robot_squares_its_force() -> None:
     robot = load_robot(with_arm("free-flyer"))
     q = configurations(robot, 3)
     v, a = np.random.default_rng(0).normal(size=(2, 3, robot.nv))

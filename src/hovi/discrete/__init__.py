@@ -1,1 +1,1 @@
-"""A motion on a grid: nodes, discrete action, interpolant, file."""
+"""Motions on a grid: nodes, discrete action, interpolation, files."""

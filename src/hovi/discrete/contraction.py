@@ -1,4 +1,4 @@
-"""Derivatives at points, contracted with a scheme's table into those of the intervals."""
+"""Contracts derivatives at quadrature points with a scheme's table to those of intervals."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ def contract(
 ) -> tuple[Array, Array]:
     """Gradient and Hessian of sum_q h w_q L(A_q x) in the m columns x of every interval.
 
-    A_q = table_q / (1, h, h^2) gives (q, v, a) at a point: with the derivatives of L there, the
-    sums of h w_q A_q^T g_q and of h w_q A_q^T H_q A_q.
+    A_q = table_q / (1, h, h^2) maps the columns to (q, v, a) at a point, so these are the sums of
+    h w_q A_q^T g_q and h w_q A_q^T H_q A_q with the derivatives g_q, H_q of L there.
 
     table: shape (Q, 3, m). weights: w, shape (Q,). steps: h of the intervals, shape (B,).
-    gradient: of L at the B Q points, 3 n numbers each. hessian: symmetric, (3 n)^2 numbers each.
+    gradient: of L at the B Q points, 3 n entries each. hessian: symmetric, (3 n)^2 entries each.
     Returns gradient (B, m, n) and hessian (B, m, m, n, n).
     """
     Q, _, m = table.shape

@@ -1,7 +1,7 @@
 """The discrete Lagrangian L_d on TQ x TQ: the action over one interval, by a scheme's table.
 
-Everything here is linear algebra on top of the pointwise Lagrangian, so nothing is derived,
-differentiated or compiled again when the scheme, the step or the number of intervals changes.
+This is linear algebra on top of the pointwise Lagrangian: nothing is derived, differentiated or
+compiled again when the scheme, the step or the number of intervals changes.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ Index = npt.NDArray[np.intp]
 class Expansion:
     """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
 
-    Columns are (q0, h v0, q1, h v1, c) when nodal, (q0, h v0, Z0, Z1, c) when regular, with m of
-    them; inner modes that an interval does not have are zero.
+    The m columns are (q0, h v0, q1, h v1, c) if nodal, (q0, h v0, Z0, Z1, c) if regularized; inner
+    modes that an interval does not have are zero.
 
     values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
     outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
-        steps; those of a Lagrangian without outputs have no rows.
-    charts: those of the intervals, one per batch, where configurations are not vectors.
+        steps; they have no rows if the Lagrangian has no outputs.
+    charts: of the intervals, one per batch; None if the chart is the identity.
     """
 
     values: Array
@@ -66,14 +66,14 @@ class DiscreteLagrangian:
 
     @cached_property
     def chart(self) -> Chart | None:
-        """The chart of the intervals; None where tangent vectors are added to configurations."""
+        """The chart of the intervals; None if it is the identity."""
         space = self.lagrangian.space
         return None if space is None or space.flat else Chart(space)
 
     def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
         """L_d of every interval, shape (N,).
 
-        jets: what `jets` gave for this path, where it is known already.
+        jets: the result of `jets` for this path, if it is known.
         """
         values = np.empty(self.grid.intervals)
         for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
@@ -96,9 +96,9 @@ class DiscreteLagrangian:
     ) -> Expansion:
         """Value, gradient and Hessian of every L_d: see Expansion.
 
-        multipliers: weights of the outputs' curvature, one array per batch, as `predict` gives
-            them; R y when None.
-        terms: what limits add at the points, one per batch; the values stay those of L_d.
+        multipliers: weights of the outputs' curvature, one array per batch, from `predict`; R y
+            when None.
+        terms: contributions of limits at the points, one per batch; they do not affect values.
         jets: as for `values`.
         """
         parts = []
@@ -187,9 +187,9 @@ class DiscreteLagrangian:
         return [self._jet(batch, path) for batch in self._batches]
 
     def turns(self, path: DiscretePath) -> Array:
-        """The largest turn of an orientation in the chart of every interval, shape (N,), in [rad].
+        """The largest rotation angle in the chart of every interval, shape (N,), in [rad].
 
-        At its quadrature points and its end; zero where there are no charts.
+        At its quadrature points and its end; zero without charts.
         """
         turns = np.zeros(self.grid.intervals)
         for batch, charts in zip(self._batches, self._charts(path) or (), strict=False):
@@ -232,7 +232,7 @@ class DiscreteLagrangian:
         """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
 
         At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
-        forces: multipliers of limits and of torques that vanish, whose work belongs to L_d.
+        forces: multipliers of limits and of passive joints, whose work is part of L_d.
         jets: as for `values`.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
@@ -248,7 +248,7 @@ class DiscreteLagrangian:
 
     @cached_property
     def _end_columns(self) -> Array:
-        """What makes D1 .. D4 of the derivatives in an interval's first four columns, (N, 4, 4)."""
+        """Matrices from the gradient in an interval's first four columns to D1 .. D4, (N, 4, 4)."""
         scales = self.grid.steps[:, None] ** [0, 1, 0, 1]
         nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0).T
         return np.asarray(scales[:, :, None] * nodal)
@@ -268,10 +268,10 @@ class DiscreteLagrangian:
     def duration_derivative(
         self, path: DiscretePath, forces: list[PointTerms] | None = None
     ) -> float:
-        """d S / d T of a stationary action S, the nodes' q and v and the steps' proportions fixed.
+        """d S / d T of a stationary action S, at fixed nodal q and v and proportions of the steps.
 
         T dS/dT = S - sum h w (dL/dv . v + 2 dL/da . a) + sum (D2 L_d . v0 + D4 L_d . v1), for L
-        that does not depend on time; it is minus Pontryagin's Hamiltonian.
+        independent of time; it is minus Pontryagin's Hamiltonian.
         """
         total = self.action(path)
         gradients = self.point_gradients(path, forces)

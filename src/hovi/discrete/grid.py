@@ -1,4 +1,4 @@
-"""The grid of a discrete motion, and the numbers that live on it."""
+"""The grid of a discrete motion, and the discrete path on it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hovi.schemes.galerkin_table import MAX_INNER_MODES
 
 Array = npt.NDArray[np.float64]
 
-SHORTEST, LONGEST = 1e-12, 1e9
-"""Steps, in [s], whose powers stay far from the ends of double precision."""
+MIN_STEP, MAX_STEP = 1e-12, 1e9
+"""Steps, in [s], whose powers do not overflow or underflow in double precision."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,10 @@ class Grid:
             )
         if not (np.isfinite(steps).all() and (steps > 0).all()):
             raise InputError("every step of a grid must be positive and finite.")
-        if steps.min() < SHORTEST or steps.max() > LONGEST:
+        if steps.min() < MIN_STEP or steps.max() > MAX_STEP:
             raise InputError(
-                f"the steps of a grid must lie between {SHORTEST:g} and {LONGEST:g} s, and these "
-                f"reach from {steps.min():.3g} to {steps.max():.3g} s: change the duration or the "
+                f"the steps of a grid must lie between {MIN_STEP:g} and {MAX_STEP:g} s, but these "
+                f"range from {steps.min():.3g} to {steps.max():.3g} s: change the duration or the "
                 "number of intervals."
             )
         steps.setflags(write=False)
@@ -64,7 +64,7 @@ class Grid:
         return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
 
     def halved(self, chosen: npt.NDArray[np.bool_]) -> Grid:
-        """The grid with the chosen intervals cut in half.
+        """The grid with the chosen intervals bisected.
 
         chosen: shape (N,).
         """
@@ -73,9 +73,9 @@ class Grid:
         return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
 
     def enriched(self, modes: int) -> Grid:
-        """The same intervals, each with so many inner modes more than its scheme has.
+        """The same intervals with `modes` additional inner modes each.
 
-        Raises InputError where an interval has too many already.
+        Raises InputError if an interval would have too many.
         """
         if self.inner_modes + modes > MAX_INNER_MODES:
             raise InputError(
@@ -105,7 +105,7 @@ class Grid:
         return float(self.t[-1])
 
     def node_at(self, time: float) -> int:
-        """The number of the inner node at a time, in [s]. Raises InputError where there is none."""
+        """The index of the inner node at a time, in [s]. Raises InputError if there is none."""
         k = int(np.argmin(np.abs(self.t - time)))
         if not 0 < k < self.intervals or abs(self.t[k] - time) > 1e-9 * self.duration:
             raise InputError(
@@ -118,7 +118,7 @@ class Grid:
         """The grid with the nearest inner nodes moved to given times, in [s], ascending.
 
         The intervals between two moved nodes keep the proportions of their lengths.
-        Raises InputError where the grid has too few nodes for it.
+        Raises InputError if the grid has too few nodes.
         """
         nodes = self.t
         fixed, times = [0], list(dict.fromkeys(times))
@@ -135,8 +135,8 @@ class Grid:
                     f"{self.intervals} intervals of {self.duration:g} s; use more intervals."
                 )
             fixed.append(k)
-        places = [0.0, *times, self.duration]
-        t = np.interp(nodes, nodes[[*fixed, self.intervals]], places)
+        targets = [0.0, *times, self.duration]
+        t = np.interp(nodes, nodes[[*fixed, self.intervals]], targets)
         return Grid(np.diff(t), self.schemes)
 
     @cached_property
@@ -146,7 +146,7 @@ class Grid:
 
 
 def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.intp]], ...]:
-    """The intervals of each scheme, so that work can be done in batches."""
+    """The intervals of each scheme, for evaluation in batches."""
     members: dict[bytes, list[int]] = {}
     tables: dict[bytes, Scheme] = {}
     keys: dict[int, bytes] = {}
@@ -159,10 +159,10 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
 
 @dataclass(frozen=True, eq=False)
 class DiscretePath:
-    """The numbers of a discrete motion on a grid.
+    """The coordinates of a discrete motion on a grid.
 
-    The regularized coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are carried, not
-    recomputed: from q and v alone they would lose 12 eps q/h^2 and more.
+    The regularized coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are stored, since
+    recomputing them from q and v loses 12 eps q/h^2 or more.
     [ColomboFerraroMartin2016, section 2]
 
     q: nodes, shape (N + 1, nq), in [rad] or [m].

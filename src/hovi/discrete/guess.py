@@ -1,4 +1,4 @@
-"""First guesses of a motion: curves between the boundary data, put on a grid."""
+"""Initial guesses: curves between the boundary data, and their discretization on a grid."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
 """(q0, v0, q1, v1): two configurations (nq,) and two velocities (nv,)."""
 
-MISFIT = 1e-6
-"""Largest gap, relative to q, between the z of a path that is handed in and that of its q and v."""
-QUADRATURE = 8
-"""Points by which the turns of continuous joints within an interval are told."""
-WIDEST = 0.9 * np.pi
-"""Turn of an orientation within an interval that a guess may make, in [rad]."""
+MISFIT_TOLERANCE = 1e-6
+"""Largest difference, relative to q, between the z of a given path and that of its q and v."""
+ROTATION_POINTS = 8
+"""Number of Gauss points by which rotations within an interval are integrated."""
+MAX_ROTATION = 0.9 * np.pi
+"""Largest rotation of an orientation within an interval of a guess, in [rad]."""
 BUMP_MODES = 8
 BUMP_AMPLITUDES = (0.2, 1.5)
-"""Range of a random bump's amplitude, in [rad] or [m]."""
+"""Range of the amplitude of a random bump, in [rad] or [m]."""
 
 
 class Curve(Protocol):
@@ -39,7 +39,7 @@ class Curve(Protocol):
 
 
 def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The cubic through both ends, x(t) of q0 (+) x: the least motion in the sense of 1/2 |x''|^2.
+    """The cubic through both ends, x(t) of q0 (+) x: the minimizer of 1/2 |x''|^2.
 
     boundary: (q0, v0, q1, v1). duration: T, in [s].
     """
@@ -57,7 +57,7 @@ def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
 
 
 def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The quintic through both ends whose x'' vanish there; arguments as for `cubic`."""
+    """The quintic through both ends with x'' = 0 there; arguments as for `cubic`."""
     q0, v0, q1, v1 = boundary
     T = duration
     x1 = robot.difference(q0, q1)
@@ -91,10 +91,10 @@ def _in_chart(
 
 
 def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
-    """A curve with a smooth random bump, zero with its rate at both ends.
+    """A curve plus a smooth random bump that vanishes with its rate at both ends.
 
-    x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed, falling
-    like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
+    x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed,
+    decreasing like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
 
     base: the curve. duration: T, in [s]. seed: of the coefficients.
     """
@@ -117,9 +117,9 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
 
 
 def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curve:
-    """A curve with full turns more, spread over the whole time by a cubic at rest at both ends.
+    """A curve plus full turns, distributed over the duration by a cubic at rest at both ends.
 
-    turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `full_turns`.
+    turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `State.turns_on`.
     duration: T, in [s].
     """
     angle = 2 * np.pi * turns
@@ -127,16 +127,18 @@ def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curv
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        return robot.chart.composed(base(t), _wound(robot, x * angle), dx * angle, ddx * angle)
+        return robot.chart.composed(
+            base(t), _modulo_period(robot, x * angle), dx * angle, ddx * angle
+        )
 
     return curve
 
 
-def _wound(robot: Robot, x: Array) -> Array:
-    """Rotation vectors (M, nv) less those full turns, two at a time, after which exp repeats.
+def _modulo_period(robot: Robot, x: Array) -> Array:
+    """Rotation vectors (M, nv) modulo 4 pi, the period of a quaternion.
 
-    A chart's rates are exact up to 2 pi, and a quaternion returns to itself after 4 pi only. About
-    an axis that stays J(x) x' = x', so that the rates of x are those of what is left of it.
+    The rates of a chart are exact up to 2 pi only. About a fixed axis J(x) x' = x', so they are the
+    same after the reduction.
     """
     left = x.copy()
     for factor in robot.space.curved:
@@ -151,18 +153,18 @@ NAMED: dict[str, Callable[[Robot, Boundary, float], Curve]] = {
     "cubic": cubic,
     "minimum-jerk": minimum_jerk,
 }
-"""Guesses that a file or the command line can name."""
+"""Guesses by their name in files and on the command line."""
 
 
 def named_curve(name: str, robot: Robot, boundary: Boundary, duration: float) -> Curve:
-    """The guess called `name`. Raises InputError for an unknown name."""
+    """The guess with a name. Raises InputError for an unknown name."""
     if name not in NAMED:
         raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
     return NAMED[name](robot, boundary, duration)
 
 
 def stretched(trajectory: Trajectory, duration: float) -> Curve:
-    """A motion as a curve over another duration."""
+    """A motion as a curve, rescaled to another duration."""
     stretch = trajectory.duration / duration
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
@@ -175,41 +177,41 @@ def stretched(trajectory: Trajectory, duration: float) -> Curve:
 def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
     """The curve on a grid: its nodes, and its acceleration projected on the inner modes.
 
-    The ends are the boundary data to the last bit.
+    The ends are exactly the boundary data.
     """
     q, v, _ = (x.copy() for x in curve(grid.t))
     q[0], v[0], q[-1], v[-1] = boundary
-    turned = None if robot.vector_joints else _turned(curve, grid, robot)
+    rotation = None if robot.vector_joints else _rotation(curve, grid, robot)
     inner = _inner_modes(curve, grid, robot, q)
-    return DiscretePath(q, v, regularized(robot, grid, q, v, turned), inner)
+    return DiscretePath(q, v, regularized(robot, grid, q, v, rotation), inner)
 
 
 def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
-    """Raise InputError for a path that does not fit a grid and a robot, or not itself."""
+    """Raise InputError for a path that does not match its grid and robot, or is inconsistent."""
     N, r, n = grid.intervals, grid.inner_modes, robot.nv
     shapes = {"q": (N + 1, robot.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
     fits = [array.shape for array in path.arrays] == list(shapes.values())
-    if fits and robot.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT:
+    if fits and robot.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT_TOLERANCE:
         return
     for name, shape in shapes.items():
         array = getattr(path, name)
         if array.shape != shape or not np.isfinite(array).all():
             raise InputError(
-                f"the guess's {name} must be finite and of shape {shape}, got {array.shape}; hand "
-                "in a Trajectory to change grids."
+                f"the guess's {name} must be finite and of shape {shape}, got {array.shape}; "
+                "pass a Trajectory to change grids."
             )
     h = grid.steps[:, None]
-    turned = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
-    gap = (regularized(robot, grid, path.q, path.v, turned) - path.z) * h[..., None] ** 2
-    if np.abs(gap).max() > MISFIT * max(1.0, np.abs(path.q).max()):
+    rotation = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
+    gap = (regularized(robot, grid, path.q, path.v, rotation) - path.z) * h[..., None] ** 2
+    if np.abs(gap).max() > MISFIT_TOLERANCE * max(1.0, np.abs(path.q).max()):
         raise InputError(
-            "the guess's z is not that of its q and v: z0 = (q1 - q0 - h v0)/h^2, z1 = (v1 - v0)/h "
-            "where configurations are vectors."
+            "the guess's z does not match its q and v: on vector spaces "
+            "z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h."
         )
 
 
 def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
-    """A path plus the cubic that carries its ends to other boundary data."""
+    """A path plus the cubic that moves its ends to other boundary data."""
     q0, v0, q1, v1 = boundary
     old = path.q[0], path.v[0], path.q[-1], path.v[-1]
     if [x.tolist() for x in old] == [x.tolist() for x in boundary]:
@@ -220,7 +222,7 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
     dq, Tdv, TTda = np.moveaxis(interval_rows(s, 0) @ local, 1, 0)  # (N + 1, n) each
     h = (grid.steps / T)[:, None]
-    # of a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
+    # for a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
     jerk = np.diff(TTda, axis=0) / h
     z = np.stack([TTda[:-1] / 2 + h * jerk / 6, TTda[:-1] + h * jerk / 2], axis=1) / T**2
     q = robot.integrate(path.q, ends[0] + dq)
@@ -230,52 +232,54 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, robot)
 
 
-def regularized(robot: Robot, grid: Grid, q: Array, v: Array, turned: Array | None = None) -> Array:
+def regularized(
+    robot: Robot, grid: Grid, q: Array, v: Array, rotation: Array | None = None
+) -> Array:
     """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
 
-    x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 where tangent vectors add.
-    turned: about how far joints turn in each interval, shape (N, nv); less than half a turn when
-        None.
+    x1 = q1 (-) q0 and x1' = J(x1)^-1 v1, which is v1 on commutative groups.
+    rotation: approximate rotation in each interval, shape (N, nv), that determines the number of
+        turns; less than half a turn when None.
     """
     h = grid.steps[:, None]
     dx1 = v[1:]
-    if turned is None:
+    if rotation is None:
         x1 = robot.difference(q[:-1], q[1:])
     else:
-        x1 = robot.space.difference_near(q[:-1], q[1:], turned)
+        x1 = robot.space.difference_near(q[:-1], q[1:], rotation)
     if not robot.space.flat:
         dx1 = robot.chart.rates(x1, dx1)[0]
     return np.stack([(x1 - h * v[:-1]) / h**2, (dx1 - v[:-1]) / h], axis=1)
 
 
 def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> DiscretePath:
-    """A path whose z follows its nodes where tangent vectors do not add, and is kept elsewhere."""
+    """A path with z recomputed from its nodes on noncommutative groups, and unchanged elsewhere."""
     if robot.space.flat:
         return path
     h = grid.steps[:, None]
-    turned = h * path.v[:-1] + h**2 * path.z[:, 0]
-    z, known = path.z.copy(), regularized(robot, grid, path.q, path.v, turned)
+    rotation = h * path.v[:-1] + h**2 * path.z[:, 0]
+    z, known = path.z.copy(), regularized(robot, grid, path.q, path.v, rotation)
     for factor in robot.space.curved:
         z[:, :, factor.v] = known[:, :, factor.v]
     return DiscretePath(path.q, path.v, z, path.inner)
 
 
-def _turned(curve: Curve, grid: Grid, robot: Robot) -> Array:
+def _rotation(curve: Curve, grid: Grid, robot: Robot) -> Array:
     """The integral of v over every interval, by Gauss quadrature, shape (N, nv).
 
-    Raises ChartError where an orientation turns by half a turn or nearly so in an interval.
+    Raises ChartError if an orientation rotates by more than MAX_ROTATION in an interval.
     """
-    x, w = np.polynomial.legendre.leggauss(QUADRATURE)
+    x, w = np.polynomial.legendre.leggauss(ROTATION_POINTS)
     t = grid.t[:-1, None] + grid.steps[:, None] * (x + 1) / 2
-    v = curve(t.ravel())[1].reshape(grid.intervals, QUADRATURE, -1)
+    v = curve(t.ravel())[1].reshape(grid.intervals, ROTATION_POINTS, -1)
     for factor in robot.space.curved:
         speed = np.linalg.norm(v[:, :, [factor.v.start + i for i in factor.group.angular]], axis=2)
         turn = grid.steps * (speed @ (w / 2))  # (N,)
-        if turn.max() > WIDEST:
+        if turn.max() > MAX_ROTATION:
             raise ChartError(
-                f"the guess turns joint {robot.joint_at(factor.v.start)!r} by {turn.max():.3g} rad "
-                f"within an interval, and a chart holds up to {WIDEST:.3g}: take more intervals, "
-                f"{int(np.ceil(grid.intervals * turn.max() / WIDEST))} or more."
+                f"the guess rotates joint {robot.joint_at(factor.v.start)!r} by {turn.max():.3g} "
+                f"rad within an interval, and a chart covers up to {MAX_ROTATION:.3g} rad: use "
+                f"{int(np.ceil(grid.intervals * turn.max() / MAX_ROTATION))} or more intervals."
             )
     return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
 
@@ -303,7 +307,7 @@ def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
 
 @functools.cache
 def _projection(inner_modes: int) -> tuple[Array, Array]:
-    """Gauss points of [0, 1], (Q,), and what projects values there on the inner modes, (r, Q)."""
+    """Gauss points of [0, 1], (Q,), and the projection of values there on inner modes, (r, Q)."""
     x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
     s = (x + 1) / 2
     return s, np.ascontiguousarray((interval_rows(s, inner_modes)[:, 2, 3:] * (w / 2)[:, None]).T)

@@ -1,4 +1,4 @@
-"""Intervals of one scheme, evaluated together: what their quadrature points see of a path."""
+"""Intervals of one scheme, evaluated together: (q, v, a) at their quadrature points."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Coordinates = Literal["nodal", "regular"]
 COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
 
 CHUNK = 4096
-"""Intervals that are evaluated at a time, so that memory stays bounded."""
+"""Maximum number of intervals per batch, which bounds the memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class IntervalBatch:
     """Intervals of one scheme, evaluated together.
 
-    numbers: of the intervals, shape (B,). index: the same, as a slice where they follow each other.
+    numbers: of the intervals, shape (B,). index: the same, as a slice if they are consecutive.
     h: their lengths, shape (B,), in [s]. t: times of the points, shape (B Q,), in [s].
     """
 
@@ -41,7 +41,7 @@ class IntervalBatch:
 
     @cached_property
     def tables(self) -> dict[Coordinates, Array]:
-        """The scheme's table for both kinds of columns, (Q, 3, m)."""
+        """The scheme's table for both kinds of coordinates, (Q, 3, m)."""
         return {"nodal": self.scheme.nodal_table, "regular": self.scheme.regular_table}
 
     @cached_property

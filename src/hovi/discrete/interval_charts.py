@@ -1,7 +1,7 @@
-"""What charts do to the expansion of a discrete Lagrangian: the chain rule at points and at ends.
+"""The chain rule of charts in the expansion of a discrete Lagrangian.
 
-In an interval's chart the columns are (q0, h v0, x1, h x1', c), where q0 moves the chart as a
-whole; pulled back along the end map they become the nodal ones, (q0, h v0, q1, h v1, c).
+In an interval's chart the columns are (q0, h v0, x1, h x1', c), where q0 is the center of the
+chart; pulled back along the end map they become the nodal ones, (q0, h v0, q1, h v1, c).
 Columns are in the scaled variables of the scheme's table.
 """
 
@@ -36,7 +36,7 @@ class IntervalCharts:
 
     @property
     def turns(self) -> Array:
-        """The largest turn of an orientation in every chart, at points and ends, (B,)."""
+        """The largest rotation angle in every chart, at points and ends, (B,), in [rad]."""
         points = self.x[0].reshape(len(self.h), -1, self.x.shape[2])
         x = np.concatenate([points, self.ends[:, :1]], axis=1)
         turns = [
@@ -57,7 +57,7 @@ class IntervalCharts:
         return self.compiled(self.scheme.nodal_table).pull_gradient(gradient, False)
 
     def end_gradient(self, gradient: Array) -> Array:
-        """As `nodal_gradient`, by (q0, h v0, q1, h v1) alone and without differences of ends."""
+        """As `nodal_gradient`, in (q0, h v0, q1, h v1) only and without cancellation."""
         return self.compiled(self.scheme.regular_table).pull_gradient(gradient, True)[:, :4]
 
     def point_steps(self, step: Array) -> Array:

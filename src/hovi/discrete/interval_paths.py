@@ -1,6 +1,6 @@
-"""Paths of intervals: what their quadrature points see, and where steps in their columns lead.
+"""Interpolation of discrete paths at quadrature points, and steps in the columns of intervals.
 
-Arrays alone, of any origin; compiled beside what contracts derivatives over the same columns.
+The compiled code works on plain arrays.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ PathArrays = tuple[Array, Array, Array, Array]
 
 
 def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) -> Array:
-    """(q, v, a) at the points of some intervals, where tangent vectors add, shape (3, B Q, n).
+    """(q, v, a) at the points of some intervals, on commutative groups, shape (3, B Q, n).
 
     (q - q0, h v, h^2 a) = table (h v0, h^2 z0, h^2 z1, h^2 inner) at every point.
 
-    table: shape (Q, 3, 3 + r), of no more modes than the path. steps: h of the intervals, (B,).
-    intervals: their numbers, shape (B,).
+    table: shape (Q, 3, 3 + r), with at most as many modes as the path.
+    steps: h of the intervals, (B,). intervals: their numbers, shape (B,).
     """
     q, v, z, inner = path
     out = np.empty((3, len(steps) * len(table), v.shape[1]))
@@ -31,10 +31,10 @@ def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) 
 
 
 def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays:
-    """Change of q in a step, and where it leads v, z and the inner modes.
+    """The change of q in a step, and v, z and the inner modes after it.
 
-    step: in the intervals' columns (q0, h v0, q1, h v1, c) when nodal, else (q0, h v0, Z0, Z1, c),
-        which leave the last node where it is; shape (N, 4 + r, n).
+    step: in the columns (q0, h v0, q1, h v1, c) if nodal, else (q0, h v0, Z0, Z1, c), which do not
+        move the last node; shape (N, 4 + r, n).
     steps: h, shape (N,).
     """
     _, v, z, inner = path
@@ -44,9 +44,9 @@ def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays
 
 
 def misfit(path: PathArrays, steps: Array) -> float:
-    """By how much z fails to be that of q and v, where tangent vectors add.
+    """The largest difference between z and its values from q and v, on commutative groups.
 
-    The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to the largest |q|
-    or to one; not a number where the path has one that is not finite. steps: h, shape (N,).
+    The largest of |q1 - q0 - h v0 - h^2 z0| and |h (v1 - v0 - h z1)|, relative to max(|q|, 1); NaN
+    for a path that is not finite. steps: h, shape (N,).
     """
     return native.misfit(steps, *path)

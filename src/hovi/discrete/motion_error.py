@@ -1,4 +1,4 @@
-"""How far one motion is from another, everywhere along it: the measure behind every error."""
+"""The difference of two motions along their whole duration, from which all errors are derived."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from hovi.robot.robot import Robot
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-LEAST_PLACES = 9
-"""Places of an interval at which two motions are compared, both ends included, at the least."""
+MIN_SAMPLES = 9
+"""Minimum number of sample points per interval, both ends included."""
 
 
 @dataclass(frozen=True, eq=False)
 class MotionError:
-    """The distance of a motion from another one, the largest of each interval.
+    """The largest differences of two motions in each interval.
 
-    cost: |J - J'| / |J'|, of the two costs; 0 where both are 0.
+    cost: |J - J'| / |J'|, of the two costs; 0 if both are 0.
     q, v, tau: of every joint coordinate, shape (N, nv), in [rad], [rad/s] and [N m]; metres and
-        newtons for sliding joints.
+        newtons for prismatic joints.
     tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
-    q_at_nodes, tip_at_nodes: the same at the nodes alone, shape (N + 1, nv) and (N + 1,).
-    sliding: which joint coordinates slide, shape (nv,).
+    q_at_nodes, tip_at_nodes: the same at the nodes, shape (N + 1, nv) and (N + 1,).
+    sliding: which joint coordinates are lengths, shape (nv,).
     """
 
     cost: float
@@ -43,17 +43,17 @@ class MotionError:
 
     @property
     def angle(self) -> float:
-        """The largest of the turning joints, in [rad]; 0 where none turns."""
+        """The largest angle difference, in [rad]; 0 without angles."""
         return float(np.max(self.q[:, ~self.sliding], initial=0.0))
 
     @property
     def slide(self) -> float:
-        """The largest of the sliding joints, in [m]; 0 where none slides."""
+        """The largest difference of lengths, in [m]; 0 without prismatic joints."""
         return float(np.max(self.q[:, self.sliding], initial=0.0))
 
     @property
     def largest_q(self) -> float:
-        """The largest of all joints, in [rad] or [m]."""
+        """The largest of q, in [rad] or [m]."""
         return float(np.max(self.q))
 
     @property
@@ -63,12 +63,12 @@ class MotionError:
 
     @property
     def largest_v(self) -> float:
-        """The largest of all joints, in [rad/s] or [m/s]."""
+        """The largest of v, in [rad/s] or [m/s]."""
         return float(np.max(self.v))
 
     @property
     def largest_tau(self) -> float:
-        """The largest of all joints, in [N m] or [N]."""
+        """The largest of tau, in [N m] or [N]."""
         return float(np.max(self.tau))
 
 
@@ -78,17 +78,17 @@ def deviation(
     costs: tuple[float, float],
     frame: str | None = None,
 ) -> MotionError:
-    """The distance of a motion from a reference of the same duration and scene.
+    """The difference of a motion and a reference of the same duration and scene.
 
-    Both are read by their interpolants at the same places of the motion's intervals, ends
-    included. The reference's grid may be any other.
+    Both interpolants are evaluated at the same sample points of the motion's intervals, ends
+    included. The grid of the reference may be different.
     costs: of the motion and of the reference. frame: by default the robot's tip_frame.
     Raises InputError for another duration, a motion without a scene, or an unknown frame.
     """
     robot = _robot_of(trajectory, reference)
     name = robot.tip_frame if frame is None else frame
-    k, s = places(trajectory)
-    one, other = trajectory.sample_intervals(k, s), _at_places(reference, trajectory, k, s)
+    k, s = sample_points(trajectory)
+    one, other = trajectory.sample_intervals(k, s), _at_samples(reference, trajectory, k, s)
     tips = [robot.frame_position(name, q) for q in (one.q, other.q)]
     tip = np.linalg.norm(tips[0] - tips[1], axis=1)
     q = np.abs(robot.difference(other.q, one.q))
@@ -106,23 +106,23 @@ def deviation(
 
 
 def relative_difference(value: float, reference: float) -> float:
-    """|value - reference| / |reference|; 0 where both are 0."""
+    """|value - reference| / |reference|; 0 if both are 0."""
     difference = abs(value - reference)
     return 0.0 if difference == 0 else difference / max(abs(reference), np.finfo(float).tiny)
 
 
-def places(trajectory: Trajectory) -> tuple[Index, Array]:
-    """Intervals and places in [0, 1] that a comparison looks at: Chebyshev points, ends included.
+def sample_points(trajectory: Trajectory) -> tuple[Index, Array]:
+    """Sample points of a comparison: intervals and Chebyshev points in [0, 1], ends included.
 
-    All intervals have as many as the most flexible scheme needs.
+    Their number per interval depends on the largest number of inner modes.
     """
-    count = max(LEAST_PLACES, 2 * trajectory.grid.inner_modes + 7)
+    count = max(MIN_SAMPLES, 2 * trajectory.grid.inner_modes + 7)
     N = trajectory.grid.intervals
     return np.repeat(np.arange(N), count), np.tile(chebyshev_points(count), N)
 
 
-def _at_places(reference: Trajectory, trajectory: Trajectory, k: Index, s: Array) -> Sample:
-    """The reference at places of the other motion's intervals."""
+def _at_samples(reference: Trajectory, trajectory: Trajectory, k: Index, s: Array) -> Sample:
+    """The reference at sample points of the other motion's intervals."""
     if np.array_equal(reference.grid.steps, trajectory.grid.steps):
         return reference.sample_intervals(k, s)
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
@@ -130,24 +130,24 @@ def _at_places(reference: Trajectory, trajectory: Trajectory, k: Index, s: Array
 
 
 def _by_interval(trajectory: Trajectory, errors: Array) -> Array:
-    """The largest of each interval from values at its places."""
+    """The largest value in each interval."""
     N = trajectory.grid.intervals
     return np.asarray(errors.reshape(N, -1, *errors.shape[1:]).max(axis=1))
 
 
 def _at_nodes(trajectory: Trajectory, errors: Array) -> Array:
-    """The values at the nodes from values at the places."""
-    by_place = errors.reshape(trajectory.grid.intervals, -1, *errors.shape[1:])
-    return np.concatenate([by_place[:, 0], by_place[-1:, -1]])
+    """The values at the nodes."""
+    by_sample = errors.reshape(trajectory.grid.intervals, -1, *errors.shape[1:])
+    return np.concatenate([by_sample[:, 0], by_sample[-1:, -1]])
 
 
 def _robot_of(trajectory: Trajectory, reference: Trajectory) -> Robot:
     robot = trajectory.robot
     if robot is None or reference.robot is None:
-        raise InputError("motions are compared with their scenes; this one was saved without it.")
+        raise InputError("comparing motions needs their scenes; one of these was saved without.")
     if abs(trajectory.duration - reference.duration) > 1e-9 * reference.duration:
         raise InputError(
-            f"motions of the same duration are compared, not {trajectory.duration:g} s with "
-            f"{reference.duration:g} s."
+            f"only motions of the same duration can be compared, not {trajectory.duration:g} s "
+            f"with {reference.duration:g} s."
         )
     return robot

@@ -1,4 +1,4 @@
-"""Momenta of a stationary motion, carried from node to node instead of evaluated at each."""
+"""Momenta of a stationary motion, accumulated along the nodes."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from hovi._native import intervals as native
 Array = npt.NDArray[np.float64]
 
 ROUNDING = 1e-13
-"""Relative error over h/T of a momentum that is evaluated from a motion."""
+"""Relative rounding error, times h/T, of a momentum evaluated at a node."""
 
 
-def carried_momenta(derivatives: Array) -> Array:
+def accumulated_momenta(derivatives: Array) -> Array:
     """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv), p by its increments.
 
     p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k, and D3 L_d, D4 L_d of
-    the last. Evaluated so, p has an error like eps/h. Where the discrete Euler-Lagrange equations
-    hold it is the sum of p_{k+1} - p_k = D1 L_d + D3 L_d as well, in which nothing cancels: the
-    mean of what is evaluated, plus that sum, is right to eps.
+    the last. Evaluated directly, p has an error like eps/h. If the discrete Euler-Lagrange
+    equations hold, p_{k+1} - p_k = D1 L_d + D3 L_d without cancellation: the prefix sums of these
+    increments plus the mean of the evaluated p are accurate to eps.
     [ColomboFerraroMartin2016, corollary to theorem 2]
 
-    derivatives: D1 .. D4 of every L_d, shape (N, 4, nv). Where p jumps at nodes, or the motion is
-        not stationary to rounding, the evaluated p is returned.
+    derivatives: D1 .. D4 of every L_d, shape (N, 4, nv). If p jumps at nodes, or the motion is not
+        stationary to rounding, the evaluated p is returned.
     """
     N = len(derivatives)
     momenta = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])

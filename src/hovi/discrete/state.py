@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 ALL = "all"
-"""Stands for every joint where joints are named."""
+"""Stands for all joints in a list of joint names."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,13 +23,13 @@ class State:
     """A point (q, v) of TQ: where a motion starts or ends.
 
     q: configuration, shape (nq,), in [rad] or [m].
-    v: velocity, shape (nv,), per [s]; zero when not given.
-    free, free_velocity: joints whose configuration or velocity is left to the optimiser, by name;
-        what q and v say of them is the first guess. ALL stands for every joint, "joint[i]" for one
-        coordinate: 0 to 2 of a free base move its place along its own axes, 3 to 5 turn it.
-    turns: of a goal, full turns that the first guess makes on top of the shortest way, by joint: a
-        whole number where one coordinate turns, a rotation vector in the body's axes whose length
-        is a whole number for orientations.
+    v: velocity, shape (nv,), per [s]; zero by default.
+    free, free_velocity: joints whose configuration or velocity is optimized, by name; q and v are
+        the initial guess. ALL stands for all joints, "joint[i]" for one coordinate: 0 to 2 of a
+        floating base translate it along its own axes, 3 to 5 rotate it.
+    turns: of a goal, full turns of the initial guess in addition to the shortest path, by joint: an
+        integer for one angle, for orientations a rotation vector in the body frame whose length is
+        an integer.
     Raises InputError for turns that are not given by joint.
     """
 
@@ -50,10 +50,10 @@ class State:
             )
 
     def on(self, robot: Robot, name: str) -> tuple[Array, Array]:
-        """q and v as arrays that fit the robot.
+        """q and v as checked arrays.
 
-        name: what the state is called in an error, "start" for instance.
-        Raises InputError when the shapes do not fit or a number is not finite.
+        name: of the state in messages, such as "start".
+        Raises InputError for wrong shapes and numbers that are not finite.
         """
         q = robot.check_configuration(self.q, name)
         v = np.zeros(robot.nv) if self.v is None else self.v
@@ -62,11 +62,11 @@ class State:
     def free_on(self, robot: Robot, name: str) -> Mask:
         """Which components of q (in the tangent space) and of v are free, shape (2, nv).
 
-        Raises InputError for a joint that the robot does not have, or for parts of a joint's
-        configuration that cannot be free alone.
+        Raises InputError for an unknown joint, and for parts of a joint's configuration that cannot
+        be free by themselves.
         """
         rows = [
-            _places(robot, name, key, joints)
+            _chosen_coordinates(robot, name, key, joints)
             for key, joints in (("free", self.free), ("free_velocity", self.free_velocity))
         ]
         for factor in robot.space.factors:
@@ -76,50 +76,51 @@ class State:
     def turns_on(self, robot: Robot, name: str) -> Array:
         """Rotation vectors over 2 pi in the tangent space, shape (nv,).
 
-        Raises InputError for a joint that makes no full turns, or turns that are not full.
+        Raises InputError for a joint without full turns, or turns that are not integers.
         """
         full = np.zeros(robot.nv)
         for joint, turns in self.turns.items():
-            places = _turning_places(robot, name, joint)
+            indices = _rotation_indices(robot, name, joint)
             given = np.atleast_1d(np.asarray(turns, dtype=np.float64))
             size = float(np.linalg.norm(given)) if np.isfinite(given).all() else 0.5
-            if given.shape != (len(places),) or abs(size - round(size)) > 1e-9:
-                wanted = "a whole number" if len(places) == 1 else "three numbers of whole length"
-                raise InputError(f"{name}.turns: {joint!r} takes {wanted}, got {turns!r}.")
-            full[places] = given
+            if given.shape != (len(indices),) or abs(size - round(size)) > 1e-9:
+                expected = "an integer" if len(indices) == 1 else "a vector of integer length"
+                raise InputError(f"{name}.turns: {joint!r} takes {expected}, got {turns!r}.")
+            full[indices] = given
         return full
 
 
 def _check_part(robot: Robot, state: str, first: int, free: Mask, angular: Sequence[int]) -> None:
-    """Refuse free parts of a configuration that would not stay parts when it moves.
+    """Raise InputError for free parts of a configuration that are not invariant under motion.
 
-    Places can be free, one turn, all turns, or all: others bend into what is held.
+    The position, one rotation, all rotations or everything can be free; other parts are coupled to
+    fixed coordinates.
     """
     turns = free[list(angular)]
-    places = np.delete(free, list(angular))
-    if turns.any() and not free.all() and (places.any() or 1 < turns.sum() < len(turns)):
+    linear = np.delete(free, list(angular))
+    if turns.any() and not free.all() and (linear.any() or 1 < turns.sum() < len(turns)):
         raise InputError(
-            f"{state}.free: of joint {robot.joint_at(first)!r} the place, one turn, all turns or "
-            "everything can be free, not other parts."
+            f"{state}.free: of joint {robot.joint_at(first)!r} only the position, one rotation, "
+            "all rotations or everything can be free."
         )
 
 
-def _turning_places(robot: Robot, state: str, joint: str) -> list[int]:
-    """Places in v of the rotation of a joint that can make full turns."""
-    turning = {}
+def _rotation_indices(robot: Robot, state: str, joint: str) -> list[int]:
+    """Indices in v of the rotation of a joint that can make full turns."""
+    rotations = {}
     for factor in robot.space.factors:
         name = robot.joint_at(factor.v.start)
-        turning[name] = [factor.v.start + i for i in factor.group.angular]
-    if joint not in turning:
-        known = nearest(str(joint), turning) if turning else "it has none."
+        rotations[name] = [factor.v.start + i for i in factor.group.angular]
+    if joint not in rotations:
+        known = nearest(str(joint), rotations) if rotations else "it has none."
         raise InputError(
-            f"{state}.turns: robot {robot.name!r} has no joint {joint!r} that makes full turns and "
-            f"comes back: {known}"
+            f"{state}.turns: robot {robot.name!r} has no joint {joint!r} that can make full turns: "
+            f"{known}"
         )
-    return turning[joint]
+    return rotations[joint]
 
 
-def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
+def _chosen_coordinates(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
     chosen = np.zeros(robot.nv, dtype=bool)
     for joint in joints:
         if joint == ALL:
@@ -130,15 +131,15 @@ def _places(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
         if joint not in robot.joint_names:
             hint = robot.hint(str(joint), (*robot.joint_names, ALL))
             raise InputError(f"{state}.{key}: robot {robot.name!r} has no joint {joint!r}: {hint}")
-        place = robot.model.joints[robot.model.getJointId(joint)]
-        chosen[place.idx_v : place.idx_v + place.nv] = True
+        member = robot.model.joints[robot.model.getJointId(joint)]
+        chosen[member.idx_v : member.idx_v + member.nv] = True
     return chosen
 
 
 def as_state(state: State | npt.ArrayLike | str, robot: Robot) -> State:
-    """A configuration at rest, or the name of a pose of the robot, as a State; a State as it is.
+    """A configuration at rest or the name of a pose of the robot as a State; a State unchanged.
 
-    Raises InputError for a pose that the robot does not have.
+    Raises InputError for an unknown pose.
     """
     if isinstance(state, str):
         return State(robot.pose(state))

@@ -1,8 +1,8 @@
-"""Torques kept as numbers: Chebyshev interpolants, one per interval.
+"""Stored torques: Chebyshev interpolants, one per interval.
 
-A robot that was given as a bare Pinocchio model has no text that a file could hold, so a
-trajectory file holds its torques. Within an interval tau(s) is smooth, and its interpolant at
-Chebyshev points converges geometrically; the ends are points, so jumps at nodes stay jumps.
+A robot given as a Pinocchio model cannot be stored, so a trajectory file stores its torques. Within
+an interval tau(s) is smooth, and its interpolant at Chebyshev points converges geometrically; the
+ends are among the points, so jumps at nodes are reproduced.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class StoredTorque:
     values: Array
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be interpolated."""
+        """Raise InputError for values that cannot be interpolated."""
         if self.values.ndim != 3 or self.values.shape[1] < 2:
             raise InputError(
                 f"stored torques need the shape (intervals, 2 or more points, nv), "
@@ -43,20 +43,20 @@ class StoredTorque:
     def fit(cls, torque: Callable[[Index, Array], Array], intervals: int) -> StoredTorque:
         """Sample torque(k, s) until the interpolant between the samples agrees with it.
 
-        torque: interval numbers k (M,) and places s (M,) in [0, 1] -> tau (M, nv).
+        torque: interval numbers k (M,) and positions s (M,) in [0, 1] -> tau (M, nv).
         intervals: N.
         """
         for count in _COUNTS:
             fitted = cls(_sample(torque, intervals, chebyshev_points(count)))
             between = 0.5 * (chebyshev_points(count)[1:] + chebyshev_points(count)[:-1])
-            wanted = _sample(torque, intervals, between)
+            expected = _sample(torque, intervals, between)
             got = _sample(fitted, intervals, between)
-            if np.abs(got - wanted).max() <= _TOLERANCE * max(np.abs(wanted).max(), 1e-300):
+            if np.abs(got - expected).max() <= _TOLERANCE * max(np.abs(expected).max(), 1e-300):
                 break
         return fitted
 
     def __call__(self, k: Index, s: Array) -> Array:
-        """tau (M, nv) at the places s (M,) in [0, 1] of the intervals k (M,).
+        """tau (M, nv) at the positions s (M,) in [0, 1] of the intervals k (M,).
 
         Barycentric formula of the second kind [BerrutTrefethen2004, eq. (4.2)].
         """
@@ -73,7 +73,7 @@ class StoredTorque:
 
 
 def chebyshev_points(count: int) -> Array:
-    """Chebyshev points of the second kind on [0, 1], ascending, both ends exact, shape (count,)."""
+    """Chebyshev points of the second kind on [0, 1], ascending, with exact ends, shape (count,)."""
     points: Array = np.sin(0.5 * np.pi * np.arange(count) / (count - 1)) ** 2
     points[-1] = 1.0
     return points

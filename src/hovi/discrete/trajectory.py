@@ -1,4 +1,4 @@
-"""A motion: the numbers of the discrete path, the scene they belong to, and how to read between."""
+"""A motion: the discrete path, its scene, interpolation and files."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ class Sample(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A motion of a scene's robot on a grid, with the costates that came with it.
+    """A motion of a scene's robot on a grid, with its costates.
 
     grid: the intervals, each with its step and scheme.
     path: nodes, regularized coordinates and inner modes.
     momenta: p and p~ at the nodes, shape (N + 1, 2, nv).
-    scene: what moves; None for a robot that was a bare Pinocchio model, after loading.
-    metadata: what JSON can hold about the origin (cost, status, versions), without wall times.
-    torque: torques by interval where there is no scene to compute them.
+    scene: None for a loaded motion of a robot that was given as a Pinocchio model.
+    metadata: JSON-compatible data about the origin (cost, status, versions), without wall times.
+    torque: torques by interval if there is no scene to compute them.
     """
 
     grid: Grid
@@ -70,14 +70,14 @@ class Trajectory:
     torque: StoredTorque | None = None
 
     def __post_init__(self) -> None:
-        """Refuse arrays that do not fit the grid and the robot."""
+        """Raise InputError for arrays that do not match the grid and the robot."""
         _check_shapes(self)
         if self.scene is None and self.torque is None:
             raise InputError("a trajectory needs a scene, or the torques themselves.")
 
     @property
     def robot(self) -> Robot | None:
-        """The scene's robot; None where there is no scene."""
+        """The scene's robot; None without a scene."""
         return None if self.scene is None else self.scene.robot
 
     @property
@@ -102,7 +102,7 @@ class Trajectory:
 
     @cached_property
     def space(self) -> ConfigurationSpace | None:
-        """The configuration space; None where configurations are vectors."""
+        """The configuration space; None if it is a vector space."""
         if self.scene is not None:
             return self.scene.robot.curved_space
         parts = self.metadata.get("space")
@@ -110,37 +110,37 @@ class Trajectory:
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
-        """A name per velocity coordinate: the joint's, with an index where a joint has several."""
+        """A name per velocity coordinate: that of the joint, with an index if it has several."""
         if self.scene is not None:
             return tuple(self.scene.robot.coordinate_names)
         nv = self.path.v.shape[1]
         return tuple(self.metadata.get("coordinates") or (f"joint{i}" for i in range(nv)))
 
     def sample(self, t: npt.ArrayLike) -> Sample:
-        """q, v, a and tau by the scheme's own interpolant (cubic Hermite where it has none).
+        """q, v, a and tau by the scheme's own interpolant (cubic Hermite if it has none).
 
-        t: times in [0, T], shape (M,) or one number, in any order, in [s]. Accelerations and
-            torques may jump at a node: the limit from the right is taken, from the left at T.
-        Raises InputError when a time is outside the motion.
+        t: times in [0, T], shape (M,) or scalar, in any order, in [s]. Where accelerations and
+            torques jump at a node, the limit from the right is returned; at T, from the left.
+        Raises InputError for a time outside the motion.
         """
         return self.sample_intervals(*self._locate(t))
 
     def configurations(self, t: npt.ArrayLike) -> Array:
-        """q alone, shape (M, nq), as `sample` gives it: cheap, since no torque is computed."""
+        """q of `sample`, shape (M, nq), without computing torques."""
         return self._interpolate(*self._locate(t))[0]
 
     def jet(self, t: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """q, v and a as `sample` gives them, without torques."""
+        """q, v and a of `sample`, without computing torques."""
         return self._interpolate(*self._locate(t))
 
     def jet_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """q, v and a as `sample_intervals` gives them, without torques."""
+        """q, v and a of `sample_intervals`, without computing torques."""
         return self._interpolate(np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64))
 
     def sample_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> Sample:
-        """q, v, a and tau in given intervals, both limits at a node within reach.
+        """q, v, a and tau in given intervals, so that both limits at a node are available.
 
-        k: numbers of intervals, shape (M,). s: places in [0, 1] of the interval, shape (M,).
+        k: interval numbers, shape (M,). s: positions in [0, 1] in the interval, shape (M,).
         """
         k, s = np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64)
         q, v, a = self._interpolate(k, s)
@@ -151,15 +151,15 @@ class Trajectory:
         return Sample(q, v, a, self.scene.inverse_dynamics(q, v, a, t))
 
     def _locate(self, t: npt.ArrayLike) -> tuple[Index, Array]:
-        """The interval of each time, and the place in [0, 1] within it."""
+        """The interval of each time, and the position in [0, 1] within it."""
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # the nodes' times are sums of so many steps
+        # rounding of the sums of steps
         slack = (4 + self.grid.intervals) * np.finfo(float).eps * self.duration
         if times.ndim != 1 or not np.isfinite(times).all():
             raise InputError(f"times must be finite and of shape (M,), not {times.shape}.")
         if times.size and not (-slack <= times.min() and times.max() <= self.duration + slack):
             raise InputError(
-                f"the motion lasts from 0 to {self.duration:.17g} s, and a sample was asked at "
+                f"the motion lasts from 0 to {self.duration:.17g} s, but a sample was requested at "
                 f"{times.min() if times.min() < -slack else times.max():.17g} s."
             )
         nodes = self.t
@@ -186,11 +186,11 @@ class Trajectory:
         return Chart(self.space).jet(path.q[k], x, dx, ddx)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion to one npz file, whole or not at all, the same bytes every time.
+        """Write the motion to one npz file, atomically and with reproducible bytes.
 
-        The scene goes with it, the robot's URDF text included; for a robot that was given as a
-        Pinocchio model, which has no text, the torques go instead.
-        path: the file, by custom `*.npz`. Raises TrajectoryFileError.
+        The file contains the scene with the text of the URDF; for a robot given as a Pinocchio
+        model it contains the torques instead.
+        path: the file, usually `*.npz`. Raises TrajectoryFileError.
         """
         for scheme, _ in self.grid.groups:
             _check_name(scheme)
@@ -221,9 +221,9 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote. Nothing in the file is believed before it is checked.
+        """Read a file of `save`; everything in it is checked.
 
-        Raises TrajectoryFileError in one sentence that says what is wrong with the file.
+        Raises TrajectoryFileError with one sentence about what is wrong with the file.
         """
         header, arrays = read_arrays(path, _ARRAYS, optional=[_TORQUE])
         try:
@@ -250,7 +250,7 @@ class Trajectory:
             ) from error
         except (HoviError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise TrajectoryFileError(
-                f"trajectory file {Path(path).name!r} does not fit together: {error}"
+                f"trajectory file {Path(path).name!r} is inconsistent: {error}"
             ) from error
 
     def _names(self) -> list[str]:
@@ -268,7 +268,7 @@ def _check_shapes(trajectory: Trajectory) -> None:
     path, grid = trajectory.path, trajectory.grid
     N, nv = grid.intervals, path.v.shape[-1]
     nq = path.q.shape[-1] if trajectory.scene is None else trajectory.scene.robot.nq
-    wanted = {
+    expected = {
         "q": (path.q, (N + 1, nq)),
         "v": (path.v, (N + 1, nv if trajectory.scene is None else trajectory.scene.robot.nv)),
         "z": (path.z, (N, 2, nv)),
@@ -276,8 +276,8 @@ def _check_shapes(trajectory: Trajectory) -> None:
     }
     if trajectory.torque is not None:
         points = trajectory.torque.values.shape[1]
-        wanted["tau"] = (trajectory.torque.values, (N, points, nv))
-    for name, (array, shape) in wanted.items():
+        expected["tau"] = (trajectory.torque.values, (N, points, nv))
+    for name, (array, shape) in expected.items():
         if array.shape != shape:
             raise InputError(f"{name} has shape {array.shape}; the grid and robot need {shape}.")
     inner = path.inner.shape
@@ -291,20 +291,20 @@ def _check_shapes(trajectory: Trajectory) -> None:
 
 
 def _check_name(scheme: Scheme) -> None:
-    """Refuse a scheme whose name would bring back another table, or none."""
+    """Raise TrajectoryFileError for a scheme that cannot be restored from its name."""
     try:
         same = np.array_equal(by_name(scheme.name).table, scheme.table)
     except HoviError:
         same = False
     if not same:
         raise TrajectoryFileError(
-            f"the scheme {scheme.name!r} is not one that a file can name; "
-            "use one of those of hovi.schemes.by_name."
+            f"the scheme {scheme.name!r} cannot be restored from its name; "
+            "use a scheme of hovi.schemes.by_name."
         )
 
 
 def _schemes(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
-    """One scheme per interval from [name, count] pairs; `inner` bounds what may be built."""
+    """One scheme per interval from [name, count] pairs; `inner` is the shape of the inner modes."""
     if not isinstance(runs, list) or not all(isinstance(run, list) for run in runs):
         raise InputError("the schemes are not a list of [name, count]")
     schemes: list[Scheme] = []
@@ -324,7 +324,7 @@ def _scene(description: Any, sha256: Any) -> Scene | None:
     if description is None:
         return None
     if _digest(description) != sha256:
-        raise InputError("the SHA-256 of its scene is not the one written beside it")
+        raise InputError("its scene does not match the stored SHA-256")
     return Scene.from_dict(description)
 
 
@@ -332,7 +332,7 @@ def _check_coordinates(names: Any, shape: tuple[int, ...]) -> None:
     if not isinstance(names, list) or len(names) != shape[-1]:
         raise InputError(f"{shape[-1]} names of coordinates are needed")
     if not all(isinstance(name, str) for name in names):
-        raise InputError("the names of the coordinates are not all text")
+        raise InputError("the names of the coordinates are not all strings")
 
 
 def _digest(description: Any) -> str:
@@ -341,7 +341,7 @@ def _digest(description: Any) -> str:
 
 
 def _versions() -> dict[str, str]:
-    """What made the motion: versions of hovi and of what it computes with."""
+    """Versions of hovi and the libraries that computed the motion."""
     versions = {}
     for name in ("hovi", "pin", "casadi"):
         try:

@@ -1,9 +1,9 @@
-"""The container of a trajectory: arrays of doubles and one JSON header in an npz file.
+"""The file format of trajectories: arrays of doubles and one JSON header in an npz file.
 
-The file is a plain npz that `numpy.load(path, allow_pickle=False)` opens too. It is written
-without compression and with fixed time stamps, so that the same motion gives the same bytes on
-every machine. Reading trusts nothing: sizes are checked before memory is asked for, and no
-pickle is ever decoded.
+The file is a plain npz that `numpy.load(path, allow_pickle=False)` reads. It is written without
+compression and with fixed time stamps, so that the same motion gives the same bytes on every
+machine. Files are untrusted input: sizes are checked before memory is allocated, and pickles are
+never decoded.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ VERSION = 1
 MAX_BYTES = 2**30
 MAX_HEADER_BYTES = 2**26
 MAX_HEADER_PARTS = 2_000_000
-"""Lists, tables and their entries: as Python objects they take thirty times their size."""
+"""Maximum number of lists, tables and entries, which take thirty times their size in memory."""
 MAX_EXPANSION = 50
-"""How much larger an unpacked file may be; doubles that mean something shrink by less."""
-_MARGIN = 2**16  # what zip and npy put around the data
+"""Maximum ratio of unpacked to packed size; real data compresses less."""
+_MARGIN = 2**16  # overhead of zip and npy
 _HEADER = "header"
 _DOUBLES = np.dtype("<f8")
 _BYTES = np.dtype("u1")
@@ -42,31 +42,31 @@ _BYTES = np.dtype("u1")
 def write_arrays(
     path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, Array]
 ) -> None:
-    """Write a header and named arrays to one npz, whole or not at all, the same bytes every time.
+    """Write a header and named arrays to one npz, atomically and with reproducible bytes.
 
     path: the file; an existing one is replaced.
-    header: what JSON can hold.
+    header: JSON-compatible data.
     arrays: finite doubles of any shape, by name.
     Raises TrajectoryFileError.
     """
     entries = {_HEADER: _encode_header(header)}
     if entries[_HEADER].nbytes > MAX_HEADER_BYTES:
         raise TrajectoryFileError(
-            f"the scene and metadata take {entries[_HEADER].nbytes} bytes, and a trajectory file "
-            f"holds at most {MAX_HEADER_BYTES} of them."
+            f"the scene and metadata take {entries[_HEADER].nbytes} bytes, but a trajectory file "
+            f"can have at most {MAX_HEADER_BYTES}."
         )
     entries |= {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
     size = sum(entry.nbytes for entry in entries.values())
     if size > MAX_BYTES:
         raise TrajectoryFileError(
-            f"this trajectory takes {size} bytes, and a trajectory file holds at most {MAX_BYTES}."
+            f"this trajectory takes {size} bytes, but a file can have at most {MAX_BYTES}."
         )
     try:
         with whole_file(path) as stream, zipfile.ZipFile(stream, "w") as archive:
             for name, entry in entries.items():
                 info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
                 info.external_attr = 0o644 << 16
-                info.create_system = 3  # the default differs between Windows and the rest
+                info.create_system = 3  # the default depends on the operating system
                 with archive.open(info, "w") as member:
                     np.lib.format.write_array(member, entry, version=(1, 0), allow_pickle=False)
     except OSError as error:
@@ -78,9 +78,9 @@ def read_arrays(
 ) -> tuple[dict[str, Any], dict[str, Array]]:
     """Read the header and the named arrays of a trajectory file.
 
-    names: the arrays that must be there; optional: those that may be missing.
-    Returns the header and the arrays, doubles and finite, of whatever shape the file says.
-    Raises TrajectoryFileError in one sentence that says what is wrong with the file.
+    names: required arrays. optional: further arrays that are read if present.
+    Returns the header and the arrays, finite doubles of any shape.
+    Raises TrajectoryFileError with one sentence about what is wrong with the file.
     """
     label = f"trajectory file {Path(path).name!r}"
     try:
@@ -88,12 +88,12 @@ def read_arrays(
         with zipfile.ZipFile(path) as archive:
             members = {info.filename: info for info in archive.infolist()}
             if len(members) < len(archive.infolist()):
-                raise ValueError("an entry is there twice")
-            wanted = [_HEADER, *names]
-            wanted += [name for name in optional if f"{name}.npy" in members]
-            _check_members(members, wanted, label)
-            _check_expansion(members, wanted, Path(path).stat().st_size, label)
-            raw = {name: archive.read(members[f"{name}.npy"]) for name in wanted}
+                raise ValueError("an entry occurs twice")
+            entry_names = [_HEADER, *names]
+            entry_names += [name for name in optional if f"{name}.npy" in members]
+            _check_members(members, entry_names, label)
+            _check_expansion(members, entry_names, Path(path).stat().st_size, label)
+            raw = {name: archive.read(members[f"{name}.npy"]) for name in entry_names}
     except TrajectoryFileError:
         raise
     except FileNotFoundError as error:
@@ -101,8 +101,8 @@ def read_arrays(
     except OSError as error:
         raise TrajectoryFileError(f"cannot read {label}: {reason(error)}.") from error
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
-        raise TrajectoryFileError(f"{label} is not a whole npz file: {error}.") from error
-    except Exception as error:  # zlib.error and the like: each compression has its own
+        raise TrajectoryFileError(f"{label} is not a complete npz file: {error}.") from error
+    except Exception as error:  # such as zlib.error: each compression has its own
         raise TrajectoryFileError(f"{label} is damaged: {error}.") from error
     header = _decode_header(_decode_array(raw.pop(_HEADER), _BYTES, f"{label}, header"), label)
     return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
@@ -128,7 +128,7 @@ def _check_expansion(
     size = sum(members[f"{name}.npy"].file_size for name in names)
     if size > MAX_EXPANSION * packed + 10_000_000:
         raise TrajectoryFileError(
-            f"{label} has {packed} bytes and would unpack to {size}: no motion shrinks like that."
+            f"{label} has {packed} bytes and would unpack to {size}: this is not a motion."
         )
 
 
@@ -145,7 +145,7 @@ def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
     text = data.tobytes()
     if sum(map(text.count, (b"[", b"{", b","))) > MAX_HEADER_PARTS:
         raise TrajectoryFileError(
-            f"{label} has a header of more than {MAX_HEADER_PARTS:,} parts, the most accepted."
+            f"{label} has a header of more than {MAX_HEADER_PARTS:,} parts, the maximum."
         )
     try:
         header = json.loads(text, parse_float=_finite, parse_constant=_finite)
@@ -155,14 +155,14 @@ def _decode_header(data: npt.NDArray[Any], label: str) -> dict[str, Any]:
         raise TrajectoryFileError(f"{label} is not a hovi trajectory.")
     if header.get("version") != VERSION:
         raise TrajectoryFileError(
-            f"{label} has format version {header.get('version')!r}, and this hovi reads "
+            f"{label} has format version {header.get('version')!r}, but this version of hovi reads "
             f"version {VERSION}."
         )
     return header
 
 
 def _finite(text: str) -> float:
-    """A number of JSON; Python's reader would take NaN, and 1e999 for infinity."""
+    """A finite number; Python's JSON parser accepts NaN, and reads 1e999 as infinity."""
     number = float(text)
     if not math.isfinite(number):
         raise ValueError(f"{text[:40]} is not a finite number")
@@ -170,7 +170,7 @@ def _finite(text: str) -> float:
 
 
 def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[Any]:
-    """One npy entry. numpy.load would allocate what the entry's header claims before looking."""
+    """Decode one npy entry. numpy.load would allocate the size in its header before checking it."""
     stream = io.BytesIO(raw)
     try:
         if np.lib.format.read_magic(stream) != (1, 0):

@@ -1,7 +1,7 @@
-"""Loads the compiled part that needs the libraries of others, and hands it models it can read.
+"""Loads the compiled extension that links to CasADi and Pinocchio, and serializes models for it.
 
-`casadi` and `pinocchio` are imported before it, because its shared libraries are theirs and are
-found by name once they are in the process.
+`casadi` and `pinocchio` are imported first, since the extension uses their shared libraries, which
+are found by name once they are loaded.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from hovi.errors import HoviError
 
 
 class BuildMismatchError(HoviError):
-    """The compiled extension does not fit the libraries that are installed."""
+    """The compiled extension does not match the installed libraries."""
 
 
 try:
@@ -32,7 +32,7 @@ __all__ = ["BuildMismatchError", "SymbolicModel", "archive"]
 def archive(model: pin.Model) -> str:
     """Pinocchio's text archive of a model, which only the same version of Pinocchio can read.
 
-    Raises BuildMismatchError when the extension was compiled against another version.
+    Raises BuildMismatchError if the extension was compiled with another version.
     """
     check_version(pin.__version__, pinocchio_version)
     text: str = model.saveToString()
@@ -40,7 +40,7 @@ def archive(model: pin.Model) -> str:
 
 
 def check_version(installed: str, compiled: str) -> None:
-    """Raises BuildMismatchError unless both versions of Pinocchio are the same."""
+    """Raise BuildMismatchError unless both versions of Pinocchio are the same."""
     if installed != compiled:
         raise BuildMismatchError(
             f"hovi was compiled against pin {compiled}, but pin {installed} is installed: run "

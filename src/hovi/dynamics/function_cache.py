@@ -1,7 +1,7 @@
-"""CasADi functions in machine code: C, compiled once and kept in the user's own cache folder.
+"""Compiles CasADi functions to C libraries, cached in the user's own cache folder.
 
-The folder is `hovi/compiled` in $XDG_CACHE_HOME or ~/.cache. A library's name is the SHA-256 of
-what it was made from, and its own SHA-256 stands beside it and is checked before it is loaded.
+The folder is `hovi/compiled` in $XDG_CACHE_HOME or ~/.cache. The name of a library is the SHA-256
+of its source and compiler, and its own SHA-256 is stored beside it and checked before it is loaded.
 No library is loaded from anywhere else, nor while another user could write to the folder.
 """
 
@@ -25,51 +25,51 @@ from hovi.version import __version__
 
 COMPILERS = ("cc", "gcc")
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-s")
-"""No fused multiplications, so that the results are the interpreter's; -O2 takes longer to
-compile and gains nothing."""
+"""Without fused multiply-add, so that results equal the interpreter's; -O2 takes longer to compile
+and is not faster."""
 
 _OTHERWISE = "or leave compile=False."
 
 
 class CompilationError(HoviError):
-    """A function cannot be compiled, or its library cannot be kept in a safe place."""
+    """A function cannot be compiled, or its library cannot be stored safely."""
 
 
 def compiled(function: ca.Function) -> ca.Function:
     """The same function as compiled C code.
 
-    function: of expressions only, no solvers or callbacks in it.
-    Raises CompilationError where there is no C compiler, or no folder that is safe to load from.
+    function: made of expressions only, without solvers or callbacks.
+    Raises CompilationError without a C compiler or a folder that is safe to load from.
     """
     code = c_code(function)
     folder = library_folder()
-    made_from = _digest(code, *FLAGS, ca.CasadiMeta.version(), __version__, *_platform())
+    source_hash = _digest(code, *FLAGS, ca.CasadiMeta.version(), __version__, *_platform())
     compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
     if compiler is None:
-        library = next(filter(_is_intact, sorted(folder.glob(f"{made_from}-*.so"))), None)
+        library = next(filter(_is_intact, sorted(folder.glob(f"{source_hash}-*.so"))), None)
         if library is None:
             raise CompilationError(
                 f"compile=True needs a C compiler named {' or '.join(COMPILERS)}, and PATH has "
                 f"none: install one, {_OTHERWISE}"
             )
         return _load(function.name(), library)
-    library = folder / f"{made_from}-{_digest(_identity(compiler))}.so"
+    library = folder / f"{source_hash}-{_digest(_identity(compiler))}.so"
     if not _is_intact(library):
         _build(compiler, function.name(), code, library)
     return _load(function.name(), library)
 
 
 def c_code(function: ca.Function) -> str:
-    """The function as C, the same text in every process."""
+    """The function as C code, identical in every process."""
     generator = ca.CodeGenerator("function.c", {"with_header": False})
     generator.add(function)
     return str(generator.dump())
 
 
 def library_folder() -> Path:
-    """The folder of the compiled libraries, made with mode 0700 if need be.
+    """The folder of the compiled libraries, created with mode 0700 if necessary.
 
-    Raises CompilationError when it, or the folder that holds it, could be changed by others.
+    Raises CompilationError if others can write to it or to its parent folder.
     """
     home = _cache_home()
     try:
@@ -91,7 +91,7 @@ def library_folder() -> Path:
 
 
 def _cache_home() -> Path:
-    """$XDG_CACHE_HOME, which has to be absolute to count, or ~/.cache."""
+    """$XDG_CACHE_HOME if that is an absolute path, else ~/.cache."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named
@@ -105,7 +105,7 @@ def _cache_home() -> Path:
 
 
 def _require_own(folder: Path) -> None:
-    """Make a folder, or make sure of one that is there."""
+    """Create a folder, or raise CompilationError if an existing one is unsafe."""
     try:
         folder.mkdir(mode=0o700)
     except FileExistsError:
@@ -131,12 +131,12 @@ def _platform() -> tuple[str, ...]:
 
 @functools.cache
 def _identity(compiler: str) -> str:
-    """What a compiler says of its version and of the machine that it compiles for."""
+    """Version and target machine that a compiler reports."""
     return "\n".join(_run(o, [compiler, o]) for o in ("--version", "-dumpmachine"))
 
 
 def _build(compiler: str, name: str, code: str, library: Path) -> None:
-    """Compile where nobody else can write, then move the library and its hash into place."""
+    """Compile in a private folder, then move the library and its hash into place."""
     try:
         with tempfile.TemporaryDirectory(prefix="hovi-") as scratch:
             source, result = Path(scratch, "function.c"), Path(scratch, "function.so")
@@ -155,7 +155,7 @@ def _build(compiler: str, name: str, code: str, library: Path) -> None:
 
 
 def _run(what: str, command: list[str]) -> str:
-    """Output of the compiler. Raises CompilationError with its first complaint."""
+    """Output of the compiler. Raises CompilationError with its first error message."""
     run = subprocess.run(
         command,
         capture_output=True,
@@ -202,7 +202,7 @@ def _load(name: str, library: Path) -> ca.Function:
 
 
 def _search_roots() -> list[str]:
-    """Folders in which CasADi looks for a library before it looks where it was told to."""
+    """Folders in which CasADi looks for a library before the given path."""
     paths = [os.environ.get(name, "") for name in ("CASADI_PLUGIN_SEARCH_PATH", "CASADIPATH")]
     paths.append(ca.GlobalOptions.getCasadiPath())
     return [root for path in paths for root in path.split(os.pathsep) if root]

@@ -1,8 +1,8 @@
-"""Inverse dynamics in doubles over many points, with analytic derivatives, in C++.
+"""Inverse dynamics of batches of points with analytic derivatives, in C++.
 
-The fast sibling of `RigidBodyFunctions.inverse_dynamics`: closed-form derivatives of RNEA
-[CarpentierMansard2018] [SinghRussellWensing2022] for packs of points at once. The curvature enters
-before second derivatives are formed: no tensor of n^3 numbers arises.
+The fast counterpart of `RigidBodyFunctions.inverse_dynamics`: closed-form derivatives of RNEA
+[CarpentierMansard2018] [SinghRussellWensing2022], vectorized over points. Second derivatives are
+contracted with the curvature on the fly: no tensor with n^3 entries is formed.
 """
 
 from __future__ import annotations
@@ -19,52 +19,50 @@ Array = npt.NDArray[np.float64]
 
 
 def joints_without_kernel(model: pin.Model) -> tuple[str, ...]:
-    """Names of the joints for which there are no analytic second derivatives."""
+    """Names of the joints without analytic second derivatives."""
     alone = list(model.parents)[1:].count(0) == 1
 
-    def served(index: int) -> bool:
+    def supported(index: int) -> bool:
         kernel = kind_of(model.joints[index]).kernel
         return kernel == "anywhere" or (kernel == "as base" and index == 1 and alone)
 
-    return tuple(str(model.names[i]) for i in range(1, model.njoints) if not served(i))
+    return tuple(str(model.names[i]) for i in range(1, model.njoints) if not supported(i))
 
 
 class InverseDynamicsKernel:
     """tau = M(q) a + b(q, v) with its first and second derivatives over a batch of points.
 
-    Points come as q of shape (P, nq) and v, a of shape (P, n) in [rad], [rad/s], [rad/s^2] (metres
-    for sliding joints). Derivatives are in the tangent space: second ones by q are those along
-    `integrate`, which is q + dq where all joints are ordinary.
-    The points are shared out over at most `threads` threads, as many as are worth starting; their
-    number does not change a bit of the result. The GIL is released and nothing is allocated per
-    point. One call at a time runs on a kernel: calls from several Python threads wait for each
-    other.
+    Points are q of shape (P, nq) and v, a of shape (P, n) in [rad], [rad/s], [rad/s^2] (metres for
+    prismatic joints). Derivatives are in the tangent space: those in q are taken along `integrate`,
+    which is q + dq on a vector space.
+    The points are distributed over at most `threads` threads, as many as pay off; results are
+    bitwise independent of their number. The GIL is released and nothing is allocated per point.
+    Calls of one kernel from several Python threads run one after the other.
     """
 
     def __init__(self, model: pin.Model) -> None:
-        """Reads the model, gravity and armature included; later changes to it have no effect.
+        """Reads the model with its gravity and armature; later changes to it have no effect.
 
-        model: a model all of whose joints are revolute, continuous, prismatic, helical or
-            translations, except that one which carries all others may be a free-flyer, spherical
-            or planar.
+        model: all joints are revolute, continuous, prismatic, helical or translations; a first
+            joint on which all others stand may also be a free-flyer, spherical or planar.
 
-        Raises ModelError when it has others, such as mimic joints.
+        Raises ModelError for other joints, such as mimic joints.
         """
         unsupported = joints_without_kernel(model)
         if unsupported:
             raise ModelError(
                 "analytic second derivatives exist only for joints with fixed axes and for a base "
-                f"that carries all others, not for {', '.join(map(repr, unsupported))}; use "
+                f"joint, not for {', '.join(map(repr, unsupported))}; use "
                 "hovi.dynamics.symbolic_dynamics.casadi_functions, or lock these joints."
             )
         self.__setstate__(read_joint_tree(model))
 
     def __getstate__(self) -> JointTree:
-        """Pickled as the joint tree: the kernel is built again on the other side."""
+        """Pickled as the joint tree."""
         return self._tree
 
     def __setstate__(self, tree: JointTree) -> None:
-        """Builds the kernel again from what `__getstate__` gave."""
+        """Build the kernel again from the joint tree."""
         self._tree = tree
         self._compiled = tree.compiled()
         self._nq = int(self._compiled.nq)
@@ -79,7 +77,7 @@ class InverseDynamicsKernel:
         """tau(q, v, a) at each point.
 
         q: shape (P, nq); v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
-        threads: how many threads share the points.
+        threads: maximum number of threads.
 
         Returns tau (P, n) in [N m]. Raises InputError on a wrong shape.
         """
@@ -93,7 +91,7 @@ class InverseDynamicsKernel:
         """tau and J = d tau / d(q, v, a) at each point.
 
         q: shape (P, nq); v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
-        threads: how many threads share the points.
+        threads: maximum number of threads.
 
         Returns tau (P, n) in [N m] and J (P, n, 3n), columns dq | dv | da. Raises InputError on a
         wrong shape.
@@ -118,11 +116,11 @@ class InverseDynamicsKernel:
 
         q: shape (P, nq); v, a: shape (P, n), in [rad], [rad/s], [rad/s^2].
         weight: shape (n,) or (P, n), the metric of the torques.
-        curvature: shape (P, n), what multiplies each torque's second derivative; None drops the
+        curvature: factor of each torque's second derivative, shape (P, n); None drops the
             sum. With curvature = weight * tau, H is the Hessian of 1/2 tau^T diag(weight) tau.
-        threads: how many threads share the points.
+        threads: maximum number of threads.
 
-        Returns tau (P, n), J (P, n, 3n) and H (P, 3n, 3n), symmetric to the last bit, with index
+        Returns tau (P, n), J (P, n, 3n) and H (P, 3n, 3n), bitwise symmetric, with index
         [k * n + i, l * n + j] for the i-th coordinate of the k-th of (q, v, a). Raises InputError
         on a wrong shape.
         """

@@ -1,9 +1,9 @@
-"""A robot as the compiled kernel reads it: joints of one axis each, and what they move, as arrays.
+"""A robot as arrays for the compiled kernel: joints with one axis each, and their bodies.
 
-Every joint rotates about and translates along the z axis of its own frame: so one formula serves
-revolute, prismatic and helical joints about any axis. A joint of several coordinates becomes as
-many joints, of which the last moves its body. A free-flyer, spherical or planar joint that is the
-first is the base: its components are the first joints of the tree and have no axis.
+Every joint rotates about and translates along the z axis of its own frame, so one formula covers
+revolute, prismatic and helical joints about any axis. A joint with several coordinates becomes a
+chain of joints, of which the last moves its body. A first joint that is a free-flyer, spherical or
+planar is the base: its components are the first joints of the tree and have no axis.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ _UPPER = np.triu_indices(3)
 
 @dataclass(frozen=True, eq=False)
 class JointTree:
-    """A tree of n joints, each after its parent; one row of each array for each joint.
+    """A tree of n joints, each after its parent; each array has one row per joint.
 
-    nq: numbers in a configuration.
-    gravity: spatial acceleration of free fall, linear and angular, shape (6,), in [m/s^2]; where a
-        base moves, in the axes that it has at the neutral configuration.
+    nq: length of a configuration.
+    gravity: spatial acceleration of free fall, linear and angular, shape (6,), in [m/s^2]; with
+        a base, in its frame at the neutral configuration.
     parents: shape (n,); -1 is the world.
     coordinates: index of each joint's coordinate in a configuration, shape (n,).
-    continuous: where (cos, sin) of the angle stand there instead of the angle, shape (n,).
+    continuous: whether that coordinate is (cos, sin) of an angle, shape (n,).
     rotations: of each frame in its parent's at q = 0, shape (n, 3, 3).
     translations: of each frame in its parent's, shape (n, 3), in [m].
     angular: angle about z per unit of q, shape (n,): 1, or 0 for a prismatic joint.
     linear: displacement along z per unit of q, shape (n,), in [m].
-    masses: of each joint's body, shape (n,), in [kg]; 0 where it has none.
+    masses: of each joint's body, shape (n,), in [kg]; 0 without a body.
     centers: of mass, in the joint's frame, shape (n, 3), in [m].
     moments: integrals of x x^T dm about the center of mass, xx xy xz yy yz zz, shape (n, 6), in
         [kg m^2].
     armatures: shape (n,), in [kg m^2] or [kg].
-    base_twist_indices: of the components of a base that moves in a twist (linear, angular), shape
-        (6,) or (3,); (0,) where there is none.
+    base_twist_indices: of the velocity components of the base in a twist (linear, angular), shape
+        (6,) or (3,); (0,) without a base.
     base_coordinate: index of the base's quaternion in a configuration.
-    planar_base: whether (cos, sin) stand there instead of a quaternion.
+    planar_base: whether (cos, sin) is stored there instead of a quaternion.
     """
 
     nq: int
@@ -67,9 +67,9 @@ class JointTree:
     planar_base: bool
 
     def compiled(self, portable: bool = False) -> native.InverseDynamicsKernel:
-        """The kernel of this tree. portable: without the instructions that few processors have.
+        """The kernel of this tree. portable: use the baseline instruction set.
 
-        Raises ValueError for arrays that do not fit each other or are no tree.
+        Raises ValueError for inconsistent arrays.
         """
         return native.InverseDynamicsKernel(**vars(self), portable=portable)
 
@@ -87,9 +87,9 @@ class _Row:
 
 
 def read_joint_tree(model: pin.Model) -> JointTree:
-    """The tree of a model all of whose joints have axes that are fixed in their frames.
+    """The tree of a model whose joints have axes that are fixed in their frames.
 
-    model: may have a base, on which all other joints must stand.
+    model: the first joint may be a base that all other joints stand on.
     """
     base = _base_of(model)
     rows = _rows(model, base)
@@ -121,7 +121,7 @@ def read_joint_tree(model: pin.Model) -> JointTree:
 
 
 def _base_of(model: pin.Model) -> Group | None:
-    """The group of a first joint that all others stand on; None where there is none such."""
+    """The group of the base; None without a base."""
     kind = kind_of(model.joints[1]) if model.njoints > 1 else None
     return kind.group if kind and kind.kernel == "as base" else None
 
@@ -152,14 +152,14 @@ def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
 
 
 def _axes(joint: pin.JointModel) -> Array:
-    """One row (linear, angular) for each coordinate, shape (nv, 6), whatever the configuration."""
+    """One row (linear, angular) for each coordinate, shape (nv, 6), at any configuration."""
     data = joint.createData()
     joint.calc(data, np.zeros(joint.idx_q + joint.nq))
     return np.asarray(data.S, dtype=np.float64).reshape(6, -1).T
 
 
 def _frames_along(axes: Array) -> Array:
-    """Rotations that take z to each axis, shape (n, 3, 3): permutations where that is x, y or z."""
+    """Rotations that map z to each axis, shape (n, 3, 3): permutations if that is x, y or z."""
     z = _normalized(axes)
     least = np.argmin(np.abs(z), axis=1)
     x = _normalized(np.eye(3)[least] - z[np.arange(len(z)), least][:, None] * z)
@@ -185,16 +185,16 @@ def _in_frames(left: Array, A: Array, right: Array) -> Array:
     """left^T A right, shape (n, 3, 3)."""
     half = _product(left.transpose(0, 2, 1), A)
     whole = _product(half, right)
-    # In Eigen's order, by which motions were planned before: they stay the same to the last bit.
+    # In the order of Eigen's sums, so that earlier motions are reproduced to the last bit.
     whole[:, 2] = half[:, 2, :1] * right[:, 0] + (
         half[:, 2, 1:2] * right[:, 1] + half[:, 2, 2:] * right[:, 2]
     )
     return whole
 
 
-# BLAS would add in an order, and fuse products, that differ from one processor to another.
+# The order of sums and the fused products of BLAS depend on the processor.
 def _product(A: Array, B: Array) -> Array:
-    """Products of matrices of three columns and of three rows."""
+    """Products of matrices with inner dimension 3."""
     first, second, third = (A[:, :, k, None] * B[:, k, None, :] for k in range(3))
     return np.asarray(first + second + third)
 

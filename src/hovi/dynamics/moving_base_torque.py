@@ -1,7 +1,7 @@
-"""Joint torques of a robot on a base that moves as prescribed, with Pinocchio's derivatives.
+"""Joint torques of a robot on a base with prescribed motion, with analytic derivatives.
 
-The robot is put on six more joints (three that slide, three that turn), RNEA is evaluated along
-their given motion, and the rows of the robot's own joints are kept.
+The robot is mounted on six additional joints (three prismatic, three revolute), RNEA is evaluated
+along their prescribed motion, and the rows of the robot's own joints are kept.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _JOINTS = (
     ("pitch", pin.JointModelRY),
     ("roll", pin.JointModelRX),
 )
-FREEDOM = len(_JOINTS)
+BASE_DOF = len(_JOINTS)
 
 
 def on_base_joints(model: pin.Model) -> pin.Model:
-    """The model on joints x, y, z, yaw, pitch and roll, which come first and have no inertia."""
+    """The model mounted on massless joints x, y, z, yaw, pitch and roll, which come first."""
     base = pin.Model()
     parent = 0
     for name, joint in _JOINTS:
@@ -40,7 +40,7 @@ def on_base_joints(model: pin.Model) -> pin.Model:
     )
     moved = pin.appendModel(base, model, frame, pin.SE3.Identity())
     moved.gravity.linear = model.gravity.linear
-    moved.armature = np.concatenate([np.zeros(FREEDOM), model.armature])
+    moved.armature = np.concatenate([np.zeros(BASE_DOF), model.armature])
     return moved
 
 
@@ -53,38 +53,38 @@ def base_jet(base: ca.SX, t: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 def inverse_dynamics(
     model: pin.Model, base: ca.SX | None, q: ca.SX, v: ca.SX, a: ca.SX, t: ca.SX
 ) -> ca.SX:
-    """RNEA of a model on a base that moves, or rests where that is None, shape (nv,)."""
+    """RNEA of a model on a moving base, or on a fixed one if None, shape (nv,)."""
     if base is None:
         return casadi_functions(model).inverse_dynamics(q, v, a)
     jet = zip(base_jet(base, t), (q, v, a), strict=True)
     moved = casadi_functions(on_base_joints(model)).inverse_dynamics
-    return moved(*(ca.vertcat(*pair) for pair in jet))[FREEDOM:]
+    return moved(*(ca.vertcat(*pair) for pair in jet))[BASE_DOF:]
 
 
 class MovingBaseTorque:
-    """A TorqueModel: the joints' rows of the kernel on a moving base.
+    """A TorqueModel: the rows of the robot's joints in the kernel on a moving base.
 
     model: without the base's joints. base: its (x, y, z, yaw, pitch, roll) as expressions of t.
-    compile: whether the base's motion becomes machine code: see PointFunction.
+    compile: whether the motion of the base is compiled: see PointFunction.
     """
 
     def __init__(self, model: pin.Model, base: ca.SX, t: ca.SX, compile: bool = False) -> None:
         self.kernel = rnea_kernel(on_base_joints(model))
         self._jet = PointFunction(ca.Function("base", [t], list(base_jet(base, t))), compile)
-        columns = np.arange(3 * (FREEDOM + model.nv)).reshape(3, -1)[:, FREEDOM:]
+        columns = np.arange(3 * (BASE_DOF + model.nv)).reshape(3, -1)[:, BASE_DOF:]
         self._columns = columns.ravel()
         self._threads = default_threads()
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> Array:
         """tau, shape (P, nv)."""
-        return self.kernel.torque(*self._on_base(q, v, a, t))[:, FREEDOM:]
+        return self.kernel.torque(*self._on_base(q, v, a, t))[:, BASE_DOF:]
 
     def linearize(
         self, q: Array, v: Array, a: Array, t: Array | None = None
     ) -> tuple[Array, Array]:
         """tau and its Jacobian."""
         tau, J = self.kernel.linearize(*self._on_base(q, v, a, t))
-        return tau[:, FREEDOM:], J[:, FREEDOM:, self._columns]
+        return tau[:, BASE_DOF:], J[:, BASE_DOF:, self._columns]
 
     def expand(
         self,
@@ -95,16 +95,16 @@ class MovingBaseTorque:
         R: Array,
         curvature: Array | None,
     ) -> tuple[Array, Array, Array]:
-        """tau, J and the Hessian of TorqueModel.expand: the base's rows weigh nothing."""
+        """tau, J and the Hessian of TorqueModel.expand; the rows of the base have weight 0."""
         jet = self._on_base(q, v, a, t)
         if curvature is None:
-            curvature = R * self.kernel.torque(*jet)[:, FREEDOM:]
-        nothing = np.zeros((len(q), FREEDOM))
-        weight = np.concatenate([nothing, np.broadcast_to(R, v.shape)], axis=1)
-        curvature = np.concatenate([nothing, curvature], axis=1)
+            curvature = R * self.kernel.torque(*jet)[:, BASE_DOF:]
+        zeros = np.zeros((len(q), BASE_DOF))
+        weight = np.concatenate([zeros, np.broadcast_to(R, v.shape)], axis=1)
+        curvature = np.concatenate([zeros, curvature], axis=1)
         tau, J, H = self.kernel.expand(*jet, weight, curvature, self._threads)
         kept = self._columns
-        return tau[:, FREEDOM:], J[:, FREEDOM:, kept], H[:, kept[:, None], kept]
+        return tau[:, BASE_DOF:], J[:, BASE_DOF:, kept], H[:, kept[:, None], kept]
 
     def _on_base(self, q: Array, v: Array, a: Array, t: Array | None) -> tuple[Array, Array, Array]:
         jets = zip(self._jet(times(t, len(q))), (q, v, a), strict=True)

@@ -1,4 +1,4 @@
-"""A CasADi function evaluated at a batch of points, straight from and into NumPy's memory."""
+"""A CasADi function evaluated at a batch of points, without copies from or to NumPy arrays."""
 
 from __future__ import annotations
 
@@ -17,33 +17,32 @@ from hovi.dynamics.function_cache import compiled
 Array = npt.NDArray[np.float64]
 
 CHUNK = 1024
-"""Points of one mapped call; more are done chunk by chunk, so that memory stays bounded."""
-SHARE = 100_000
-"""Instructions that a thread has to have for itself to be worth its start. Two threads break even
-at 50,000 each: starting and ending them takes up to 100 microseconds, the interpreter 2 to 5
-nanoseconds for an instruction."""
-COMPILED_GAIN = 10
-"""How many times faster compiled code is, for the same account: 4 to 25 were measured."""
+"""Maximum number of points per mapped call, which bounds the memory."""
+MIN_INSTRUCTIONS = 100_000
+"""Minimum number of instructions per thread. Two threads break even at 50,000 each: starting and
+joining them takes up to 100 microseconds, an interpreted instruction 2 to 5 nanoseconds."""
+COMPILED_SPEEDUP = 10
+"""Assumed speedup of compiled code, for the number of threads; 4 to 25 were measured."""
 
 
 class PointFunction:
     """f at P points: every argument gains a leading axis of length P.
 
     Arguments are column vectors in CasADi; a result of shape (r, c) comes back as (P, r, c), a
-    column as (P, r), a number as (P,). Many points are shared out over threads, which does not
-    change a bit of the result. Calls from several Python threads are safe.
+    column as (P, r), a scalar as (P,). Many points are distributed over threads; results are
+    bitwise independent of their number. Calls from several Python threads are safe.
 
-    function: made of SX expressions.
-    compile: compile it to machine code, or take that from the user's cache: see `compiled`.
+    function: of SX expressions.
+    compile: use compiled code, built or from the user's cache: see `compiled`.
     """
 
     def __init__(self, function: ca.Function, compile: bool = False) -> None:
-        self._made_from = function, compile
+        self._arguments = function, compile
         function = _dense(function)
         self._cost = function.n_instructions()
         if compile:
             function = compiled(function)
-            self._cost //= COMPILED_GAIN
+            self._cost //= COMPILED_SPEEDUP
         self.function = function
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         self._threads = default_threads()
@@ -51,8 +50,8 @@ class PointFunction:
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled as what it was made from: compiled code stays in the cache."""
-        return type(self), self._made_from
+        """Pickled as its arguments; compiled code stays in the cache."""
+        return type(self), self._arguments
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate at P points; arguments of shape (P, width)."""
@@ -64,10 +63,10 @@ class PointFunction:
         return [_squeeze(result) for result in results]
 
     def _parts(self, points: int) -> Iterator[tuple[slice, int]]:
-        """Points of one call and the threads that share them equally; the rest are done alone."""
+        """(points of a call, number of threads that share them equally); a remainder runs alone."""
         for first in range(0, points, CHUNK):
             last = min(first + CHUNK, points)
-            threads = max(1, min(self._threads, (last - first) * self._cost // SHARE))
+            threads = max(1, min(self._threads, (last - first) * self._cost // MIN_INSTRUCTIONS))
             shared = last - (last - first) % threads
             yield slice(first, shared), threads
             if shared < last:
@@ -80,7 +79,7 @@ class PointFunction:
                 self._mapped(points) if threads == 1 else self._mapped(points, "thread", threads)
             )
         buffer, trigger = mapped.buffer()
-        # CasADi's stubs do not know that buffers take a memoryview
+        # CasADi's stubs lack that buffers take a memoryview
         for i, argument in enumerate(arguments):
             if argument.size:
                 buffer.set_arg(i, memoryview(argument.reshape(-1)))  # type: ignore[call-arg,arg-type]
@@ -91,13 +90,13 @@ class PointFunction:
 
 
 def default_threads() -> int:
-    """OMP_NUM_THREADS where it is set, as worker processes do, else the processors at hand."""
+    """OMP_NUM_THREADS if set, as in worker processes, else the number of processors."""
     wanted = os.environ.get("OMP_NUM_THREADS", "")
     return int(wanted) if wanted.isdigit() and int(wanted) > 0 else os.cpu_count() or 1
 
 
 def _dense(function: ca.Function) -> ca.Function:
-    """The function with full matrices for results."""
+    """The function with dense results."""
     dense = [ca.Sparsity.dense(*function.size_out(i)) for i in range(function.n_out())]
     if all(function.sparsity_out(i) == dense[i] for i in range(function.n_out())):
         return function

@@ -47,10 +47,10 @@ class TorqueModel(Protocol):
 
 
 class CasadiTorque:
-    """A torque model from CasADi expressions: the definition, and the fallback of faster ones.
+    """A torque model from CasADi expressions: the reference, and the fallback of faster models.
 
-    compile: whether its functions become machine code: see PointFunction.
-    space: the configuration space; None where configurations are vectors.
+    compile: whether its functions are compiled: see PointFunction.
+    space: the configuration space; None if it is a vector space.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class CasadiTorque:
 
     @cached_property
     def _curvature(self) -> PointFunction | None:
-        """The weighted second derivatives; None where tau is affine."""
+        """The weighted second derivatives; None if tau is affine."""
         weight = ca.SX.sym("weight", self.nv)
         weighted = ca.dot(weight, self._tau)
         curvature = tangent.hessian(weighted, self._symbols, self._space)[0]
@@ -83,7 +83,7 @@ class CasadiTorque:
         return PointFunction(function, self._compile)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The functions alone: symbols cannot be pickled."""
+        """The functions without the symbols, which cannot be pickled."""
         functions = ("_torque", "_linearize", "_curvature")
         return {"nv": self.nv, **{name: getattr(self, name) for name in functions}}
 
@@ -105,8 +105,8 @@ class CasadiTorque:
         return self._curvature(q, v, a, times(t, len(q)), weight)[0]
 
     @property
-    def bends(self) -> bool:
-        """Whether tau has any second derivatives."""
+    def has_curvature(self) -> bool:
+        """Whether tau has nonzero second derivatives."""
         return self._curvature is not None
 
     def expand(
@@ -162,7 +162,7 @@ class AnalyticTorque:
 
 
 class SummedTorque:
-    """What a main torque model gives and what effects add to it from CasADi."""
+    """The sum of a main torque model and the CasADi torques that effects add."""
 
     def __init__(self, main: TorqueModel, added: CasadiTorque) -> None:
         self.main = main
@@ -200,11 +200,11 @@ class SummedTorque:
         cross = np.matmul((J + 0.5 * dmore).transpose(0, 2, 1), R[..., None] * dmore)
         hessian += cross
         hessian += cross.transpose(0, 2, 1)
-        if self.added.bends:
+        if self.added.has_curvature:
             hessian += self.added.curvature(q, v, a, t, curvature)
         return tau + more, J + dmore, hessian
 
 
 def times(t: Array | None, points: int) -> Array:
-    """Times as a column, zeros where nothing depends on time, shape (P, 1)."""
+    """Times as a column, shape (P, 1); zeros if t is None."""
     return np.zeros((points, 1)) if t is None else np.asarray(t, dtype=np.float64).reshape(-1, 1)

@@ -1,7 +1,7 @@
-"""Effects: what a scene simulates beyond inertia, one file each, none unless it is named.
+"""Effects: opt-in physics and costs of a scene beyond rigid-body inertia, one file each.
 
-This file is their one list: an effect that is imported here and named in EFFECTS and in __all__ is
-public, a table of scene files and of their JSON schema, and can stand in a motion file.
+This file lists them: an effect in EFFECTS and __all__ is public, a table of scene files and of
+their JSON schema, and can be stored in motion files.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Armature: the inertia of rotors, reflected by their gears."""
+"""Armature: rotor inertia reflected through the gears."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Armature(Effect):
     """M(q) += diag(I), I_i = rotor inertia times gear ratio squared. [Featherstone2008, sec. 9.6]
 
     inertia: I, 0 or more, in [kg m^2] or [kg].
-    from_urdf: take the armature that the robot's model holds instead.
+    from_urdf: use the armature of the robot's model instead.
     """
 
     inertia: JointValues | None = None
@@ -37,7 +37,7 @@ class Armature(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse negative numbers, unknown joints, and a model without armature."""
+        """Raise SceneError for negative values, unknown joints, or a model without armature."""
         self.values(robot)
 
     def values(self, robot: Robot) -> npt.NDArray[np.float64]:
@@ -48,9 +48,9 @@ class Armature(Effect):
         return joint_values(robot, "effect 'armature': inertia", self.inertia, 0)
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """Armature is simulated by Pinocchio itself."""
+        """Set the armature of the model, which RNEA includes."""
         model.armature = self.values(robot)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"armature: {in_words(self.inertia, 'kg m^2 (kg)')}"

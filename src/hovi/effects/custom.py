@@ -1,4 +1,4 @@
-"""An effect of the user's own, from formulas."""
+"""A user-defined effect from formulas."""
 
 from __future__ import annotations
 
@@ -22,12 +22,11 @@ if TYPE_CHECKING:
 class Custom(Effect):
     """Torques and a cost, each a formula of q["joint"], v["joint"], a["joint"] and t.
 
-    Joints with nq != nv have no q["joint"], since they have no single position.
+    Joints with nq != nv have no q["joint"]. In Python, a subclass of Effect can use any CasADi
+    expression instead of a formula.
 
-    In Python, a subclass of Effect takes any CasADi expression instead of a formula.
-
-    torque_of: what is added to tau of each joint, in [N m] or [N].
-    cost: what is added to the cost.
+    torque_of: added to tau, by joint, in [N m] or [N].
+    cost: added to the cost.
     """
 
     torque_of: Mapping[str, Number] = field(default_factory=dict)
@@ -36,13 +35,13 @@ class Custom(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.TORQUE, Touch.COST)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints and formulas that make no sense."""
+        """Raise SceneError for unknown joints and invalid formulas."""
         symbols = SceneSymbols.of(robot)
         self.torque(robot, symbols)
         self.potential(robot, symbols)
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """The formulas of the joints."""
+        """The formulas for the joint torques."""
         names, rows = robot.coordinate_names, [ca.SX(0)] * robot.nv
         for joint, given in self.torque_of.items():
             if joint not in names:
@@ -55,19 +54,19 @@ class Custom(Effect):
         return ca.vertcat(*rows) if self.torque_of else None
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """The formula of the cost."""
+        """The formula for the cost."""
         cost = expression("effect 'custom': cost", self.cost, _by_joint(robot, symbols))
         return None if cost.is_zero() else cost
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         parts = [f"tau of {joint} += {given}" for joint, given in self.torque_of.items()]
         parts += [] if self.cost == 0 else [f"cost += {self.cost}"]
         return "custom: " + ("; ".join(parts) or "nothing")
 
 
 def _by_joint(robot: Robot, symbols: SceneSymbols) -> Symbols:
-    """q, v and a by the names of their coordinates, and t."""
+    """q, v and a by coordinate name, and t."""
     names, q = robot.coordinate_names, positions(robot, symbols.q)
     by_name = (dict(zip(names, ca.vertsplit(x), strict=True)) for x in (symbols.v, symbols.a))
     v, a = by_name

@@ -1,4 +1,4 @@
-"""Drag of air or a fluid on a frame, in wind or at rest."""
+"""Drag of a moving or resting fluid on a frame."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Drag(Effect):
-    """The force F = -(rho A |u| / 2 + c) u on a frame that moves at u against the fluid.
+    """The force F = -(rho A |u| / 2 + c) u on a frame with velocity u relative to the fluid.
 
     |u| is smoothed as sqrt(u^2 + w^2) - w, so that the force is twice differentiable at rest.
     [Batchelor1967, sec. 5.11]
 
-    frame: one of the robot's frames, at whose origin the force acts.
+    frame: a frame of the robot; the force acts at its origin.
     area: A, drag coefficient times area, in [m^2]. density: rho, in [kg/m^3].
     linear: c, in [N s/m]. wind: velocity of the fluid in the world, in [m/s], each component a
         number or a formula of t. width: w, in [m/s].
@@ -40,7 +40,7 @@ class Drag(Effect):
     key: ClassVar[str] = "drag"
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown frames and negative numbers."""
+        """Raise SceneError for an unknown frame and negative values."""
         require_frame(robot, self.key, self.frame)
         for name in ("area", "density", "linear"):
             value = getattr(self, name)
@@ -63,7 +63,7 @@ class Drag(Effect):
         return motion.joint_torque(strength * u)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return (
             f"drag: area {self.area:g} m^2 in {self.density:g} kg/m^3, linear {self.linear:g} "
             f"N s/m on {self.frame}, wind {in_words(self.wind)} m/s"

@@ -1,4 +1,4 @@
-"""Dry friction of the joints: Coulomb and Stribeck, smoothed."""
+"""Dry joint friction: smoothed Coulomb and Stribeck friction."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class DryFriction(Effect):
 
     [ArmstrongDupontCanudas1994, sec. 2]
 
-    coulomb: F_c, 0 or more, in [N m] or [N]. static: F_s, not below F_c; F_c when not given.
+    coulomb: F_c, 0 or more, in [N m] or [N]. static: F_s, at least F_c; F_c by default.
     stribeck_velocity: v_s, in [rad/s] or [m/s]. width: w, the velocity over which the sign
-        changes, in [rad/s] or [m/s]: at v = w it is 0.76 of its full value.
-    from_urdf: take the `friction` that the URDF states for F_c.
+        changes, in [rad/s] or [m/s]: at v = w it is tanh(1) = 0.76.
+    from_urdf: use the `friction` of the URDF for F_c.
     """
 
     coulomb: JointValues | None = None
@@ -46,7 +46,7 @@ class DryFriction(Effect):
     key: ClassVar[str] = "dry_friction"
 
     def check(self, robot: Robot) -> None:
-        """Refuse negative friction, static below Coulomb's, and widths that are not positive."""
+        """Raise SceneError for negative friction, F_s < F_c, and widths that are not positive."""
         for name in ("stribeck_velocity", "width"):
             value = getattr(self, name)
             if not 0 < value < np.inf:
@@ -84,7 +84,7 @@ class DryFriction(Effect):
         return level * ca.tanh(v / self.width)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         line = f"dry_friction: {in_words(self.coulomb, 'N m (N)')}"
         if self.static is not None:
             line += f", {in_words(self.static, 'N m (N)')} when starting"

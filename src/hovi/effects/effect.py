@@ -1,4 +1,4 @@
-"""What an effect is: something a scene simulates because it was named."""
+"""The base class of effects."""
 
 from __future__ import annotations
 
@@ -23,50 +23,50 @@ Array = npt.NDArray[np.float64]
 
 
 class Touch(StrEnum):
-    """What an effect may touch."""
+    """What an effect modifies."""
 
     MODEL = "model"
-    """The scene's own rigid bodies: costs nothing more than RNEA does anyway."""
+    """The rigid-body model of the scene: no cost beyond RNEA."""
     TORQUE = "torque"
-    """The balance of torques: it adds to tau, in plans and in simulations."""
+    """The torque balance: it adds to tau, in planning and in simulation."""
     COST = "cost"
-    """What is minimised: plans alone."""
+    """The cost: in planning only."""
 
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """An opt-in part of a scene; a field of the dataclass is a key in the scene file."""
+    """An opt-in part of a scene; the fields of the dataclass are keys in scene files."""
 
     key: ClassVar[str]
     """Name of the effect's table in a scene file."""
     touches: ClassVar[tuple[Touch, ...]] = (Touch.TORQUE,)
-    """All that it may touch; a scene refuses an effect that touches more."""
+    """What it modifies; a scene refuses an effect that modifies anything else."""
 
     def __post_init__(self) -> None:
-        """Lists become tuples, so that an effect read from a file equals the one written."""
+        """Convert lists to tuples, so that effects read from a file equal those written."""
         for field in fields(self):
             object.__setattr__(self, field.name, _frozen(getattr(self, field.name)))
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError when the effect does not fit the robot."""
+        """Raise SceneError if the effect is not valid for the robot."""
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """Change the scene's own copy of the model, for what Pinocchio simulates itself."""
+        """Modify the scene's own copy of the model, for properties that RNEA includes."""
 
     def base(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """Where it puts the base at time t, (x, y, z, yaw, pitch, roll); or None."""
+        """Prescribed pose of the base at time t, (x, y, z, yaw, pitch, roll); or None."""
         return None
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """What it adds to tau = M a + C + g + ..., a column of nv in [N m] or [N]; or None."""
+        """Its term in tau = M a + C + g + ..., a column of nv in [N m] or [N]; or None."""
         return None
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """What it adds to the cost, V of L~ = 1/2 tau^T R tau + V, a number; or None."""
+        """Its term V in the cost L~ = 1/2 tau^T R tau + V, a scalar; or None."""
         return None
 
     def effort_cost(self, robot: Robot, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """What it adds to the cost that depends on the torque, a number; or None."""
+        """Its term phi(tau, v) in the cost, a scalar; or None."""
         return None
 
     def effort_weight(self, robot: Robot) -> Array | None:
@@ -75,7 +75,7 @@ class Effect(ABC):
 
     @abstractmethod
     def describe(self) -> str:
-        """One line: the effect and its numbers with units."""
+        """One line: the effect and its parameters with units."""
 
 
 def _frozen(value: Any) -> Any:

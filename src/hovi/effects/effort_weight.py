@@ -1,4 +1,4 @@
-"""Weights of the joints' torques in the cost."""
+"""Weights of the joint torques in the cost."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class EffortWeight(Effect):
-    """R of the cost 1/2 tau^T diag(R) tau, where without it every joint weighs 1.
+    """R of the cost 1/2 tau^T diag(R) tau; without this effect R = 1.
 
-    weight: R, positive, per [(N m)^2] or [N^2]; in a table, joints that are left out weigh 1.
+    weight: R, positive, per [(N m)^2] or [N^2]; in a table, joints that are left out have weight 1.
     """
 
     weight: JointValues
@@ -30,7 +30,7 @@ class EffortWeight(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints and weights that are not positive."""
+        """Raise SceneError for unknown joints and weights that are not positive."""
         self.effort_weight(robot)
 
     def effort_weight(self, robot: Robot) -> Array:
@@ -48,5 +48,5 @@ class EffortWeight(Effect):
         return weight
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"effort_weight: {in_words(self.weight, 'times the squared torque')}"

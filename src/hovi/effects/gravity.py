@@ -1,4 +1,4 @@
-"""Gravity."""
+"""Uniform gravity."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gravity(Effect):
-    """The generalised gravity g(q) of RNEA, for a uniform field.
+    """The generalized gravity g(q) of RNEA, for a uniform field.
 
-    acceleration: in [m/s^2]. direction: of the field in the world, of any length but zero.
+    acceleration: in [m/s^2]. direction: of the field in the world frame, any nonzero vector.
     """
 
     acceleration: float = 9.81
@@ -29,7 +29,7 @@ class Gravity(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an acceleration that is not a finite number, and a direction that is none."""
+        """Raise SceneError for a non-finite acceleration and an invalid direction."""
         if not np.isfinite(self.acceleration):
             raise SceneError(
                 f"effect 'gravity': acceleration must be finite, got {self.acceleration}; "
@@ -42,12 +42,12 @@ class Gravity(Effect):
             )
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """Gravity is simulated by Pinocchio itself."""
+        """Set the gravity of the model, which RNEA includes."""
         along = np.array(self.direction) / np.linalg.norm(self.direction)
         model.gravity.linear = self.acceleration * along
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         if self.direction == (0.0, 0.0, -1.0):
             return f"gravity: {self.acceleration} m/s^2 along -z"
         along = ", ".join(f"{x:g}" for x in self.direction)

@@ -1,4 +1,4 @@
-"""The paper's potential that keeps a joint in its range."""
+"""The paper's penalty potential that keeps a joint in its range."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JointLimitPotential(Effect):
-    """V(q) = slope * sum over joints of r(lower - q) + r(q - upper), a part of the cost.
+    """V(q) = slope * sum over joints of r(lower - q) + r(q - upper), a term of the cost.
 
-    With stops = true it is a mechanical stop as well: tau_i += dV/dq_i, in plans and simulations.
+    With stops = true it is also a mechanical stop: tau_i += dV/dq_i, in planning and simulation.
 
     r is the ramp max(x, 0), made twice differentiable within `width` of its kink:
     r(x) = (x + w)^3 (3 w - x) / (16 w^3) for |x| < w. [ColomboFerraroMartin2016, section 5: the
@@ -30,7 +30,7 @@ class JointLimitPotential(Effect):
     ranges: (lower, upper) by joint name, in [rad] or [m].
     slope: of the cost, per [rad] or [m]; of stops too, in [N m] or [N].
     width: w > 0, in [rad] or [m].
-    stops: whether the joints feel it.
+    stops: whether it acts on the joints as well.
     """
 
     ranges: Mapping[str, tuple[float, float]]
@@ -41,7 +41,7 @@ class JointLimitPotential(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST, Touch.TORQUE)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints, empty ranges, and numbers that make no ramp."""
+        """Raise SceneError for unknown joints, empty ranges, and invalid slopes and widths."""
         for name, value in (("slope", self.slope), ("width", self.width)):
             if not (np.isfinite(value) and value > 0):
                 raise SceneError(
@@ -69,7 +69,7 @@ class JointLimitPotential(Effect):
         return self.slope * ca.sum1(ca.vertcat(*terms))
 
     def torque(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """dV/dq of the named joints, where they have stops."""
+        """dV/dq of the joints with stops; None without stops."""
         if not self.stops or not self.ranges:
             return None
         rows = [ca.SX(0)] * robot.nv
@@ -81,9 +81,9 @@ class JointLimitPotential(Effect):
         return ca.vertcat(*rows)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         ranges = ", ".join(f"{j} in [{a:.6g}, {b:.6g}]" for j, (a, b) in self.ranges.items())
-        stops = ", a stop for the joints too" if self.stops else ""
+        stops = ", also a mechanical stop" if self.stops else ""
         return (
             f"joint_limit_potential: {ranges}; slope {self.slope:g} per rad or m, "
             f"smoothed over {self.width:g}{stops}"
@@ -91,7 +91,7 @@ class JointLimitPotential(Effect):
 
 
 def _simple_joints(robot: Robot) -> dict[str, int]:
-    """Place in q of every joint whose configuration is one number."""
+    """Index in q of every joint with nq = nv = 1."""
     model = robot.model
     joints = list(zip(model.names, model.joints, strict=True))[1:]
     return {name: joint.idx_q for name, joint in joints if joint.nq == joint.nv == 1}

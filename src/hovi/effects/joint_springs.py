@@ -1,4 +1,4 @@
-"""Springs in the joints."""
+"""Joint springs."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class JointSprings(Effect):
-    """tau_i += k_i (q_i - rest_i): what it takes to bend a spring away from its rest.
+    """tau_i += k_i (q_i - rest_i), the torque against a linear spring.
 
     stiffness: k, 0 or more, in [N m/rad] or [N/m]. rest: in [rad] or [m].
     """
@@ -29,7 +29,7 @@ class JointSprings(Effect):
     key: ClassVar[str] = "joint_springs"
 
     def check(self, robot: Robot) -> None:
-        """Refuse negative stiffness, unknown joints, and joints without a position to rest at."""
+        """Raise SceneError for negative stiffness, unknown joints, and joints with nq != nv."""
         what = "effect 'joint_springs'"
         stiffness = joint_values(robot, f"{what}: stiffness", self.stiffness, 0)
         joint_values(robot, f"{what}: rest", self.rest)
@@ -42,7 +42,7 @@ class JointSprings(Effect):
         return ca.DM(stiffness) * (positions(robot, symbols.q) - ca.DM(rest))
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return (
             f"joint_springs: {in_words(self.stiffness, 'N m/rad (N/m)')}, "
             f"at rest at {in_words(self.rest, 'rad (m)')}"

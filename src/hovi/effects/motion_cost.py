@@ -27,7 +27,7 @@ class VelocityCost(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints and negative weights."""
+        """Raise SceneError for unknown joints and negative weights."""
         joint_values(robot, "effect 'velocity_cost': weight", self.weight, 0)
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
@@ -36,13 +36,13 @@ class VelocityCost(Effect):
         return ca.dot(ca.DM(weight), symbols.v**2) / 2
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"velocity_cost: {in_words(self.weight, 'per (rad/s)^2')}"
 
 
 @dataclass(frozen=True)
 class AccelerationCost(Effect):
-    """V = 1/2 sum_i w_i a_i^2: large weights lead to splines.
+    """V = 1/2 sum_i w_i a_i^2: motions tend to splines for large weights.
 
     weight: w, 0 or more, per [(rad/s^2)^2] or [(m/s^2)^2].
     """
@@ -52,7 +52,7 @@ class AccelerationCost(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints and negative weights."""
+        """Raise SceneError for unknown joints and negative weights."""
         joint_values(robot, "effect 'acceleration_cost': weight", self.weight, 0)
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
@@ -61,5 +61,5 @@ class AccelerationCost(Effect):
         return ca.dot(ca.DM(weight), symbols.a**2) / 2
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"acceleration_cost: {in_words(self.weight, 'per (rad/s^2)^2')}"

@@ -1,4 +1,4 @@
-"""A base that moves in a given way: a robot on a ship, a train, a shaking table."""
+"""A base with prescribed motion: a robot on a ship, a train, a shaking table."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MovingBase(Effect):
-    """tau = the joints' rows of RNEA for the robot on six more joints that move as prescribed.
+    """tau = the joints' rows of RNEA for the robot on six additional joints with prescribed motion.
 
-    All that a moving frame brings with it (its acceleration, Euler's, Coriolis' and centrifugal
-    forces, and a gravity that turns in the base's eyes) is in these rows. [Featherstone2008,
-    sec. 9.2]
+    These rows contain all inertial forces of a moving frame (its acceleration, Euler, Coriolis and
+    centrifugal forces) and gravity rotating in the base frame. [Featherstone2008, sec. 9.2]
 
     position: of the base in the world, in [m]. rotation: (roll, pitch, yaw) about the world's
         axes, R = Rz(yaw) Ry(pitch) Rx(roll) as in a URDF, in [rad]. Each component is a number or
@@ -35,14 +34,14 @@ class MovingBase(Effect):
     key: ClassVar[str] = "moving_base"
 
     def check(self, robot: Robot) -> None:
-        """Refuse what is no number and no formula, and a base that floats by itself."""
+        """Raise SceneError for invalid components, and for a floating base."""
         for name in ("position", "rotation"):
             time_vector(f"effect 'moving_base': {name}", getattr(self, name), ca.SX.sym("t"))
         for name, joint in list(zip(robot.model.names, robot.model.joints, strict=True))[1:]:
             if kind_of(joint) is FLOATING:
                 raise SceneError(
                     f"effect 'moving_base': joint {name!r} of robot {robot.name!r} floats, so that "
-                    "its base moves by itself; load the robot with free_flyer=False."
+                    "its base cannot be prescribed; load the robot with free_flyer=False."
                 )
 
     def base(self, robot: Robot, symbols: SceneSymbols) -> ca.SX:
@@ -52,7 +51,7 @@ class MovingBase(Effect):
         return ca.vertcat(position, rotation[2], rotation[1], rotation[0])
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return (
             f"moving_base: position {in_words(self.position)} m, roll, pitch and yaw "
             f"{in_words(self.rotation)} rad"

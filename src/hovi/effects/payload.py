@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Payload(Effect):
-    """A rigid body welded to a frame: the spatial inertias of body and link add up.
+    """A rigid body fixed to a frame: its spatial inertia is added to that of the link.
 
     [Featherstone2008, sec. 2.13]
 
-    frame: one of the robot's frames. mass: in [kg].
+    frame: a frame of the robot. mass: in [kg].
     center: its center of mass in the frame, in [m].
     inertia: (Ixx, Iyy, Izz, Ixy, Ixz, Iyz) about that center in the frame's axes, in [kg m^2];
-        a point mass when not given.
+        a point mass by default.
     """
 
     frame: str
@@ -36,7 +36,7 @@ class Payload(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown frames, frames that rest, and numbers that make no rigid body."""
+        """Raise SceneError for an unknown or fixed frame, and for an invalid inertia."""
         require_frame(robot, self.key, self.frame)
         if robot.model.frames[robot.model.getFrameId(self.frame)].parentJoint == 0:
             raise SceneError(
@@ -64,13 +64,13 @@ class Payload(Effect):
             )
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """The body is part of the model then."""
+        """Add the inertia of the body to the model."""
         frame = model.frames[model.getFrameId(self.frame)]
         body = pin.Inertia(self.mass, np.array(self.center), self._tensor())
         model.inertias[frame.parentJoint] += frame.placement.act(body)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         center = ", ".join(f"{x:g}" for x in self.center)
         return f"payload: {self.mass:g} kg at {self.frame}, center ({center}) m"
 

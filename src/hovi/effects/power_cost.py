@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PowerCost(Effect):
-    """w_i |tau_i v_i| summed over the joints: the energy of drives that cannot take any back.
+    """sum_i w_i |tau_i v_i|: the power of drives that do not recover energy.
 
     |P| is smoothed as sqrt(P^2 + s^2) - s.
 
@@ -31,7 +31,7 @@ class PowerCost(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints, negative weights, and a width that is not positive."""
+        """Raise SceneError for unknown joints, negative weights and a nonpositive width."""
         joint_values(robot, "effect 'power_cost': weight", self.weight, 0)
         if not 0 < self.width < np.inf:
             raise SceneError(
@@ -45,5 +45,5 @@ class PowerCost(Effect):
         return ca.dot(ca.DM(weight), power)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"power_cost: {in_words(self.weight, 'per W')}, smoothed over {self.width:g} W"

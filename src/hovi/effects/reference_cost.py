@@ -1,4 +1,4 @@
-"""A cost on the distance to a reference posture."""
+"""A cost on the distance to a reference motion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ReferenceCost(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown joints, formulas that make no sense, and a negative weight."""
+        """Raise SceneError for unknown joints, invalid formulas and a negative weight."""
         if not 0 <= self.weight < np.inf:
             raise SceneError(
                 f"effect 'reference_cost': weight must be finite and 0 or more, got {self.weight}."
@@ -55,11 +55,11 @@ class ReferenceCost(Effect):
         distance = ca.SX(0)
         for joint, given in self.reference.items():
             what = f"effect 'reference_cost': reference of joint {joint!r}"
-            wanted = expression(what, given, {"t": symbols.t})
-            distance += (q[robot.coordinate_names.index(joint)] - wanted) ** 2
+            reference = expression(what, given, {"t": symbols.t})
+            distance += (q[robot.coordinate_names.index(joint)] - reference) ** 2
         return self.weight / 2 * distance
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
-        wanted = ", ".join(f"{joint} at {given}" for joint, given in self.reference.items())
-        return f"reference_cost: {wanted}; {self.weight:g} per rad^2 (m^2)"
+        """One line for the description of a scene."""
+        reference = ", ".join(f"{joint} at {given}" for joint, given in self.reference.items())
+        return f"reference_cost: {reference}; {self.weight:g} per rad^2 (m^2)"

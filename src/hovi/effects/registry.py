@@ -8,16 +8,16 @@ from hovi.effects.effect import Effect
 from hovi.errors import SceneError
 
 REGISTRY: dict[str, type[Effect]] = {}
-"""The effects of hovi.effects, in its order, and those that were registered after them."""
+"""The effects of hovi.effects, in its order, then those registered by users."""
 
 Kind = TypeVar("Kind", bound=type[Effect])
 
 
 def register(effect: Kind) -> Kind:
-    """Let scene files and motions on file name an effect of one's own: a decorator of its class.
+    """A class decorator that makes a user-defined effect available in scene and motion files.
 
-    The class has to be registered again wherever such a file is read.
-    Raises SceneError when its key belongs to another effect.
+    The class must be registered before such a file is read.
+    Raises SceneError if another effect has the same key.
     """
     known = REGISTRY.setdefault(effect.key, effect)
     if known is not effect:

@@ -1,4 +1,4 @@
-"""Viscous friction of the joints."""
+"""Viscous joint friction."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ViscousFriction(Effect):
     """tau_i += d_i v_i. [SicilianoKhatib2016, sec. 7.2]
 
     coefficient: d, 0 or more, in [N m s/rad] or [N s/m].
-    from_urdf: take the `damping` that the URDF states instead.
+    from_urdf: use the `damping` of the URDF instead.
     """
 
     coefficient: JointValues | None = None
@@ -36,7 +36,7 @@ class ViscousFriction(Effect):
     key: ClassVar[str] = "viscous_friction"
 
     def check(self, robot: Robot) -> None:
-        """Refuse negative numbers, unknown joints, and a URDF without damping."""
+        """Raise SceneError for negative values, unknown joints, or a URDF without damping."""
         self.values(robot)
 
     def values(self, robot: Robot) -> npt.NDArray[np.float64]:
@@ -51,5 +51,5 @@ class ViscousFriction(Effect):
         return ca.SX(ca.DM(self.values(robot))) * symbols.v
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return f"viscous_friction: {in_words(self.coefficient, 'N m s/rad (N s/m)')}"

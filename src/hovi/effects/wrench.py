@@ -1,4 +1,4 @@
-"""A force and a moment from outside, at a frame."""
+"""An external wrench on a frame."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ AXES = ("world", "frame")
 
 @dataclass(frozen=True)
 class Wrench(Effect):
-    """tau -= J(q)^T (f, m), for a wrench that acts on the robot. [Featherstone2008, sec. 5.3]
+    """tau -= J(q)^T (f, m), for a wrench (f, m) on the robot. [Featherstone2008, sec. 5.3]
 
-    frame: one of the robot's frames, at whose origin the force acts.
+    frame: a frame of the robot; the force acts at its origin.
     force: f, in [N]. moment: m, in [N m]. Each component is a number or a formula of t.
-    axes: "world", or "frame" for components along the frame's own axes.
+    axes: "world" or "frame", the axes of the components.
     """
 
     frame: str
@@ -35,7 +35,7 @@ class Wrench(Effect):
     key: ClassVar[str] = "wrench"
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown frames and axes, and what is no number and no formula."""
+        """Raise SceneError for an unknown frame or axes, and for invalid components."""
         require_frame(robot, self.key, self.frame)
         if self.axes not in AXES:
             raise SceneError(f"effect 'wrench': axes {self.axes!r}: {nearest(self.axes, AXES)}")
@@ -52,7 +52,7 @@ class Wrench(Effect):
         return -motion.joint_torque(f, None if m.is_zero() else m)
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
+        """One line for the description of a scene."""
         return (
             f"wrench: force {in_words(self.force)} N, moment {in_words(self.moment)} N m "
             f"at {self.frame} in the axes of the {self.axes}"

@@ -1,1 +1,1 @@
-"""Initial value problems: Legendre transforms, discrete flows, simulation, replay of torques."""
+"""Initial value problems: Legendre transforms, discrete flows, simulation, torque replay."""

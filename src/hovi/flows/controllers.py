@@ -1,4 +1,4 @@
-"""Torques that play a plan: as planned, or with a feedback that holds the motion to it."""
+"""Controllers that execute a plan: open loop, or with feedback."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Controller(ABC):
-    """u(q, v, t) for a plan that is played from its start.
+    """u(q, v, t) for a plan that is executed from its start.
 
     plan: the motion and its torques.
     """
 
     plan: Trajectory
-    _last: dict[bytes, Sample] = field(default_factory=dict, init=False, repr=False)
+    _cache: dict[bytes, Sample] = field(default_factory=dict, init=False, repr=False)
 
     @abstractmethod
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """u (P, nv) in [N m] or [N], and du/d(q, v), shape (P, nv, 2, nv)."""
 
     def planned(self, t: Array) -> Sample:
-        """q, v, a and tau of the plan at t (P,), its ends held; the last times are remembered."""
+        """q, v, a and tau of the plan at t (P,), clipped to its duration; caches the last call."""
         key = t.tobytes()
-        if key not in self._last:
-            self._last.clear()
-            self._last[key] = self.plan.sample(np.clip(t, 0.0, self.plan.duration))
-        return self._last[key]
+        if key not in self._cache:
+            self._cache.clear()
+            self._cache[key] = self.plan.sample(np.clip(t, 0.0, self.plan.duration))
+        return self._cache[key]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,7 @@ class OpenLoop(Controller):
     """u = tau_plan(t)."""
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """The planned torques, whatever happens."""
+        """The planned torques, independent of q and v."""
         return self.planned(t).tau, np.zeros((*v.shape, 2, v.shape[1]))
 
 
@@ -62,31 +62,30 @@ class ProportionalDerivative(Controller):
 
     @classmethod
     def of_bandwidth(cls, plan: Trajectory, robot: Robot, omega: float) -> ProportionalDerivative:
-        """K = M_ii omega^2 and D = 2 M_ii omega, with the masses at the plan's start.
+        """K = M_ii omega^2 and D = 2 M_ii omega, with the inertias at the start of the plan.
 
-        omega: what each joint would have alone, critically damped, in [rad/s].
+        omega: bandwidth of each decoupled joint, critically damped, in [rad/s].
         """
         mass = np.diagonal(MassMatrix(robot.model)(plan.q[:1])[0])
         return cls(plan, mass * omega**2, 2 * mass * omega)
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """Feedback by joint."""
-        wanted = self.planned(t)
-        ahead, slopes = _ahead(self.plan, q, wanted.q)
-        u = wanted.tau + self.stiffness * ahead + self.damping * (wanted.v - v)
-        damped = np.broadcast_to(-np.diag(self.damping), slopes.shape)
-        return u, np.stack([self.stiffness[:, None] * slopes, damped], axis=2)
+        """Independent feedback at each joint."""
+        planned = self.planned(t)
+        error, error_slopes = _position_error(self.plan, q, planned.q)
+        u = planned.tau + self.stiffness * error + self.damping * (planned.v - v)
+        damped = np.broadcast_to(-np.diag(self.damping), error_slopes.shape)
+        return u, np.stack([self.stiffness[:, None] * error_slopes, damped], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
 class ComputedTorque(Controller):
     """u = tau(q, v, a_plan + w^2 (q_plan (-) q) + 2 w (v_plan - v)) of the plan's own scene.
 
-    Where the world is as planned, the error decays like exp(-w t) (1 + w t) in every joint; in
-    orientations as far as it is small.
-    [SicilianoKhatib2016, sec. 8.5]
+    If the plan's scene matches the simulated one, the error decays like exp(-w t) (1 + w t) in
+    every joint; for orientations, if it is small. [SicilianoKhatib2016, sec. 8.5]
 
-    scene: what is believed. omega: w, in [rad/s].
+    scene: the model of the controller. omega: w, in [rad/s].
     """
 
     scene: Scene
@@ -94,53 +93,53 @@ class ComputedTorque(Controller):
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
         """Inverse dynamics of the corrected acceleration."""
-        wanted, w, n = self.planned(t), self.omega, v.shape[1]
-        ahead, slopes = _ahead(self.plan, q, wanted.q)
-        a = wanted.a + w**2 * ahead + 2 * w * (wanted.v - v)
+        planned, w, n = self.planned(t), self.omega, v.shape[1]
+        error, error_slopes = _position_error(self.plan, q, planned.q)
+        a = planned.a + w**2 * error + 2 * w * (planned.v - v)
         u, J = self.scene.torques.linearize(q, v, a, t)
         J = J.reshape(len(t), n, 3, n)
-        by_q = J[:, :, 0] + w**2 * J[:, :, 2] @ slopes
+        by_q = J[:, :, 0] + w**2 * J[:, :, 2] @ error_slopes
         return u, np.stack([by_q, J[:, :, 1] - 2 * w * J[:, :, 2]], axis=2)
 
 
 @dataclass(frozen=True, eq=False)
-class WithoutMotors(Controller):
-    """The torques of a controller, and none at joints that carry none.
+class PassiveJoints(Controller):
+    """The torques of a controller, set to zero at passive joints.
 
-    driver: whose torques they are. passive: places of those joints in v.
+    driver: the controller. passive: indices of the passive joints in v.
     """
 
     driver: Controller
     passive: npt.NDArray[np.intp]
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """As the driver's, with zeros."""
+        """The driver's torques with zeros at passive joints."""
         u, slope = (np.array(x) for x in self.driver.evaluate(q, v, t))
         u[:, self.passive], slope[:, self.passive] = 0.0, 0.0
         return u, slope
 
 
-def _ahead(plan: Trajectory, q: Array, wanted: Array) -> tuple[Array, Array]:
+def _position_error(plan: Trajectory, q: Array, planned: Array) -> tuple[Array, Array]:
     """q_plan (-) q, shape (P, nv), and its derivatives by q in the tangent space, (P, nv, nv)."""
     if plan.space is None:
         n = q.shape[1]
-        return wanted - q, np.broadcast_to(-np.eye(n), (len(q), n, n))
-    ahead = plan.space.difference(q, wanted)
-    return ahead, Chart(plan.space).difference_slopes(ahead)
+        return planned - q, np.broadcast_to(-np.eye(n), (len(q), n, n))
+    error = plan.space.difference(q, planned)
+    return error, Chart(plan.space).difference_slopes(error)
 
 
 FEEDBACKS = ("none", "pd", "computed-torque")
 
 
 def controller(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> Controller:
-    """The controller of a name.
+    """A controller by name.
 
-    feedback: "none", "pd" or "computed-torque". scene: what is driven; its robot's masses scale
-    the gains, and its passive joints get no torque.
+    feedback: "none", "pd" or "computed-torque". scene: the simulated scene; the inertias of its
+    robot scale the gains, and its passive joints get no torque.
     bandwidth: of the feedback, in [rad/s]. Raises InputError.
     """
     driver = _driver(plan, feedback, scene, bandwidth)
-    return WithoutMotors(plan, driver, scene.passive_coordinates) if scene.passive else driver
+    return PassiveJoints(plan, driver, scene.passive_coordinates) if scene.passive else driver
 
 
 def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> Controller:
@@ -160,7 +159,7 @@ def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> 
         )
     if plan.scene is None:
         raise InputError(
-            "computed torques need the plan's scene, which a robot given as a pinocchio.Model does "
-            "not leave in a file; choose the feedback 'pd'."
+            "computed torques need the plan's scene, which files do not store for a robot given as "
+            "a pinocchio.Model; choose the feedback 'pd'."
         )
     return ComputedTorque(plan, plan.scene, bandwidth)

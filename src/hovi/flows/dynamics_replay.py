@@ -1,12 +1,10 @@
-"""Do the planned torques move the robot as planned? Asked of SciPy and of Pinocchio's ABA.
+"""Forward-simulates the planned torques with Pinocchio's ABA and SciPy, and compares.
 
-Where joints mimic others, which ABA does not know, it is asked of the mass matrix instead: that of
-Pinocchio for the robot with every joint on its own, pulled back by the same G as the planner's
-torques. An error in G would then be in both.
+The forward dynamics are integrated from every node to the next by an independent method. This
+verifies dynamics and torques, not optimality: the inverse dynamics of any curve reproduce it.
 
-The forward dynamics are integrated under the planned torques by an independent method, from every
-node to the next. That certifies dynamics and torques. It says nothing of optimality: the inverse
-dynamics of any curve reproduce that curve.
+ABA does not support mimic joints. For these, accelerations follow from the mass matrix of the
+uncoupled robot, reduced by the same G as the planned torques: an error in G is not detected.
 """
 
 from __future__ import annotations
@@ -25,19 +23,20 @@ from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-RELATIVE, ABSOLUTE = 1e-11, 1e-13
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-11, 1e-13
 """Tolerances of the integration."""
-SAME = 1e-9
-"""Relative difference of torques below which they count as the same."""
+TORQUE_TOLERANCE = 1e-9
+"""Relative difference below which torques are considered equal."""
 
 
 @dataclass(frozen=True, eq=False)
 class DynamicsReplay:
-    """By how much the driven robot misses each node when it starts at the node before.
+    """Deviations at each node of a simulation that starts at the previous node.
 
-    q, v: of every joint coordinate, shape (N, nv), in [rad] and [rad/s]; metres for sliding joints.
+    q, v: of every joint coordinate, shape (N, nv), in [rad] and [rad/s]; metres for prismatic
+        joints.
     tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
-    sliding: which joint coordinates slide, shape (nv,).
+    sliding: which joint coordinates are lengths, shape (nv,).
     """
 
     q: Array = field(repr=False)
@@ -48,29 +47,29 @@ class DynamicsReplay:
 
     @property
     def angle(self) -> float:
-        """The largest miss of a turning joint, in [rad]."""
+        """The largest deviation of an angle, in [rad]."""
         return float(np.max(self.q[:, ~self.sliding], initial=0.0))
 
     @property
     def slide(self) -> float:
-        """The largest miss of a sliding joint, in [m]."""
+        """The largest deviation of a length, in [m]."""
         return float(np.max(self.q[:, self.sliding], initial=0.0))
 
     @property
     def largest_tip(self) -> float:
-        """The largest miss of the frame, in [m]."""
+        """The largest deviation of the frame, in [m]."""
         return float(np.max(self.tip))
 
 
 def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> DynamicsReplay:
-    """Drive the robot with the planned torques, all intervals at once, by SciPy's DOP853.
+    """Simulate all intervals under the planned torques at once, by SciPy's DOP853.
 
-    qdd = ABA(q, v, tau - what effects add to RNEA), with tau of the interpolant at the same times
-    and zero at passive joints; each interval starts at its node, in the chart of that node.
-    frame: whose miss is told, by default the robot's tip_frame.
-    Raises InputError where this cannot be done, with the reason.
+    a = ABA(q, v, tau - torques of effects), with tau of the interpolant at the same times and zero
+    at passive joints; each interval starts at its node, in the chart of that node.
+    frame: whose deviation is reported, by default the robot's tip_frame.
+    Raises InputError with the reason if this is not possible.
     """
-    from scipy.integrate import solve_ivp  # a quarter of a second, for replays alone
+    from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
     scene, robot = _scene_of(trajectory)
     name = robot.tip_frame if frame is None else frame
@@ -87,9 +86,17 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         return np.concatenate([chart_rates(robot, start, x, hv), h * h * a]).ravel()
 
     first = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
-    done = solve_ivp(rates, (0.0, 1.0), first, "DOP853", t_eval=[1.0], rtol=RELATIVE, atol=ABSOLUTE)
+    done = solve_ivp(
+        rates,
+        (0.0, 1.0),
+        first,
+        "DOP853",
+        t_eval=[1.0],
+        rtol=RELATIVE_TOLERANCE,
+        atol=ABSOLUTE_TOLERANCE,
+    )
     if not done.success or not np.isfinite(done.y).all():
-        raise InputError(f"SciPy's DOP853 did not come to the end of an interval: {done.message}")
+        raise InputError(f"SciPy's DOP853 did not reach the end of an interval: {done.message}")
     x, hv = done.y[:, -1].reshape(2, N, n)
     arrived = robot.integrate(start, x)
     tips = [robot.frame_position(name, q) for q in (arrived, trajectory.q[1:])]
@@ -103,9 +110,9 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
 
 
 def chart_rates(robot: Robot, origin: Array, x: Array, v: Array) -> Array:
-    """x' of q = origin (+) x that moves with velocity v: v itself for ordinary joints, (M, nv).
+    """x' of q = origin (+) x with velocity v, (M, nv): v itself on commutative groups.
 
-    Elsewhere v = D x' with the derivative D of (+) by x, in the tangent space at q.
+    Otherwise v = D x' with the derivative D of (+) with respect to x, in the tangent space at q.
     """
     if all(joint.nq == joint.nv or joint.nv == 1 for joint in list(robot.model.joints)[1:]):
         return v
@@ -119,7 +126,7 @@ def chart_rates(robot: Robot, origin: Array, x: Array, v: Array) -> Array:
 class _ForwardDynamics:
     """a(q, v, tau, t) of a scene by Pinocchio's ABA.
 
-    What effects add to RNEA is taken from the torques first; it must not depend on a.
+    Torques of effects are subtracted first; they must not depend on a.
     """
 
     def __init__(self, scene: Scene, trajectory: Trajectory) -> None:
@@ -134,11 +141,11 @@ class _ForwardDynamics:
         moving = self._added(motion.q, motion.v, motion.a, t)
         still = self._added(motion.q, motion.v, np.zeros_like(motion.a), t)
         size = max(float(np.max(np.abs(motion.tau))), 1e-12)
-        if np.max(np.abs(moving - still)) > SAME * size:
+        if np.max(np.abs(moving - still)) > TORQUE_TOLERANCE * size:
             raise InputError(
-                "an effect adds torques that depend on the acceleration, which ABA does not know"
+                "an effect adds torques that depend on the acceleration, which ABA does not support"
             )
-        self.plain = bool(np.max(np.abs(still)) <= SAME * size)
+        self.plain = bool(np.max(np.abs(still)) <= TORQUE_TOLERANCE * size)
 
     def __call__(self, q: Array, v: Array, tau: Array, t: Array) -> Array:
         """Accelerations, shape (M, nv)."""

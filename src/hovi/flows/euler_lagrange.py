@@ -28,10 +28,10 @@ Form = Literal["plus", "minus", "momentum"]
 
 @dataclass(frozen=True, eq=False)
 class Regularity:
-    """Whether end points determine a motion: W_d = [D_{i, k+j} L_d].
+    """Regularity of L_d, that is whether end points determine a motion: W_d = [D_{i, k+j} L_d].
 
-    matrix: shape (B, k n, k n). determinant: (B,). condition: (B,), in the 2-norm, of W_d as it
-    is, whose blocks have different powers of h.
+    matrix: shape (B, k n, k n). determinant: (B,). condition: (B,), in the 2-norm, of the unscaled
+    W_d, whose blocks have different powers of h.
     """
 
     matrix: Array
@@ -64,7 +64,7 @@ def discrete_hamiltonian_flow(
 ) -> tuple[Array, Array]:
     """The discrete Hamiltonian flow (x0, p0) -> (x1, p1) on T*T^(k-1)Q, in three forms.
 
-    "momentum": F^+ o (F^-)^-1, what `flow` steps with.
+    "momentum": F^+ o (F^-)^-1, the steps of `flow`.
     "plus": F^+ o F_{L_d} o (F^+)^-1. "minus": F^- o F_{L_d} o (F^-)^-1.
     They are equal [ColomboFerraroMartin2016, corollary to theorem 2].
     """

@@ -1,7 +1,7 @@
 """The exact discrete Lagrangian: the action of the exact solution between two points.
 
 [ColomboFerraroMartin2016, section 3]: L_d^e(x0, x1) = integral of L along the solution of the
-Euler-Lagrange equations with these ends. The curve's degree is raised until nothing changes.
+Euler-Lagrange equations with these ends. The degree of the curve is raised until it converges.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from hovi.schemes import Scheme, galerkin
 
 Array = npt.NDArray[np.float64]
 
-LADDER = (4, 7, 10, 14, 19, 25, 32, 40)
-"""Inner modes that are tried in turn."""
+INNER_MODES = (4, 7, 10, 14, 19, 25, 32, 40)
+"""Numbers of inner modes, in the order in which they are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,8 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
 
     lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularized momenta (for
         k = 2 h p and p~ - h p), relative to the largest.
-    The solution that is followed is the one that exists for small h; where h has passed a
-    conjugate point of it, InputError says so, as it does where the tolerance is not met.
+    It belongs to the solution that exists for small h. InputError is raised if h is beyond its
+    first conjugate point, or if the tolerance is not met.
     """
 
     lagrangian: Lagrangian
@@ -60,7 +60,7 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
     def _raised(self, solve: Callable[[SchemeLagrangian, Segment | None], Segment]) -> Segment:
         """Raise the degree until the ends and their momenta stop changing."""
         before: Segment | None = None
-        for inner_modes in LADDER:
+        for inner_modes in INNER_MODES:
             ld = SchemeLagrangian(self.lagrangian, _table(inner_modes, self.k), self.h)
             segment = solve(ld, None)
             if before is not None and _change(before, segment) <= self.tolerance:
@@ -68,19 +68,20 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
                 return segment
             before = segment
         raise InputError(
-            f"the exact discrete Lagrangian is not known to {self.tolerance:g} at h = {self.h:g} s "
-            f"with {LADDER[-1]} inner modes; take a shorter step or a larger tolerance."
+            f"the exact discrete Lagrangian did not converge to {self.tolerance:g} at "
+            f"h = {self.h:g} s with {INNER_MODES[-1]} inner modes; use a shorter step or a larger "
+            "tolerance."
         )
 
 
 def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float) -> float:
-    """The first conjugate point along a solution: how long h of L_d^e may be there, in [s].
+    """The first conjugate point along a solution, the upper bound of h of L_d^e, in [s].
 
-    By Morse's index theorem the action between fixed ends is a minimum up to it: the least
-    eigenvalue of the inner modes' Hessian passes through zero.
-    x0, p0: start, shape (k, n). longest: where to stop looking. Returns inf if there is none.
+    By Morse's index theorem the action between fixed ends is a minimum up to it; there, the
+    smallest eigenvalue of the inner modes' Hessian is zero.
+    x0, p0: start, shape (k, n). longest: end of the search, in [s]. Returns inf if there is none.
     """
-    scheme = _table(LADDER[-1], lagrangian.order)
+    scheme = _table(INNER_MODES[-1], lagrangian.order)
 
     def least(h: float) -> float:
         segment = SchemeLagrangian(lagrangian, scheme, h).from_start(x0[None], p0[None])
@@ -95,10 +96,10 @@ def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float)
 
 
 def _change(before: Segment, after: Segment) -> float:
-    """What a higher degree changed: derivatives of phi in (h x0, w), and the end not given.
+    """The relative change by a higher degree, of the derivatives of phi in (h x0, w) and the ends.
 
-    Momenta are these derivatives with powers of 1/h, which would only magnify rounding here; w
-    itself would magnify it by the condition of d2L/dq^(k)2.
+    Momenta are these derivatives times powers of 1/h, which amplify rounding errors; w amplifies
+    them by the condition of d2L/dq^(k)2.
     """
     k = after.k
     scale = np.concatenate([np.full(k, after.h), np.ones(k)])[:, None]
@@ -119,8 +120,8 @@ def _refuse_conjugate_points(segment: Segment) -> None:
     if passed > 0:
         raise InputError(
             f"h = {segment.h:g} s is too long for the exact discrete Lagrangian: {passed} "
-            "conjugate point(s) lie before its end, so that the solution between the two ends is "
-            "not the one of least action; take a shorter step."
+            "conjugate point(s) lie before its end, so the solution between the two ends does not "
+            "minimize the action; use a shorter step."
         )
 
 

@@ -1,14 +1,14 @@
 """The discrete Lagrangian on groups: L_d on T^(k-1)Q x T^(k-1)Q, one interval at a time, k = 1, 2.
 
-An interval's curve is q(s) = q0 (+) x(s) in the chart of its first node, which moves with that
-node: L_d = h sum_j w_j L(q0 (+) x_j, J(x_j) x_j', ..) keeps the left symmetries of L. A step solves
+An interval's curve is q(s) = q0 (+) x(s) in the chart centered at its first node, so
+L_d = h sum_j w_j L(q0 (+) x_j, J(x_j) x_j', ..) has the left symmetries of L. A step solves
 
     p0 = -D_1 .. -D_k L_d,   0 = D_c L_d,   p1 = D_{k+1} .. D_2k L_d
 
-for the moments w of x^(k) and the inner modes c, which stay of order one as h tends to zero. What
-`SchemeLagrangian` is where configurations are vectors. [MarsdenPekarskyShkoller1999]
+for the moments w of x^(k) and the inner modes c, which stay of order one as h tends to zero. The
+counterpart of `SchemeLagrangian` on groups. [MarsdenPekarskyShkoller1999]
 
-A point of T^(k-1)Q is a row (q, q', ..) of nq + (k - 1) nv numbers.
+A point of T^(k-1)Q is a row (q, q', ..) of length nq + (k - 1) nv.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 
-WIDEST = 3.0
-"""Turn of an orientation in one step, in [rad], that a chart holds: less than half a turn."""
+MAX_ROTATION = 3.0
+"""Largest rotation of an orientation in one step, in [rad]: less than half a rotation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +69,8 @@ class ChartedLagrangian:
             raise InputError(f"a step must be positive and finite, got {self.h} s.")
         if self.k not in (1, 2) or self.scheme.derivatives != self.k:
             raise SchemeError(
-                "flows on groups are those of Lagrangians of order 1 or 2 with a scheme of the "
-                f"same order, got {self.k} and {self.scheme.derivatives}."
+                "flows on groups need a Lagrangian of order 1 or 2 and a scheme of the same "
+                f"order, got {self.k} and {self.scheme.derivatives}."
             )
 
     @property
@@ -85,7 +85,7 @@ class ChartedLagrangian:
 
     @property
     def regularized(self) -> Regularized:
-        """The change between the chart's end and w."""
+        """The transformation between the end in the chart and w."""
         return regularized(self.k, self.h)
 
     def split(self, x: Array) -> list[Array]:
@@ -97,7 +97,7 @@ class ChartedLagrangian:
     ) -> ChartedSegment:
         """The segment that starts at a point (1, 1, nq + ..) with momenta (1, k, nv).
 
-        By Newton's method. Raises InputError where there is none, or it turns too far.
+        By Newton's method. Raises InputError if there is none, or if it rotates too far.
         """
         k, n, r, R = self.k, self.n, self.scheme.inner_modes, self.regularized
         start = x0[0]
@@ -134,7 +134,7 @@ class ChartedLagrangian:
 
     @cached_property
     def _scheme(self) -> Scheme:
-        """The scheme as a table for k = 2, which ignores the velocities of the ends for k = 1."""
+        """The scheme as a table for k = 2; for k = 1 it ignores the end velocities."""
         if self.k == 2:
             return self.scheme
         first = self.scheme.table  # (Q, 2, 1 + r) over (Z0, c)
@@ -178,7 +178,7 @@ class ChartedLagrangian:
         return np.asarray(t0 + self.h * self.scheme.points)
 
     def _force(self, gradient: Array) -> Array:
-        """A gradient at the points with zeros for what L does not depend on, (Q, 3, n)."""
+        """A gradient at the points, padded with zeros up to order 2, (Q, 3, n)."""
         return np.append(gradient, np.zeros((len(gradient), 2 - self.k, self.n)), axis=1)
 
     def _momenta(self, interval: IntervalCharts, start: Array, t0: float) -> tuple[Array, Array]:
@@ -193,28 +193,28 @@ class ChartedLagrangian:
     def _expand(
         self, interval: IntervalCharts, start: Array, t0: float
     ) -> tuple[Array, Array, Array]:
-        """p0 (1, k, n), D_c L_d (r, n) and the derivatives of both by (w, c)."""
+        """p0 (1, k, n), D_c L_d (r, n) and their derivatives with respect to (w, c)."""
         n, k, Q = self.n, self.k, len(self.scheme.weights)
         jets = self._jets(interval, start)
         _, gradient, hessian = self.lagrangian.evaluate(*jets, t=self._times(t0))
         force = self._force(gradient)
-        # the work of a force has no symmetric Hessian, so that the chart's part stands alone
-        g, bent = interval.expand(force, np.zeros((Q, 3 * n, 3 * n)))
+        # the "Hessian" with a force is not symmetric: the chart's curvature is added separately
+        g, chart_curvature = interval.expand(force, np.zeros((Q, 3 * n, 3 * n)))
         used = self._used
-        bent = bent[0][np.ix_(used, used)].transpose(0, 2, 1, 3)
+        chart_curvature = chart_curvature[0][np.ix_(used, used)].transpose(0, 2, 1, 3)
         D = self._point_steps(interval)  # (C, Q, (k + 1) n), C columns
         weighted = self.h * self.scheme.weights[:, None] * D
         size = (k + 1) * n
         moved = np.matmul(D.transpose(1, 0, 2), hessian.reshape(Q, size, size).swapaxes(1, 2))
         H = weighted.reshape(len(D), -1) @ moved.transpose(0, 2, 1).reshape(-1, len(D))
-        H += bent.reshape(len(D), len(D))
+        H += chart_curvature.reshape(len(D), len(D))
         H[: k * n] *= -np.repeat([1.0, self.h], n)[: k * n, None]
         H = np.delete(H, np.s_[k * n : 2 * k * n], axis=0)[:, k * n :]  # rows (p0, c)
         H = H @ self._columns(interval)
         return self._ends(interval, force)[0], g[0, 4:], H
 
     def _columns(self, interval: IntervalCharts) -> Array:
-        """(q1, h v1, h^k c) by (w, c), in the tangent space, (C, (k + r) n)."""
+        """d(q1, h v1, h^k c) / d(w, c) in the tangent space, (C, (k + r) n)."""
         n, k, r = self.n, self.k, self.scheme.inner_modes
         columns = self.h**k * np.eye((k + r) * n)
         ends = np.kron(self.regularized.gamma, np.eye(n))
@@ -222,14 +222,14 @@ class ChartedLagrangian:
         return columns
 
     def _end_slopes(self, interval: IntervalCharts) -> Array:
-        """(q1, h v1) by (x1, h x1'), for k = 1 without the velocities, (k n, k n).
+        """d(q1, h v1) / d(x1, h x1'), for k = 1 without the velocities, (k n, k n).
 
-        h v1 = J(x1) y with y = h x1'. The rate of J(x1) y by x1 along e follows from those of J e
-        and J y along y and e, of which charts know the sum, and the bracket is the difference.
+        h v1 = J(x1) y with y = h x1'. Charts give the sum of the derivatives of J e along y and of
+        J y along e; their difference is the bracket.
         """
         n, (x1, y) = self.n, interval.ends[0]
         each, still = np.eye(n), np.zeros((n, n))
-        chart, origin = Chart(self.space), np.ones((n, self.space.nq))  # wherever it stands
+        chart, origin = Chart(self.space), np.ones((n, self.space.nq))  # any origin
         _, J, own = chart.jet(origin, still + x1, each, still)
         if self.k == 1:
             return J.T
@@ -255,10 +255,10 @@ class ChartedLagrangian:
         return steps.reshape(C, -1, (self.k + 1) * n)
 
     def _check(self, x1: Array, found: bool) -> None:
-        turns = [x1[f.v][list(f.group.angular)] for f in self.space.curved]
-        widest = max((float(np.linalg.norm(turn)) for turn in turns), default=0.0)
-        if not (found and widest < WIDEST):
+        rotations = [x1[f.v][list(f.group.angular)] for f in self.space.curved]
+        largest = max((float(np.linalg.norm(rotation)) for rotation in rotations), default=0.0)
+        if not (found and largest < MAX_ROTATION):
             raise InputError(
                 f"the discrete equations of a step of h = {self.h:g} s have no solution near the "
-                "one sought: take a shorter step, or smaller momenta."
+                "initial guess: use a shorter step or smaller momenta."
             )

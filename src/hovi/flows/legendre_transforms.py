@@ -1,9 +1,9 @@
 """Legendre transforms: the continuous FL, and F+ and F- of a discrete Lagrangian.
 
-[ColomboFerraroMartin2016, sections 3 and 4; F+ and F- as its theorems use them, the other way
-round than its first display prints them]
+[ColomboFerraroMartin2016, sections 3 and 4; F+ and F- as in its theorems, interchanged with respect
+to its first display]
 
-Points of T^(k-1)Q and momenta have shape (B, k, n), B of them at a time; (k, n) does as well.
+Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n).
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
     p_{k-1} = dL/dq^(k) and p_{j-1} = dL/dq^(j) - d/dt p_j; for k = 2 it is
     (q, v, dL/dv - d/dt dL/da, dL/da). [ColomboFerraroMartin2016, section 4; deLeonRodrigues1985]
 
-    lagrangian: not dependent on time; of order 3 or more only as a CasadiLagrangian.
-    jet: 2 k arrays of shape (B, n) or (n,). On groups x is one row, (B, 1, nq + (k - 1) nv).
+    lagrangian: independent of time; a CasadiLagrangian for order 3 or more.
+    jet: 2 k arrays of shape (B, n) or (n,). On groups x has shape (B, 1, nq + (k - 1) nv).
     """
     arrays = [np.asarray(x, dtype=np.float64) for x in jet]
     k = lagrangian.order
@@ -73,7 +73,7 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
 def highest_derivative(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
     """q^(k) of p_{k-1} = dL/dq^(k)(x, q^(k)), shape (B, n) for x and p of shape (B, k, n).
 
-    x: or (q, q', ..., q^(k-1)), k arrays of B rows, as on groups.
+    x: alternatively (q, q', ..., q^(k-1)), k arrays with B rows, as on groups.
     """
     jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
 
@@ -134,5 +134,5 @@ def _symbolic_momenta(lagrangian: Lagrangian, jet: list[Array]) -> Array:
 
 
 def total_derivative(expression: ca.SX, jet: list[ca.SX]) -> ca.SX:
-    """d/dt of an expression along the curve whose jet (q, q', ...) the symbols are."""
+    """d/dt of an expression along a curve with the jet (q, q', ...)."""
     return ca.jtimes(expression, ca.vertcat(*jet[:-1]), ca.vertcat(*jet[1:]))

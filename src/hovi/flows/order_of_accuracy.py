@@ -1,4 +1,4 @@
-"""The order of a discrete Lagrangian by its definition: how fast L_d tends to L_d^e.
+"""The order of a discrete Lagrangian by its definition: the rate at which L_d tends to L_d^e.
 
 [ColomboFerraroMartin2016, section 4.1; MarsdenWest2001, section 2.3]
 """
@@ -32,12 +32,12 @@ class VariationalOrder:
 
     @property
     def slopes(self) -> Array:
-        """Of log error against log h between neighbouring steps, shape (H - 1,)."""
+        """d log(error) / d log(h) between consecutive steps, shape (H - 1,)."""
         return np.asarray(np.diff(np.log(self.errors)) / np.diff(np.log(self.steps)))
 
     @property
     def order(self) -> float:
-        """r of |L_d - L_d^e| <= C h^(r+1), from the line of least squares."""
+        """r of |L_d - L_d^e| <= C h^(r+1), by a least-squares fit."""
         return float(np.polyfit(np.log(self.steps), np.log(self.errors), 1)[0]) - 1.0
 
 
@@ -46,10 +46,9 @@ def variational_order(
 ) -> VariationalOrder:
     """Measure |L_d - L_d^e| on the solutions that start at given jets, for every step.
 
-    The difference may change sign along a motion, so that one segment says little: the largest
-    over all of them is taken.
+    The difference may change sign along a motion, so the maximum over all solutions is taken.
     steps: h, in [s]. jet: (q, q', ..., q^(2k-1)), 2 k arrays of shape (S, n), one row per solution.
-    Raises InputError where a step is too long for L_d^e.
+    Raises InputError if a step is too long for L_d^e.
     """
     x, p = legendre(lagrangian, *jet)
     errors = []

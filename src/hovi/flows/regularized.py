@@ -1,9 +1,9 @@
-"""Regularized coordinates of an interval: end data that stay apart as h tends to zero.
+"""Regularized coordinates of an interval: end data without cancellation as h tends to zero.
 
 [ColomboFerraroMartin2016, section 2]. A point of T^(k-1)Q is x = (q, q', ..., q^(k-1)). The end of
 an interval is x1 = T x0 + S z, with T[j, j+i] = h^i / i! (Taylor) and S = diag(h^(k-j)), and
 z = gamma w. At h = 0 the ends coincide, but z and w are still the moments of q^(k): (x0, w) are
-coordinates through h = 0, where (x0, x1) are not.
+coordinates up to and including h = 0, and (x0, x1) are not.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Regularized:
-    """The change of coordinates (x0, w) <-> (x0, z) <-> (x0, x1) of an interval of length h.
+    """The coordinate transformations (x0, w) <-> (x0, z) <-> (x0, x1) of an interval of length h.
 
     k: order of the Lagrangian. h: length of the interval, in [s].
     Arrays of jets and moments have shape (..., k, n).
@@ -53,7 +53,7 @@ class Regularized:
 
     @cached_property
     def inverse_gamma(self) -> Array:
-        """Its inverse."""
+        """The inverse of gamma, shape (k, k)."""
         return inverse_gamma(self.k)
 
     @cached_property
@@ -63,7 +63,7 @@ class Regularized:
 
     @cached_property
     def back(self) -> Array:
-        """gamma^T S T^-T, by which forces along the interval enter the equations of w, (k, k)."""
+        """gamma^T S T^-T, which maps forces along the interval to the equations of w, (k, k)."""
         return np.asarray(self.gamma.T @ (self.scale[:, None] * self.inverse_taylor.T))
 
     @cached_property
@@ -89,7 +89,7 @@ class Regularized:
         return np.asarray(self.inverse_gamma @ z)
 
     def w(self, x0: Array, x1: Array) -> Array:
-        """w from the two ends; it loses what their difference loses, eps |q| / h^k."""
+        """w from the two ends, with the rounding error eps |q| / h^k of their difference."""
         difference = x1 - x0 - (self.taylor - np.eye(self.k)) @ x0
         return self.w_of_z(difference / self.scale[:, None])
 
@@ -103,5 +103,5 @@ class Regularized:
 
 @lru_cache(maxsize=256)
 def regularized(k: int, h: float) -> Regularized:
-    """The change of coordinates of intervals of length h, made once."""
+    """The coordinate transformations of intervals of length h, cached."""
     return Regularized(k, h)

@@ -1,7 +1,7 @@
 """The discrete Lagrangian L_d on T^(k-1)Q x T^(k-1)Q for any k, one interval at a time.
 
-`DiscreteLagrangian` sums the action of a whole motion for the optimiser; here L_d is the function
-of two end points that the paper's theorems speak of.
+`DiscreteLagrangian` evaluates the action of a whole motion for the optimizer; here L_d is the
+function of two end points in the theorems of the paper.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ class SegmentLagrangian(ABC):
 
     @property
     def regularized(self) -> Regularized:
-        """The change between (x0, w) and (x0, x1)."""
+        """The transformation between (x0, w) and (x0, x1)."""
         return regularized(self.k, self.h)
 
     @abstractmethod
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
         """The segment with given ends, in regularized coordinates: x0, w of shape (B, k, n).
 
-        t0: time at its start, in [s]. Raises InputError when the inner modes are not found.
+        t0: time at its start, in [s]. Raises InputError if Newton's method fails.
         """
 
     @abstractmethod
@@ -80,8 +80,8 @@ class SchemeLagrangian(SegmentLagrangian):
     """L_d = h sum_j w_j L(q_j, q'_j, ..., q^(k)_j), extremal in the inner modes.
 
     lagrangian: L on T^(k)Q. scheme: a table for the same k. h: in [s].
-    Raises SchemeError when the orders differ, InputError for a step that is not positive or for
-    joints whose configurations are not vectors.
+    Raises SchemeError if the orders differ, InputError for a step that is not positive and for
+    joints with nq != nv.
     """
 
     lagrangian: Lagrangian
@@ -99,11 +99,11 @@ class SchemeLagrangian(SegmentLagrangian):
 
     @classmethod
     def of(cls, ld: DiscreteLagrangian) -> SchemeLagrangian:
-        """The L_d of every interval of a grid whose intervals are all alike."""
+        """The L_d of the intervals of a uniform grid."""
         return cls(ld.lagrangian, *uniform_grid(ld))
 
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
-        """Newton on the inner modes alone."""
+        """Newton's method for the inner modes."""
         B, k, r, n = len(x0), self.k, self.scheme.inner_modes, self.n
         if r == 0:
             return self._segment(x0, w, np.zeros((B, 0, n)), t0)
@@ -119,7 +119,7 @@ class SchemeLagrangian(SegmentLagrangian):
     def from_start(
         self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
     ) -> Segment:
-        """Newton on (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
+        """Newton's method for (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
         B, m = len(x0), self.k * self.n
         back, given = self._back, (self.regularized.back / self.h @ p0).reshape(B, m)
 
@@ -135,7 +135,7 @@ class SchemeLagrangian(SegmentLagrangian):
         return self._segment(x0, w, inner, t0)
 
     def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
-        """Newton on (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, where x0 follows from w."""
+        """Newton's method for (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, with x0 from w."""
         B, m, R = len(x1), self.k * self.n, self.regularized
         given = (R.gamma.T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
         moved = np.kron(R.inverse_taylor @ R.moments, np.eye(self.n))
@@ -152,7 +152,7 @@ class SchemeLagrangian(SegmentLagrangian):
         return self._segment(R.start(x1, w), w, inner, t0)
 
     def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
-        """The segment with given inner modes, taken as extremal."""
+        """The segment with given inner modes, which are assumed to be extremal."""
         return self._segment(x0, w, inner, t0)
 
     def jet(self, x0: Array, w: Array, inner: Array) -> list[Array]:
@@ -232,13 +232,13 @@ class SchemeLagrangian(SegmentLagrangian):
         if not found.all():
             raise InputError(
                 f"the discrete equations of a segment of h = {self.h:g} s have no solution near "
-                "the one sought: take a shorter step, or smaller momenta."
+                "the initial guess: use a shorter step or smaller momenta."
             )
         return root
 
 
 def uniform_grid(ld: DiscreteLagrangian) -> tuple[Scheme, float]:
-    """The scheme and the step of every interval. Raises InputError where they differ."""
+    """The scheme and the step of a uniform grid. Raises InputError if intervals differ."""
     steps, schemes = ld.grid.steps, ld.grid.groups
     if len(schemes) > 1 or np.ptp(steps) > 1e-12 * steps[0]:
         raise InputError("a discrete flow needs a grid of equal steps with one scheme.")
@@ -246,11 +246,11 @@ def uniform_grid(ld: DiscreteLagrangian) -> tuple[Scheme, float]:
 
 
 def check_segment(lagrangian: Lagrangian, h: float) -> None:
-    """Raise InputError where no discrete Lagrangian can be built on one interval."""
+    """Raise InputError for an invalid step, or a configuration space that is no vector space."""
     if not (np.isfinite(h) and h > 0):
         raise InputError(f"a step must be positive and finite, got {h} s.")
     if lagrangian.nq != lagrangian.nv:
         raise InputError(
-            "L_d between two points needs joints whose configurations are vectors (nq = nv): lock "
-            "the others with load_robot(..., locked=[...]), or step with hovi.flow."
+            "L_d between two points needs joints with nq = nv: lock the others with "
+            "load_robot(..., locked=[...]), or use hovi.flow."
         )

@@ -1,7 +1,7 @@
-"""A segment: one interval of a discrete motion, with all derivatives of L_d there.
+"""A segment: one interval of a discrete motion, with all derivatives of L_d.
 
-L_d(x0, x1) = h phi(x0, w), and phi and its derivatives stay of order one as h tends to zero. From
-them follow the momenta, D1 .. D2k and D11 .. of L_d, and the tangent of the discrete flow.
+L_d(x0, x1) = h phi(x0, w), and phi and its derivatives stay of order one as h tends to zero. They
+give the momenta, D1 .. D2k and D11 .. of L_d, and the tangent map of the discrete flow.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """B intervals of length h, the inner modes extremal.
+    """B intervals of length h with extremal inner modes.
 
-    scheme: what the action was discretised with. h: in [s].
+    scheme: of the discrete action. h: in [s].
     x0: jets (q, q', ..., q^(k-1)) at the start, shape (B, k, n).
     w: regularized coordinates, shape (B, k, n). inner: inner modes, shape (B, r, n); both in the
         units of q^(k).
@@ -49,7 +49,7 @@ class Segment:
 
     @property
     def regularized(self) -> Regularized:
-        """The change between (x0, w) and (x0, x1)."""
+        """The transformation between (x0, w) and (x0, x1)."""
         return regularized(self.k, self.h)
 
     @cached_property
@@ -80,7 +80,7 @@ class Segment:
 
     @property
     def step_derivative(self) -> Array:
-        """D_h of L_d with both ends held, shape (B,); minus the energy where L_d is exact."""
+        """D_h of L_d at fixed ends, shape (B,); for the exact L_d it is minus the energy."""
         powers = np.arange(self.k)[:, None] / self.h
         moved = np.sum(powers * (self.p1 * self.x1 - self.p0 * self.x0), axis=(1, 2))
         return np.asarray(self.step_rate + moved)
@@ -114,7 +114,7 @@ class Segment:
 
     @property
     def newton_matrix(self) -> Array:
-        """Matrix of a step from momenta in the unknowns w, shape (B, k n, k n).
+        """The Jacobian of `from_start` in the unknowns w, shape (B, k n, k n).
 
         d/dw of phi_w - gamma^T (S/h) T^-T (p0 + h phi_x): for k = 2 the equations are scaled as
         h p and p~ - h p. It tends to d2L/dq^(k)2 (x) I as h tends to zero.

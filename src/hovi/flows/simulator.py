@@ -1,7 +1,7 @@
-"""simulate: forced mechanics of a scene by the discrete Lagrange-d'Alembert equations.
+"""Simulates the mechanics of a scene by the discrete Lagrange-d'Alembert equations.
 
-The first-order sibling (k = 1) of the planner: L = K - V, with the torques that are put on the
-joints and what the effects resist with as forces. [MarsdenWest2001, section 3.2]
+The first-order counterpart (k = 1) of the planner: L = K - V, with the joint torques and the
+torques of effects as forces. [MarsdenWest2001, section 3.2]
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Array = npt.NDArray[np.float64]
 class Simulation:
     """A motion of a scene under given torques.
 
-    scene: what was simulated. lagrangian: K - V. flow: the discrete motion.
+    scene: the simulated scene. lagrangian: K - V. flow: the discrete motion.
     """
 
     scene: Scene
@@ -42,7 +42,7 @@ class Simulation:
     flow: Flow
 
     def __repr__(self) -> str:
-        """A robot, a time and a grid, for a terminal."""
+        """Robot, duration and grid, for a terminal."""
         name, N = self.scene.robot.name, len(self.t) - 1
         return f"<Simulation of {name!r}: {self.t[-1]:g} s in {N} intervals, order {self.order}>"
 
@@ -79,15 +79,15 @@ class Simulation:
 
     @property
     def work(self) -> tuple[Array, Array]:
-        """Work of the torques, and of the effects, since the start, (N + 1,) each, in [J].
+        """Work of the torques and of the effects since the start, (N + 1,) each, in [J].
 
-        At the quadrature points of the discrete motion: `energy` changes by their sum, to the
-        order of the integrator.
+        Integrated at the quadrature points: `energy` changes by their sum, to the order of the
+        integrator.
         """
         ld = self.flow.ld
         assert isinstance(ld, SchemeLagrangian | ChartedLagrangian)
         assert isinstance(ld.lagrangian, ForcedLagrangian)
-        w = self.flow.z  # for k = 1 both regularized coordinates are the same
+        w = self.flow.z  # for k = 1, z = w
         q, v = ld.jet(self.flow.x[:-1], w, self.flow.inner[:, : ld.scheme.inner_modes])
         t = (self.t[:-1, None] + ld.h * ld.scheme.points).ravel()
         done = []
@@ -99,7 +99,7 @@ class Simulation:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion to be replayed, plotted and saved: the cubic through (q, v) at the nodes."""
+        """The motion as a Trajectory: the cubic through (q, v) at the nodes."""
         q, v, h = self.q, self.v, self.flow.ld.h
         N, n = len(q) - 1, v.shape[1]
         grid = Grid(np.full(N, h), (galerkin(0),) * N)
@@ -122,13 +122,13 @@ def simulate(
 ) -> Simulation:
     """The motion of a scene's robot from a state, by a symplectic integrator of order 2 (r + 1).
 
-    scene: what is simulated; potentials that effects add to a cost are no forces.
+    scene: the scene; potentials that effects add to the cost are not forces.
     start: a State, or a configuration of shape (nq,) at rest.
     duration: in [s].
     torque: u(t), times (P,) -> (P, nv), in [N m]; a Trajectory for the torques of a plan; a
-        Controller for a feedback; none when not given.
+        Controller for feedback; none when None.
     intervals: N. inner_modes: r, from 0 (the midpoint rule).
-    Raises InputError or SceneError for what does not fit, or for steps too long to be solved.
+    Raises InputError or SceneError for invalid arguments, and for steps that are too long.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError(f"the duration must be positive and finite, got {duration} s.")

@@ -1,11 +1,11 @@
-"""The discrete flow: initial value problems, stepped in momentum form.
+"""The discrete flow: initial value problems in momentum form.
 
-One step solves p0 = -D_1 L_d(x0, x1), ... for the regularized coordinates w of the interval, whose
-equations stay well conditioned as h tends to zero, and moves on by increments,
+A step solves p0 = -D_1 L_d(x0, x1), ... for the regularized coordinates w of the interval, which
+is well conditioned as h tends to zero, and adds the increments
 
     x1 = x0 + (T - 1) x0 + S gamma w,      p1 = p0 + (T^-T - 1) p0 + h T^-T dphi/dx0,
 
-summed with compensation. [ColomboFerraroMartin2016, section 2 and corollary to theorem 2]
+by compensated summation. [ColomboFerraroMartin2016, section 2 and corollary to theorem 2]
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Flow:
-    """A discrete motion from momenta.
+    """A discrete motion from initial momenta.
 
     ld: the discrete Lagrangian. t: times of the nodes, shape (N + 1,), in [s].
     x: (q, q', ..., q^(k-1)) at the nodes, shape (N + 1, k, n); on groups in one row,
@@ -44,8 +44,8 @@ class Flow:
     p: momenta, shape (N + 1, k, n).
     z: regularized coordinates of the intervals, shape (N, k, n).
     inner: inner modes, (N, r, n).
-    rounding: what rounding of the start has grown to in q, shape (N + 1,); None when `force`d.
-    symmetries: of which the momentum maps are wanted, by name.
+    rounding: the error of q by amplified rounding of the start, shape (N + 1,); None with `force`.
+    symmetries: by name, for `momentum_maps`.
     """
 
     ld: SegmentLagrangian | ChartedLagrangian
@@ -83,21 +83,21 @@ class Flow:
     def reevaluated_momenta(self) -> tuple[Array, Array]:
         """-D_1 .. -D_k and D_{k+1} .. D_2k of L_d from the stored x, z and inner modes.
 
-        Shape (N, k, n) each: what F^- and F^+ make of the intervals, beside the carried p.
+        Shape (N, k, n) each: F^- and F^+ of the intervals, to compare with the propagated p.
         """
         if not isinstance(self.ld, SchemeLagrangian):
-            raise InputError("only the L_d of a scheme is evaluated again from its inner modes.")
+            raise InputError("only the L_d of a scheme can be evaluated from its inner modes.")
         w = self.ld.regularized.w_of_z(self.z)
         segment = self.ld.at(self.x[:-1], w, self.inner)
         return segment.p0, segment.p1
 
     @property
     def trajectory(self) -> Trajectory:
-        """The motion of a scene's effort Lagrangian as a Trajectory, to be replayed and saved."""
+        """The motion as a Trajectory, for the effort Lagrangian of a scene."""
         lagrangian, ld = self.ld.lagrangian, self.ld
         scene = getattr(lagrangian, "scene", None)
         if not isinstance(scene, Scene) or not isinstance(ld, SchemeLagrangian | ChartedLagrangian):
-            raise InputError("only the flow of a scene's effort Lagrangian is a Trajectory.")
+            raise InputError("only the flow of a scene's effort Lagrangian has a Trajectory.")
         q, v = self.jets
         path = DiscretePath(q.copy(), v.copy(), self.z, self.inner)
         N = len(self.z)
@@ -120,37 +120,37 @@ def flow(
 
     ld: a discrete Lagrangian on a uniform grid, or that of one interval.
     z0: start in T^(k-1)Q: a State for k = 2, or (q, q', ..., q^(k-1)) of shape (k, n); on groups
-        one row of nq + (k - 1) nv numbers.
-    p0: momenta, shape (k, n): (p, p~) for k = 2. `legendre` gives both from (q, v, a, jerk).
-    steps: how many. t0: time of the start, in [s].
-    force: go on where the flow's own instability has made of the rounding of the start an error in
-        q above `tolerance` (relative to the largest |q|, at least one); otherwise InputError says
-        how far the motion can be known. Optimal control is unstable both ways in time. Motions
-        on groups are not watched.
-    Raises InputError also for shapes that do not fit and steps that have no solution, SchemeError
-    for a scheme that is not regular.
+        one row of length nq + (k - 1) nv.
+    p0: momenta, shape (k, n): (p, p~) for k = 2. `legendre` computes both from (q, v, a, jerk).
+    steps: number of steps. t0: initial time, in [s].
+    force: continue where the instability of the flow has amplified rounding of the start to an
+        error in q above `tolerance` (relative to max(|q|, 1)); otherwise InputError states the time
+        up to which the motion is accurate. Optimal control is unstable in both directions of time.
+        Motions on groups are not monitored.
+    Raises InputError also for wrong shapes and steps without a solution, SchemeError for a scheme
+    that is not regular.
     """
     segment = _segment(ld) if isinstance(ld, DiscreteLagrangian) else ld
     if isinstance(segment, SchemeLagrangian | ChartedLagrangian) and segment.k == 2:
         require_regular(segment.scheme)
     if symmetries and isinstance(segment, ChartedLagrangian):
-        raise InputError("momentum maps are of joints whose configurations are vectors (nq = nv).")
+        raise InputError("momentum maps are supported only for joints with nq = nv.")
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
     stepper = _stepper(segment, x, p, t0)
-    watch = None
+    monitor = None
     if not force and not isinstance(segment, ChartedLagrangian):
-        watch = _Watch(segment, x, p, tolerance)
-    records = _records(segment, x, p, steps)
+        monitor = _RoundingMonitor(segment, x, p, tolerance)
+    records = _allocate(segment, x, p, steps)
     for i in range(steps):
         done = stepper.step()
         records[0][i + 1], records[1][i + 1] = stepper.x, stepper.p
         records[2][i], records[3][i, : done.inner.shape[1]] = done.z[0], done.inner[0]
-        if watch is not None and isinstance(done, Segment):
-            watch.follow(done, stepper.x, (i + 1) * segment.h)
+        if monitor is not None and isinstance(done, Segment):
+            monitor.propagate(done, stepper.x, (i + 1) * segment.h)
     t = np.asarray(t0 + np.arange(steps + 1) * segment.h)
-    rounding = None if watch is None else np.array(watch.errors)
+    rounding = None if monitor is None else np.array(monitor.errors)
     return Flow(segment, t, *records, rounding, symmetries or {})
 
 
@@ -170,7 +170,7 @@ def _stepper(
 
 
 class _ChartedStepper:
-    """The state of a flow on groups, whose configurations are no sums."""
+    """The state of a flow on groups."""
 
     def __init__(self, ld: ChartedLagrangian, x: Array, p: Array, t0: float) -> None:
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
@@ -182,23 +182,23 @@ class _ChartedStepper:
         t = self.t0 + self._steps * self.ld.h
         try:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
-        except InputError as lost:
-            raise InputError(f"the flow ends at t = {t:.6g} s: {lost}") from lost
+        except InputError as failure:
+            raise InputError(f"the flow ends at t = {t:.6g} s: {failure}") from failure
         self.x, self.p, self._segment = segment.x1[0], segment.p1[0], segment
         self._steps += 1
         return segment
 
 
 class _Stepper:
-    """The state of a flow, with what its sums have lost."""
+    """The state of a flow, with the remainders of its compensated sums."""
 
     def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, t0: float) -> None:
         R = ld.regularized
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
-        self._lost = np.zeros((2, *x.shape))
+        self._remainder = np.zeros((2, *x.shape))
         self._taylor = R.taylor - np.eye(ld.k)
         self._moments = R.moments
-        self._back = R.inverse_taylor.T - np.eye(ld.k)
+        self._momentum_taylor = R.inverse_taylor.T - np.eye(ld.k)
         self._kick = ld.h * R.inverse_taylor.T
         self._segment: Segment | None = None
         self._steps = 0
@@ -208,19 +208,19 @@ class _Stepper:
         t = self.t0 + self._steps * self.ld.h
         try:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
-        except InputError as lost:
-            raise InputError(f"the flow ends at t = {t:.6g} s: {lost}") from lost
+        except InputError as failure:
+            raise InputError(f"the flow ends at t = {t:.6g} s: {failure}") from failure
         dx = self._taylor @ self.x + self._moments @ segment.w[0]
-        dp = self._back @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
-        self.x, self._lost[0] = compensated(self.x, dx, self._lost[0])
-        self.p, self._lost[1] = compensated(self.p, dp, self._lost[1])
+        dp = self._momentum_taylor @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
+        self.x, self._remainder[0] = compensated(self.x, dx, self._remainder[0])
+        self.p, self._remainder[1] = compensated(self.p, dp, self._remainder[1])
         self._segment = segment
         self._steps += 1
         return segment
 
 
-class _Watch:
-    """Follows what the rounding of the start becomes, by the tangent maps of the steps."""
+class _RoundingMonitor:
+    """Propagates rounding errors of the start by the tangent maps of the steps."""
 
     def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, tolerance: float) -> None:
         sizes = np.concatenate([np.abs(x).max(axis=1), np.abs(p).max(axis=1)])
@@ -229,22 +229,22 @@ class _Watch:
         self._n, self._tolerance, self._size = ld.n, tolerance, sizes[0]
         self.errors = [EPS * float(sizes[0])]
 
-    def follow(self, segment: Segment, x: Array, t: float) -> None:
-        """One more step. Raises InputError where the error passes the tolerance."""
+    def propagate(self, segment: Segment, x: Array, t: float) -> None:
+        """Propagate by one step. Raises InputError if the error exceeds the tolerance."""
         self._tangent = segment.tangent[0] @ self._tangent
         self._size = max(self._size, float(np.abs(x[0]).max()))
         self.errors.append(float(np.linalg.norm(self._tangent[: self._n], 2)))
         if not self.errors[-1] <= self._tolerance * self._size:
             raise InputError(
-                f"the flow is so unstable that after {t:.4g} s the rounding of its start alone "
-                f"moves q by {self.errors[-1]:.1g}, more than tolerance {self._tolerance:g}: take "
-                "a shorter horizon, a boundary value problem instead, or force=True."
+                f"the flow is so unstable that after {t:.4g} s rounding of its start alone changes "
+                f"q by {self.errors[-1]:.1g}, more than tolerance {self._tolerance:g}: use a "
+                "shorter horizon, a boundary value problem instead, or force=True."
             )
 
 
-def compensated(sum_: Array, increment: Array, lost: Array) -> tuple[Array, Array]:
-    """Kahan's summation: sum + increment, and what the new sum has lost. [Kahan1965]"""
-    increment = increment - lost
+def compensated(sum_: Array, increment: Array, remainder: Array) -> tuple[Array, Array]:
+    """Kahan's summation: sum + increment, and the remainder of the new sum. [Kahan1965]"""
+    increment = increment - remainder
     total = sum_ + increment
     return total, (total - sum_) - increment
 
@@ -252,7 +252,7 @@ def compensated(sum_: Array, increment: Array, lost: Array) -> tuple[Array, Arra
 def _start(
     ld: SegmentLagrangian | ChartedLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
 ) -> tuple[Array, Array]:
-    """x and p as arrays (k, n). Raises InputError where they do not fit."""
+    """x and p as arrays (k, n). Raises InputError for wrong shapes."""
     if isinstance(z0, State):
         v = np.zeros(ld.n) if z0.v is None else z0.v
         rows = [np.asarray(z0.q, float), np.asarray(v, float)][: ld.k]
@@ -270,11 +270,11 @@ def _start(
     return x, p
 
 
-def _records(
+def _allocate(
     ld: SegmentLagrangian | ChartedLagrangian, x: Array, p: Array, steps: int
 ) -> tuple[Array, Array, Array, Array]:
-    """Room for x, p, z and inner modes of all steps, the start filled in."""
-    # an exact L_d may need as many inner modes as there are
+    """Arrays for x, p, z and inner modes of all steps, with the start filled in."""
+    # an exact L_d may use the maximum number of inner modes
     modes = MAX_INNER_MODES
     if isinstance(ld, SchemeLagrangian | ChartedLagrangian):
         modes = ld.scheme.inner_modes

@@ -1,4 +1,4 @@
-"""Symmetries and their momentum maps: what a motion conserves.
+"""Symmetries and their momentum maps, which motions conserve.
 
 A one-parameter group acts on Q with generator xi(q). Its lift to T^(k-1)Q has the generator
 (xi, d/dt xi, ...), and J = sum_j p_j . d^j/dt^j xi is constant along motions of an invariant L, and
@@ -26,7 +26,7 @@ from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
-MOST_DERIVATIVES = 4
+MAX_DERIVATIVES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,13 +43,13 @@ class Symmetry:
     def momentum(self, x: Array, p: Array) -> Array:
         """J at N points, shape (N,); x and p of shape (N, k, n).
 
-        The group itself need not be a symmetry of anything for this.
+        The group need not be a symmetry of L.
         """
         lifted = self.lift(x)
         return np.asarray(np.sum(p * lifted, axis=(1, 2)))
 
     def defect(self, lagrangian: Lagrangian, *jet: Array) -> Array:
-        """sum_j dL/dq^(j) . d^j/dt^j xi, shape (P,): zero everywhere where L is invariant.
+        """sum_j dL/dq^(j) . d^j/dt^j xi, shape (P,): zero if L is invariant.
 
         jet: (q, q', ..., q^(k)), k + 1 arrays of shape (P, n).
         """
@@ -59,44 +59,43 @@ class Symmetry:
     def lift(self, x: Array) -> Array:
         """(xi, d/dt xi, ...) at N points of T^(k-1)Q, shape (N, k, n)."""
         k = x.shape[1]
-        if k > MOST_DERIVATIVES:
-            raise InputError(f"symmetries are lifted to k <= {MOST_DERIVATIVES}, got {k}.")
+        if k > MAX_DERIVATIVES:
+            raise InputError(f"symmetries are lifted to k <= {MAX_DERIVATIVES}, got {k}.")
         derivatives = self._lifts[k - 1](*np.moveaxis(np.asarray(x, dtype=np.float64), 1, 0))
         return np.stack([d.reshape(len(x), self.n) for d in derivatives], axis=1)
 
     @cached_property
     def _lifts(self) -> list[PointFunction]:
-        jet = [ca.SX.sym(f"q{j}", self.n) for j in range(MOST_DERIVATIVES)]
+        jet = [ca.SX.sym(f"q{j}", self.n) for j in range(MAX_DERIVATIVES)]
         xi = [ca.densify(self.generator(jet[0]))]
-        for _ in range(1, MOST_DERIVATIVES):
+        for _ in range(1, MAX_DERIVATIVES):
             xi.append(ca.densify(total_derivative(xi[-1], jet)))
         return [
             PointFunction(ca.Function("lift", jet[: k + 1], xi[: k + 1]))
-            for k in range(MOST_DERIVATIVES)
+            for k in range(MAX_DERIVATIVES)
         ]
 
 
 def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 0, 0)) -> Symmetry:
-    """The rotation of a whole robot about an axis of the world that gravity leaves free.
+    """The rotation of a whole robot about an axis under which gravity is invariant.
 
     axis: shape (3,). point: a point on it, shape (3,), in [m].
-    An effect on the first joints, such as a range kept by a potential, may break the symmetry all
-    the same: `Symmetry.defect` tells.
-    Raises SceneError when gravity does not leave it free, or the robot's first joints cannot
-    carry it out.
+    An effect on the first joints, such as a joint limit potential, may break the symmetry: see
+    `Symmetry.defect`.
+    Raises SceneError if gravity is not invariant, or the robot's first joints cannot perform it.
     """
     w = _unit(axis)
     g = np.array(scene.model.gravity.linear)
     if np.abs(np.cross(w, g)).max() > 1e-12 * max(1.0, float(np.abs(g).max())):
         raise SceneError(
-            f"gravity {g.tolist()} changes under a rotation about {w.tolist()}; take an axis along "
+            f"gravity {g.tolist()} changes under a rotation about {w.tolist()}; use an axis along "
             "gravity."
         )
     return _base_motion(scene, np.concatenate([np.cross(np.asarray(point, float), w), w]))
 
 
 def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
-    """The translation of a whole robot along a direction of the world that gravity leaves free.
+    """The translation of a whole robot along a direction orthogonal to gravity.
 
     direction: shape (3,). Raises SceneError as `base_rotation` does.
     """
@@ -104,8 +103,8 @@ def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
     g = np.array(scene.model.gravity.linear)
     if abs(d @ g) > 1e-12 * max(1.0, float(np.abs(g).max())):
         raise SceneError(
-            f"gravity {g.tolist()} does work under a translation along {d.tolist()}; take a "
-            "direction across gravity."
+            f"gravity {g.tolist()} does work under a translation along {d.tolist()}; use a "
+            "direction orthogonal to gravity."
         )
     return _base_motion(scene, np.concatenate([d, np.zeros(3)]))
 
@@ -120,7 +119,7 @@ def _unit(vector: npt.ArrayLike) -> Array:
 def _base_motion(scene: Scene, twist: Array) -> Symmetry:
     """The generator that moves every body with one twist (velocity at the origin, rotation).
 
-    The first joint has to do it, or the first few where the bodies between them have no mass.
+    The first joint must perform it, or the first few if the bodies between them are massless.
     """
     n, trunk = scene.robot.nv, _trunk(scene)
     q = ca.SX.sym("q", n)
@@ -136,15 +135,15 @@ def _base_motion(scene: Scene, twist: Array) -> Symmetry:
             column = ca.vertcat(xi, ca.SX.zeros(n - count))
             return Symmetry(ca.Function("xi", [q], [column]), n)
     raise SceneError(
-        f"the first joints of robot {scene.robot.name!r} cannot move the whole robot so: the "
-        "motion of its base is not a symmetry of the configurations it has."
+        f"the first joints of robot {scene.robot.name!r} cannot move the whole robot this way: "
+        "the motion of its base is not a symmetry of its configurations."
     )
 
 
 def _trunk(scene: Scene) -> list[int]:
-    """Joints, of one coordinate each, up to the first body with mass or the first branch."""
+    """Joints with one coordinate, up to the first body with mass or the first branch."""
     model, trunk = scene.model, []
-    leading = set(scene.model.mimicked_joints)  # moves other joints, too
+    leading = set(scene.model.mimicked_joints)  # they move other joints as well
     for joint in range(1, model.njoints):
         alone = list(model.parents)[1:].count(model.parents[joint]) == 1
         simple = model.joints[joint].nq == model.joints[joint].nv == 1 and joint not in leading
@@ -157,7 +156,7 @@ def _trunk(scene: Scene) -> list[int]:
 
 
 def _joint_axis(scene: Scene, joint: int, q: ca.SX) -> ca.SX:
-    """The twist of the world per unit speed of a joint, (velocity at the origin, rotation)."""
+    """The twist per unit speed of a joint in the world, (velocity at the origin, rotation)."""
     model = scene.model
     frame = next(
         f.name for f in model.frames if f.parentJoint == joint and f.placement.isIdentity(1e-15)

@@ -1,4 +1,4 @@
-"""Plan simply, check richly: a plan's torques played on a scene with more effects."""
+"""Executes a plan on a scene with more effects, and measures the deviation."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ STEPS_PER_SECOND = 400
 
 @dataclass(frozen=True, eq=False)
 class Tracking:
-    """A plan and what became of it.
+    """A plan and its execution.
 
-    plan: what was wanted. simulation: what happened. controller: what drove it.
+    plan: the planned motion. simulation: the executed motion. controller: the torques.
     """
 
     plan: Trajectory
@@ -38,17 +38,17 @@ class Tracking:
 
     @property
     def joint_deviation(self) -> Array:
-        """What happened minus what was wanted, shape (N + 1, nv), in [rad] or [m]."""
-        wanted = self.plan.configurations(np.clip(self.t, 0.0, self.plan.duration))
-        return self.simulation.scene.robot.difference(wanted, self.simulation.q)
+        """Executed minus planned configuration, shape (N + 1, nv), in [rad] or [m]."""
+        planned = self.plan.configurations(np.clip(self.t, 0.0, self.plan.duration))
+        return self.simulation.scene.robot.difference(planned, self.simulation.q)
 
     @property
     def tip_deviation(self) -> Array:
-        """Distance between the two places of the robot's tip frame, shape (N + 1,), in [m]."""
+        """Distance of executed and planned position of the tip frame, shape (N + 1,), in [m]."""
         robot = self.simulation.scene.robot
-        wanted = self.plan.configurations(np.clip(self.t, 0.0, self.plan.duration))
-        places = (robot.frame_position(robot.tip_frame, q) for q in (wanted, self.simulation.q))
-        return np.asarray(np.linalg.norm(np.subtract(*places), axis=1))
+        planned = self.plan.configurations(np.clip(self.t, 0.0, self.plan.duration))
+        positions = (robot.frame_position(robot.tip_frame, q) for q in (planned, self.simulation.q))
+        return np.asarray(np.linalg.norm(np.subtract(*positions), axis=1))
 
     @property
     def torque(self) -> Array:
@@ -57,7 +57,7 @@ class Tracking:
 
     @property
     def feedback_torque(self) -> Array:
-        """u less the planned torque, shape (N + 1, nv), in [N m] or [N]."""
+        """u minus the planned torque, shape (N + 1, nv), in [N m] or [N]."""
         more = self.torque - self.controller.planned(self.t).tau
         more[:, self.simulation.scene.passive_coordinates] = 0.0
         return more
@@ -72,22 +72,22 @@ def play(
     intervals: int | None = None,
     inner_modes: int = 1,
 ) -> Tracking:
-    """Play a plan's torques on a scene, and see how far it strays.
+    """Execute the torques of a plan on a scene, and measure the deviation.
 
-    scene: what is simulated, of the plan's robot.
+    scene: the simulated scene, with the robot of the plan.
     plan: a motion with its torques, which may come from a simpler scene.
     feedback: "none", "pd" or "computed-torque": see `controllers`.
     bandwidth: of the feedback, in [rad/s].
-    intervals: steps of the simulation, from `steps_on_nodes` when not given.
+    intervals: number of steps of the simulation, by default from `steps_on_nodes`.
     inner_modes: as `simulate`.
-    Raises InputError when the plan is another robot's, or the steps are too long to be solved.
+    Raises InputError if the plan is for another robot, or if the steps are too long.
     """
     expect(plan, Trajectory, "the trajectory of a solution")
     names = scene.robot.coordinate_names
     if plan.coordinate_names != names:
         raise InputError(
             f"the plan moves {', '.join(plan.coordinate_names)}, but the scene's robot "
-            f"{scene.robot.name!r} has {', '.join(names)}; play it on a scene of its own robot."
+            f"{scene.robot.name!r} has {', '.join(names)}; use a scene of the plan's robot."
         )
     drive = controller(plan, feedback, scene, bandwidth)
     count = intervals or steps_on_nodes(plan)
@@ -97,14 +97,14 @@ def play(
 
 
 def steps_on_nodes(plan: Trajectory) -> int:
-    """At least 400 steps a second that end at every node of the plan, where its torques jump.
+    """A number of steps, at least 400 per second, that hits every node of the plan.
 
-    A step across a jump is of first order, whatever the integrator. Where the nodes are no
-    multiples of the shortest interval, just that many steps.
+    Torques jump at nodes, and a step across a jump is of first order for any integrator. If the
+    nodes are no multiples of the shortest interval, 400 steps per second.
     """
-    wanted = max(1, math.ceil(STEPS_PER_SECOND * plan.duration))
-    places = plan.t / plan.grid.steps.min()
-    if np.abs(places - np.round(places)).max() > 1e-6:
-        return wanted
-    units = round(float(places[-1]))
-    return units * math.ceil(wanted / units)
+    count = max(1, math.ceil(STEPS_PER_SECOND * plan.duration))
+    multiples = plan.t / plan.grid.steps.min()
+    if np.abs(multiples - np.round(multiples)).max() > 1e-6:
+        return count
+    units = round(float(multiples[-1]))
+    return units * math.ceil(count / units)

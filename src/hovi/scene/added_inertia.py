@@ -1,4 +1,4 @@
-"""The inertia that effects add to a robot: what multiplies accelerations in their torques."""
+"""The inertia that effects add to a robot: the coefficient of accelerations in their torques."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def added_inertia(scene: Scene) -> ca.SX | None:
         if ca.depends_on(A, ca.vertcat(v, a, t)) or not _symmetric(A, q):
             raise SceneError(
                 f"effect {effect.key!r} depends on the acceleration, but not as an inertia does "
-                "(a symmetric A(q) times a): it cannot be simulated; leave it out."
+                "(a symmetric A(q) times a), so it cannot be simulated: remove it."
             )
         total = A if total is None else total + A
     return total

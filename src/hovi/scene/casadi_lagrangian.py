@@ -17,9 +17,9 @@ Array = npt.NDArray[np.float64]
 class CasadiLagrangian(Lagrangian):
     """A Lagrangian of any order k from a CasADi expression.
 
-    jet: symbols (q, v, a, ...), k + 1 columns of n each; q one of nq where there is a space.
+    jet: symbols (q, v, a, ...), k + 1 columns of length n; q has length nq if there is a space.
     expression: L as a function of them. [ColomboFerraroMartin2016, section 2]
-    space: the configuration space; None where configurations are vectors.
+    space: the configuration space; None if it is a vector space.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class CasadiLagrangian(Lagrangian):
 
     @property
     def nq(self) -> int:
-        """Numbers in a configuration."""
+        """Length of a configuration."""
         return int(self.jet[0].shape[0])
 
     @property
@@ -47,7 +47,7 @@ class CasadiLagrangian(Lagrangian):
 
     @property
     def space(self) -> ConfigurationSpace | None:
-        """The configuration space; None where configurations are vectors."""
+        """The configuration space; None if it is a vector space."""
         return self._space
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:

@@ -1,4 +1,4 @@
-"""Terms of the cost beside the squared torque, from CasADi expressions."""
+"""Terms of the cost besides the squared torque, from CasADi expressions."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from hovi.robot.space.tangent import Symbols
 Array = npt.NDArray[np.float64]
 
 
-class EffortTerm:
+class TorqueVelocityCost:
     """phi(tau, v), composed with tau(q, v, a, t) by the chain rule.
 
     With K = d(tau, v)/d(q, v, a) = (J; E), the gradient is K^T dphi and the Hessian
-    K^T d2phi K + sum_i dphi/dtau_i d2 tau_i, whose sum is left to the torque model.
+    K^T d2phi K + sum_i dphi/dtau_i d2 tau_i; the torque model evaluates the sum.
 
-    compile: whether its functions become machine code: see PointFunction.
+    compile: whether its functions are compiled: see PointFunction.
     """
 
     def __init__(self, tau: ca.SX, v: ca.SX, expression: ca.SX, compile: bool = False) -> None:
@@ -36,7 +36,7 @@ class EffortTerm:
         return self._value(tau, v)[0]
 
     def slope(self, tau: Array, v: Array) -> Array:
-        """dphi/dtau, shape (P, nv): what weighs the second derivatives of tau."""
+        """dphi/dtau, shape (P, nv): weights of the second derivatives of tau."""
         return self._expand(tau, v)[1][:, : self._nv]
 
     def expand(self, tau: Array, v: Array, J: Array) -> tuple[Array, Array, Array]:
@@ -45,19 +45,19 @@ class EffortTerm:
         J: d tau / d(q, v, a), shape (P, nv, 3 nv).
         """
         n = self._nv
-        value, slope, bend = self._expand(tau, v)
+        value, slope, curvature = self._expand(tau, v)
         K = np.zeros((len(tau), 2 * n, 3 * n))
         K[:, :n] = J
         K[:, n:, n : 2 * n] = np.eye(n)
         gradient = np.matmul(slope[:, None], K)[:, 0]
-        return value, gradient, np.matmul(K.transpose(0, 2, 1), np.matmul(bend, K))
+        return value, gradient, np.matmul(K.transpose(0, 2, 1), np.matmul(curvature, K))
 
 
 class PotentialTerm:
     """A term V(q, v, a, t) of the cost from a CasADi expression.
 
-    compile: whether its functions become machine code: see PointFunction.
-    space: the configuration space; None where configurations are vectors.
+    compile: whether its functions are compiled: see PointFunction.
+    space: the configuration space; None if it is a vector space.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.dynamics.torque_model import TorqueModel
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.scene.cost_terms import EffortTerm, PotentialTerm
+from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
 from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms, add_weights
 from hovi.scene.squared_effort import expand_squares, predict, weighted_square
 
@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 
 class EffortScene(Protocol):
-    """Where an effort Lagrangian comes from: the robot whose torques it squares."""
+    """The scene of an effort Lagrangian, with the robot whose torques it squares."""
 
     @property
     def robot(self) -> Robot:
@@ -33,22 +33,22 @@ class EffortLagrangian(Lagrangian):
     [ColomboFerraroMartin2016, section 5]
 
     torques: tau(q, v, a, t).
-    scene: the scene that it belongs to.
-    potential: (q, v, a, t) -> V, gradient (3 nv), Hessian (3 nv, 3 nv), or None where V = 0.
+    scene: the scene that defines it.
+    potential: V with gradient (3 nv) and Hessian (3 nv, 3 nv), or None if V = 0.
     weight: R, shape (nv,).
-    effort_term: phi, or None where it is zero.
+    torque_velocity_cost: phi, or None if it is zero.
     """
 
     torques: TorqueModel
     scene: EffortScene
     weight: Array
     potential: PotentialTerm | None = None
-    effort_term: EffortTerm | None = None
+    torque_velocity_cost: TorqueVelocityCost | None = None
     order: int = 2
 
     @property
     def nq(self) -> int:
-        """Numbers in a configuration."""
+        """Length of a configuration."""
         return self.scene.robot.nq
 
     @property
@@ -58,7 +58,7 @@ class EffortLagrangian(Lagrangian):
 
     @property
     def space(self) -> ConfigurationSpace | None:
-        """The robot's configuration space; None where configurations are vectors."""
+        """The robot's configuration space; None if it is a vector space."""
         return self.scene.robot.curved_space
 
     @property
@@ -68,7 +68,7 @@ class EffortLagrangian(Lagrangian):
 
     @property
     def output_name(self) -> str:
-        """What an output is called in a sentence."""
+        """Name of an output in messages."""
         return "torque"
 
     def output(self, *jet: Array, t: Array | None = None) -> Array:
@@ -80,7 +80,7 @@ class EffortLagrangian(Lagrangian):
         return predict(outputs, self.weight, jacobian, change)
 
     def reweighted(self, weight: Array) -> EffortLagrangian:
-        """The same with another R, shape (nv,)."""
+        """The same Lagrangian with another R, shape (nv,)."""
         return replace(self, weight=weight)
 
     def torque(self, q: Array, v: Array, a: Array, t: Array | None = None) -> tuple[Array, Array]:
@@ -99,19 +99,19 @@ class EffortLagrangian(Lagrangian):
         value = 0.5 * np.vecdot(tau, self.weight * tau)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
-        if self.effort_term is not None:
-            value = value + self.effort_term.value(tau, jet[1])
+        if self.torque_velocity_cost is not None:
+            value = value + self.torque_velocity_cost.value(tau, jet[1])
         return np.asarray(value)
 
     def integral(
         self, outputs: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
     ) -> float:
-        """sum_p w_p L at points where the torques are known; weights: w, shape (P,)."""
+        """sum_p w_p L at points with known torques; weights: w, shape (P,)."""
         total = weighted_square(outputs, self.weight, weights)
         if self.potential is not None:
             total += float(weights @ self.potential.value(*jet, t=t))
-        if self.effort_term is not None:
-            total += float(weights @ self.effort_term.value(outputs, jet[1]))
+        if self.torque_velocity_cost is not None:
+            total += float(weights @ self.torque_velocity_cost.value(outputs, jet[1]))
         return total
 
     def gradient(
@@ -119,14 +119,14 @@ class EffortLagrangian(Lagrangian):
     ) -> Array:
         """The gradient J^T R tau + dV + dphi, shape (P, 3, nv).
 
-        terms: what limits and multipliers add.
+        terms: contributions of limits and multipliers.
         """
         q, v, a = jet
         tau, J = self.torques.linearize(q, v, a, t)
         force = None if terms is None else terms.output_gradient
         _, gradient = expand_squares(tau, self.weight, J, force)
-        if self.effort_term is not None:
-            gradient = gradient + self.effort_term.expand(tau, v, J)[1]
+        if self.torque_velocity_cost is not None:
+            gradient = gradient + self.torque_velocity_cost.expand(tau, v, J)[1]
         if terms is not None:
             gradient += terms.jet_gradient
         if self.potential is not None:
@@ -148,16 +148,16 @@ class EffortLagrangian(Lagrangian):
     ) -> PointExpansion:
         """As evaluate, with the curvature of tau weighted by `multiplier` instead of R tau.
 
-        multiplier: shape (P, nv). Weighted with the torque that the last step predicted
-            (R (tau + J dx), a lifted Newton step) an optimiser needs fewer steps.
-        terms: what limits add.
+        multiplier: shape (P, nv). With the torque predicted by the last step, R (tau + J dx), this
+            is a lifted Newton step, and the optimiser needs fewer iterations.
+        terms: contributions of limits.
         """
         q, v, a = jet
         R = self.weight if terms is None else self.weight + terms.output_weight
-        if self.effort_term is not None:
+        if self.torque_velocity_cost is not None:
             tau = self.torques.torque(q, v, a, t)
             given = self.weight * tau if multiplier is None else multiplier
-            multiplier = given + self.effort_term.slope(tau, v)
+            multiplier = given + self.torque_velocity_cost.slope(tau, v)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
         force = None if terms is None else terms.output_gradient
         value, gradient = expand_squares(tau, self.weight, J, force)
@@ -167,7 +167,7 @@ class EffortLagrangian(Lagrangian):
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV
-        if self.effort_term is not None:
-            phi, dphi, ddphi = self.effort_term.expand(tau, v, J)
+        if self.torque_velocity_cost is not None:
+            phi, dphi, ddphi = self.torque_velocity_cost.expand(tau, v, J)
             value, gradient, hessian = value + phi, gradient + dphi, hessian + ddphi
         return PointExpansion(value, gradient, hessian, tau, J)

@@ -1,4 +1,4 @@
-"""What each effect of a scene costs: instructions of the expression graph, and measured time."""
+"""The cost of each effect of a scene: instructions of the expression graph, and measured time."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from hovi.system.deadline import Deadline
 Array = npt.NDArray[np.float64]
 
 POINTS = 64
-"""Points of one evaluation: about as many as a motion of 16 intervals has."""
+"""Points per evaluation: about those of a motion with 16 intervals."""
 SECONDS = 0.02
-"""For how long each scene is evaluated again and again."""
-LEAST_TURNS = 3
+"""Time for the repeated evaluation of each scene, in [s]."""
+MIN_TURNS = 3
 
 
 class AccountedScene(Protocol):
-    """What is asked of a scene."""
+    """What is measured of a scene."""
 
     @property
     def robot(self) -> Robot:
@@ -49,11 +49,11 @@ class AccountedScene(Protocol):
 
 @dataclass(frozen=True)
 class EffectCost:
-    """What one effect adds.
+    """The cost of one effect.
 
-    key: of the effect. touches: what it may touch, in words.
-    instructions: what it adds to the graph of (tau, L~); nothing where only numbers change.
-    seconds, seconds_without: per point of an evaluation with derivatives.
+    key: of the effect. touches: what it modifies, as text.
+    instructions: number added to the graph of (tau, L~); 0 if only constants change.
+    seconds, seconds_without: per point of an evaluation with derivatives, in [s].
     """
 
     key: str
@@ -65,10 +65,10 @@ class EffectCost:
 
 @dataclass(frozen=True)
 class SceneAccount:
-    """What a scene costs.
+    """The cost of evaluating a scene.
 
-    instructions: of its graph. seconds: per point of an evaluation with derivatives.
-    effects: each effect's share, as the scene is with it and as it would be without it.
+    instructions: of its graph. seconds: per point of an evaluation with derivatives, in [s].
+    effects: the cost of each effect, from the scene with and without it.
     """
 
     instructions: int
@@ -76,7 +76,7 @@ class SceneAccount:
     effects: tuple[EffectCost, ...]
 
     def lines(self) -> list[str]:
-        """The account as text, a line for each effect."""
+        """The account as text, with one line per effect."""
         first = (
             f"cost: {_microseconds(self.seconds)} per point with derivatives, "
             f"{self.instructions} instructions in the expression graph"
@@ -108,17 +108,17 @@ def account(scene: AccountedScene) -> SceneAccount:
             ", ".join(effect.touches),
             instructions - other.graph().n_instructions(),
             seconds,
-            its_seconds,
+            seconds_without,
         )
-        for effect, other, its_seconds in zip(scene.effects, bare, without, strict=True)
+        for effect, other, seconds_without in zip(scene.effects, bare, without, strict=True)
     )
     return SceneAccount(instructions, seconds, costs)
 
 
 def seconds_per_point(scenes: Sequence[AccountedScene]) -> list[float]:
-    """The shortest time of an evaluation with derivatives, per point, in [s], of each scene.
+    """The shortest time per point of an evaluation with derivatives, in [s], of each scene.
 
-    They take turns, so that what else the machine does falls on all of them alike.
+    The scenes take turns, so that other load on the machine affects all of them alike.
     """
     evaluations = [scene.evaluation() for scene in scenes]
     batches = [_points(scene.robot) for scene in scenes]
@@ -126,11 +126,11 @@ def seconds_per_point(scenes: Sequence[AccountedScene]) -> list[float]:
     deadline = Deadline(SECONDS * len(scenes))
     for turn in itertools.count():
         for i, (evaluate, points) in enumerate(zip(evaluations, batches, strict=True)):
-            evaluate(*points)  # what the one before it left in the caches does not count
+            evaluate(*points)  # warms the caches after the previous scene
             began = time.perf_counter()
             evaluate(*points)
             shortest[i] = min(shortest[i], time.perf_counter() - began)
-        if turn >= LEAST_TURNS and deadline.passed:
+        if turn >= MIN_TURNS and deadline.passed:
             break
     return [float(each) / POINTS for each in shortest]
 

@@ -1,4 +1,4 @@
-"""Forces beside a Lagrangian: what drives and what resists a motion."""
+"""Forces that are not part of a Lagrangian: drive torques and resistance."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Drive(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """A Drive that does not look at the motion: u(t)."""
+    """A Drive that is a function of time alone: u(t)."""
 
     torque: Torque
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """u(t), with no slope."""
+        """u(t), with zero derivatives."""
         u = np.asarray(self.torque(t), dtype=np.float64).reshape(v.shape)
         return u, np.zeros((*v.shape, 2, v.shape[1]))
 
@@ -50,7 +50,7 @@ class Force:
     """A force on TQ x time: f = u(q, v, t) - d(q, v, t).
 
     n: degrees of freedom. drive: u; none when None.
-    resistance: what a scene's effects ask of the joints, d, or None.
+    resistance: d, the torques that the effects of a scene require; none when None.
     """
 
     n: int
@@ -78,11 +78,11 @@ class Force:
 
 
 def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
-    """The torques that are put on a scene's joints, less what its effects resist with.
+    """The drive torques of a scene minus the resistance of its effects.
 
-    drive: u(q, v, t); none when not given.
-    Raises SceneError for an effect whose torque depends on the acceleration in another way than
-    an inertia does.
+    drive: u(q, v, t); none when None.
+    Raises SceneError for an effect whose torque depends on the acceleration other than as an
+    inertia.
     """
     resistance = resistance_of(scene)
     if resistance is None:
@@ -94,9 +94,9 @@ def scene_force(scene: Scene, drive: Drive | None = None) -> Force:
 
 
 def resistance_of(scene: Scene) -> ca.SX | None:
-    """d(q, v, t) of M a + ... + d = u: what is not in the Euler-Lagrange equations of `mechanics`.
+    """d(q, v, t) of M a + ... + d = u: terms not in the Euler-Lagrange equations of `mechanics`.
 
-    An expression of scene.terms.symbols, shape (nv,); None where there is nothing.
+    An expression in scene.terms.symbols, shape (nv,); None if it is zero.
     """
     q, v, a, t = scene.terms.symbols.columns()
     parts = []
@@ -107,11 +107,11 @@ def resistance_of(scene: Scene) -> ca.SX | None:
         if inertia is not None:
             momentum, energy = inertia @ v, ca.bilin(inertia, v, v) / 2
             parts.append(_slope(scene, energy) - ca.jtimes(momentum, q, _rate(scene)))
-            parts.append(_turned_back(scene, momentum))
+            parts.append(_coadjoint(scene, momentum))
     if np.any(scene.model.armature):
-        parts.append(_turned_back(scene, ca.DM(np.array(scene.model.armature)) * v))
+        parts.append(_coadjoint(scene, ca.DM(np.array(scene.model.armature)) * v))
     if scene.terms.symbols.base is not None:
-        # masses do not depend on where a base is: without accelerations the difference is exact
+        # M(q) does not depend on the base: the difference at zero acceleration is exact
         still = ca.SX.zeros(a.shape)
         parts.append(inverse_dynamics(scene.model, scene.terms.symbols.base, q, v, still, t))
         parts.append(-inverse_dynamics(scene.model, None, q, v, still, t))
@@ -123,10 +123,9 @@ def resistance_of(scene: Scene) -> ca.SX | None:
 class ForcedLagrangian(Lagrangian):
     """L on TQ with a force: the Lagrange-d'Alembert principle.
 
-    The virtual work f . delta q joins dL in every variation, so that f is added to dL/dq wherever
-    a discrete Lagrangian contracts it: at the quadrature points this is the discrete
-    Lagrange-d'Alembert principle with its forces F_d^+ and F_d^-. The "Hessian" is not symmetric
-    then. [MarsdenWest2001, section 3.2]
+    The virtual work f . delta q is added to dL in every variation, that is f to dL/dq at the
+    quadrature points: this is the discrete Lagrange-d'Alembert principle with its forces F_d^+ and
+    F_d^-. The "Hessian" is not symmetric. [MarsdenWest2001, section 3.2]
 
     free: L, of order 1. force: f(q, v, t).
     """
@@ -137,12 +136,12 @@ class ForcedLagrangian(Lagrangian):
 
     @property
     def nq(self) -> int:
-        """Numbers in a configuration."""
+        """Length of a configuration."""
         return self.free.nq
 
     @property
     def space(self) -> ConfigurationSpace | None:
-        """The configuration space; None where configurations are vectors."""
+        """The configuration space; None if it is a vector space."""
         return self.free.space
 
     @property
@@ -155,7 +154,7 @@ class ForcedLagrangian(Lagrangian):
         return self.free.value(*jet, t=t)
 
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
-        """L, dL + (f, 0) and the derivatives of that."""
+        """L, dL + (f, 0), and the derivatives of the latter."""
         value, gradient, hessian = self.free.evaluate(*jet, t=t)
         f, df = self.force.evaluate(jet[0], jet[1], times(t, len(value))[:, 0])
         gradient, hessian = gradient.copy(), hessian.copy()
@@ -177,17 +176,17 @@ def _rate(scene: Scene) -> ca.SX:
     return v if scene.robot.vector_joints else configuration_rate(scene.model, q, v)
 
 
-def _turned_back(scene: Scene, momentum: ca.SX) -> ca.SX:
-    """ad*_v of a momentum in the body's axes, shape (nv,): zero where tangent vectors add.
+def _coadjoint(scene: Scene, momentum: ca.SX) -> ca.SX:
+    """ad*_v of a momentum in the body frame, shape (nv,): zero on commutative groups.
 
-    The equations of Lagrange on a group are (d/dt - ad*_v) dL/dv - dL/dq = f, but inertia that
-    RNEA or an effect states as A a turns no momentum.
+    The Euler-Poincare equations are (d/dt - ad*_v) dL/dv - dL/dq = f, but armature and effects with
+    a torque A a have no coadjoint term.
     """
-    v, turned = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
+    v, result = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
     for factor in scene.robot.space.curved:
         i, places = factor.v, list(factor.group.se3_indices)
         p, twist = ca.SX.zeros(6), ca.SX.zeros(6)
         p[places], twist[places] = momentum[i], v[i]
         moment = ca.cross(p[:3], twist[:3]) + ca.cross(p[3:], twist[3:])
-        turned[i] = ca.vertcat(ca.cross(p[:3], twist[3:]), moment)[places]
-    return turned
+        result[i] = ca.vertcat(ca.cross(p[:3], twist[3:]), moment)[places]
+    return result

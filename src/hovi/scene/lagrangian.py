@@ -1,6 +1,6 @@
 """Lagrangians on T^(k)Q, evaluated at batches of points with their exact derivatives.
 
-This is the narrow waist: below it are CasADi and Pinocchio, above it NumPy and LAPACK.
+This is the only interface between CasADi and Pinocchio below it and NumPy and LAPACK above it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PointTerms:
-    """What limits and multipliers add to a Lagrangian's derivatives at P points.
+    """Contributions of limits and multipliers to a Lagrangian's derivatives at P points.
 
     With the jet x = (q, v, a, ...) and the outputs y(x) of the Lagrangian, gradient:
     jet_gradient + J^T output_gradient; Hessian: diag(jet_weight) + J^T diag(output_weight) J, and
     configuration_weight in its block of q.
 
     jet_gradient, jet_weight: shape (P, (k+1) nv). output_gradient, output_weight: shape (P, m).
-    configuration_weight: shape (P, nv, nv); nothing when None.
+    configuration_weight: shape (P, nv, nv); none when None.
     """
 
     jet_gradient: Array
@@ -37,13 +37,13 @@ class PointTerms:
 
     @classmethod
     def on_outputs(cls, gradient: Array, jet_size: int) -> PointTerms:
-        """A force on the outputs alone, shape (P, m); jet_size: (k+1) nv."""
+        """A gradient in the outputs alone, shape (P, m); jet_size: (k+1) nv."""
         jet = np.zeros((len(gradient), jet_size))
         return cls(jet, jet, gradient, np.zeros_like(gradient))
 
 
 class PointExpansion(NamedTuple):
-    """A Lagrangian at P points to second order, and its outputs to first.
+    """A Lagrangian at P points to second order, and its outputs to first order.
 
     value: shape (P,). gradient: shape (P, (k+1) nv). hessian: shape (P, (k+1) nv, (k+1) nv).
     outputs: y, shape (P, m). jacobian: J = dy/dx, shape (P, m, (k+1) nv).
@@ -57,13 +57,13 @@ class PointExpansion(NamedTuple):
 
 
 class Lagrangian(ABC):
-    """L on T^(k)Q: what a discrete Lagrangian needs to know of it.
+    """L on T^(k)Q with its derivatives.
 
-    Derivatives live in the tangent space: with respect to q they are taken along `integrate`.
+    Derivatives with respect to q are in the tangent space: they are taken along `integrate`.
 
-    A Lagrangian may be L = 1/2 y^T diag(R) y + rest in m outputs y of its jet, joint torques for
-    instance. Outputs can be bounded and given multipliers, and a lifted Newton step weighs their
-    curvature by what the last step predicted of them. Without outputs nothing of that applies.
+    A Lagrangian may have the form L = 1/2 y^T diag(R) y + rest with m outputs y of its jet, such as
+    joint torques. Outputs can have bounds and multipliers, and a lifted Newton step weights their
+    curvature with the prediction of the last step. By default there are no outputs.
     """
 
     order: int
@@ -72,7 +72,7 @@ class Lagrangian(ABC):
     @property
     @abstractmethod
     def nq(self) -> int:
-        """Numbers in a configuration."""
+        """Length of a configuration."""
 
     @property
     @abstractmethod
@@ -81,7 +81,7 @@ class Lagrangian(ABC):
 
     @property
     def space(self) -> ConfigurationSpace | None:
-        """The configuration space; None where configurations are vectors."""
+        """The configuration space; None if it is a vector space."""
         return None
 
     @abstractmethod
@@ -100,12 +100,12 @@ class Lagrangian(ABC):
 
     @property
     def output_weight(self) -> Array:
-        """R, shape (m,): none without outputs."""
+        """R, shape (m,); m = 0 without outputs."""
         return np.zeros(0)
 
     @property
     def output_name(self) -> str:
-        """What an output is called in a sentence."""
+        """Name of an output in messages."""
         return "output"
 
     def output(self, *jet: Array, t: Array | None = None) -> Array:
@@ -121,19 +121,19 @@ class Lagrangian(ABC):
         return self.output_slope(outputs + np.matmul(jacobian, change[:, :, None])[:, :, 0])
 
     def reweighted(self, weight: Array) -> Lagrangian:
-        """The same with another R, shape (m,)."""
+        """The same Lagrangian with another R, shape (m,)."""
         raise NotImplementedError
 
     def integral(
         self, outputs: Array, jet: tuple[Array, ...], t: Array | None, weights: Array
     ) -> float:
-        """sum_p w_p L at points where the outputs are known; weights: w, shape (P,)."""
+        """sum_p w_p L at points with known outputs; weights: w, shape (P,)."""
         return float(weights @ self.value(*jet, t=t))
 
     def gradient(
         self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
     ) -> Array:
-        """The gradient alone, shape (P, k+1, nv); terms: what limits and multipliers add."""
+        """The gradient, shape (P, k+1, nv). terms: contributions of limits and multipliers."""
         gradient = self.evaluate(*jet, t=t)[1]
         return gradient if terms is None else gradient + terms.jet_gradient.reshape(gradient.shape)
 
@@ -144,9 +144,9 @@ class Lagrangian(ABC):
         multiplier: Array | None = None,
         terms: PointTerms | None = None,
     ) -> PointExpansion:
-        """As evaluate, with outputs and what limits and multipliers add.
+        """As evaluate, with outputs and the contributions of limits and multipliers.
 
-        multiplier: what weighs the curvature of the outputs instead of R y, shape (P, m).
+        multiplier: weights of the curvature of the outputs instead of R y, shape (P, m).
         """
         value, gradient, hessian = self.evaluate(*jet, t=t)
         size = (self.order + 1) * self.nv
@@ -159,7 +159,7 @@ class Lagrangian(ABC):
 
 
 def add_weights(hessian: Array, terms: PointTerms, nv: int) -> None:
-    """Add what limits add to the Hessian of the jet itself, in place."""
+    """Add the contributions of limits on the jet to its Hessian, in place."""
     diagonal = np.arange(hessian.shape[1])
     hessian[:, diagonal, diagonal] += terms.jet_weight
     if terms.configuration_weight is not None:

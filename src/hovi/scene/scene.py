@@ -1,4 +1,4 @@
-"""A scene: a robot and the effects that a person decided to simulate."""
+"""A scene: a robot and the effects that act on it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hovi.effects import REGISTRY, Effect
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
-from hovi.scene.cost_terms import EffortTerm, PotentialTerm
+from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.evaluation_cost import SceneAccount, account
 from hovi.scene.terms import SceneTerms
@@ -30,17 +30,17 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A robot with the effects that act on it; what is not named is not simulated.
+    """A robot with the effects that act on it; nothing else is simulated.
 
     robot: the robot.
     effects: at most one of each kind.
-    passive: joints that carry no torque, by name; every coordinate of a joint.
-    compile: compile what is evaluated by CasADi to machine code, once: the libraries stay in the
-        user's cache folder. It takes a C compiler and seconds, and changes no result.
-    model: the scene's own copy of the robot's model, with gravity and armature as the effects
-        say (none where no effect says so).
-    Raises SceneError when an effect does not fit the robot, or is named twice; with compile,
-    its functions raise CompilationError where they cannot be compiled or kept.
+    passive: names of unactuated joints, with all their coordinates.
+    compile: compile CasADi functions once, to libraries in the user's cache folder. It needs a C
+        compiler, takes seconds and does not change results.
+    model: the scene's own copy of the robot's model, with gravity and armature set by effects and
+        zero by default.
+    Raises SceneError if an effect is not valid for the robot, or given twice; with compile, its
+    functions raise CompilationError if they cannot be compiled or stored.
     """
 
     robot: Robot
@@ -67,9 +67,9 @@ class Scene:
 
     @cached_property
     def torques(self) -> TorqueModel:
-        """tau(q, v, a, t): RNEA and what the effects add to it, with exact derivatives.
+        """tau(q, v, a, t): RNEA plus the torques of effects, with exact derivatives.
 
-        Pinocchio's analytic derivatives where the joints have them, CasADi's otherwise.
+        Derivatives of RNEA are analytic if the kernel supports all joints, CasADi's otherwise.
         """
         symbols, added = self.terms.symbols, self.terms.torque
         space = self.robot.curved_space
@@ -88,28 +88,28 @@ class Scene:
 
     @cached_property
     def terms(self) -> SceneTerms:
-        """What the effects add to RNEA and to the cost, as expressions."""
+        """The terms that effects add to RNEA and to the cost, as expressions."""
         return SceneTerms(self.robot, self.effects)
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
-        """Places in v of the joints that carry no torque, ascending."""
+        """Indices in v of the passive joints, ascending."""
         joints = [self.robot.model.joints[self.robot.model.getJointId(j)] for j in self.passive]
-        places = [np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in joints]
-        return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *places]))
+        indices = [np.arange(joint.idx_v, joint.idx_v + joint.nv) for joint in joints]
+        return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *indices]))
 
     @property
     def analytic(self) -> bool:
-        """Whether RNEA's derivatives are Pinocchio's analytic ones."""
+        """Whether the derivatives of RNEA are analytic."""
         return not self._without_kernel
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
 
-        weight: R, shape (nv,); when not given, that of the effect `effort_weight`, or all ones;
-            that of passive joints, whose torque vanishes, does not count and is set to zero.
+        weight: R, shape (nv,); by default that of the effect `effort_weight`, or ones. Weights of
+            passive joints are set to zero, since their torque vanishes.
             [ColomboFerraroMartin2016, section 5]
-        Raises ModelError for joints whose configurations are not vectors.
+        Raises ModelError for joints of an unsupported kind.
         """
         require_known_joints(self.robot)
         R = self.terms.effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
@@ -119,7 +119,7 @@ class Scene:
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
         R = np.where(passive, 0.0, R)
-        return EffortLagrangian(self.torques, self, R, self._potential, self._effort_term)
+        return EffortLagrangian(self.torques, self, R, self._potential, self._torque_velocity_cost)
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -137,7 +137,7 @@ class Scene:
         return dataclasses.replace(self, effects=kept)
 
     def graph(self) -> ca.Function:
-        """(q, v, a, t) -> (tau, L~): all that the scene names, as one expression graph."""
+        """(q, v, a, t) -> (tau, L~), as one expression graph."""
         symbols, added = self.terms.symbols, self.terms.torque
         tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
         tau = tau if added is None else tau + added
@@ -148,33 +148,33 @@ class Scene:
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
     def evaluation(self) -> Callable[..., Any]:
-        """(q, v, a, t) -> L~ with its derivatives at a batch of points, as an optimiser asks."""
+        """(q, v, a, t) -> L~ with its derivatives at a batch of points, as in an optimiser step."""
         lagrangian = self.effort_lagrangian()
         return lambda q, v, a, t: lagrangian.expand(q, v, a, t=t)
 
     def account(self) -> SceneAccount:
-        """What each effect costs in instructions and in measured time."""
+        """The cost of each effect in instructions and in measured time."""
         return account(self)
 
     def describe(self) -> str:
-        """What is simulated, what the URDF holds but the scene leaves out, and what it costs."""
+        """A text: what is simulated, which properties of the URDF are not, and the costs."""
         lines = [f"scene of robot {self.robot.name!r}", "simulated:"]
         lines += ["  rigid-body inertia (RNEA)", *(f"  {e.describe()}" for e in self.effects)]
         if self.passive:
             lines.append(f"  no torque at {', '.join(self.passive)}")
         lines.append("left out:")
-        lines += [f"  {line}" for line in self._left_out()] or ["  nothing that the URDF holds"]
+        lines += [f"  {line}" for line in self._left_out()] or ["  nothing in the URDF"]
         lines.append(self._derivatives())
         if self.compile:
-            lines.append("what CasADi evaluates is compiled to machine code")
+            lines.append("CasADi functions are compiled to machine code")
         return "\n".join([*lines, *self.account().lines()])
 
     def to_dict(self) -> dict[str, Any]:
-        """The scene as JSON-able data, the URDF's text included."""
+        """The scene as JSON-compatible data, including the text of the URDF."""
         for effect in self.effects:
             if REGISTRY.get(effect.key) is not type(effect):
                 raise SceneError(
-                    f"effect {effect.key!r} is not registered, so that no file can hold it: put "
+                    f"effect {effect.key!r} is not registered, so it cannot be stored: put "
                     f"@hovi.effects.register before its class {type(effect).__name__}."
                 )
         effects = {effect.key: dataclasses.asdict(effect) for effect in self.effects}
@@ -183,7 +183,7 @@ class Scene:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Scene:
-        """The scene that to_dict wrote. Raises SceneError for an unknown effect."""
+        """The scene from the result of `to_dict`. Raises SceneError for an unknown effect."""
         effects = []
         for key, values in data["effects"].items():
             if key not in REGISTRY:
@@ -209,16 +209,16 @@ class Scene:
         )
 
     @cached_property
-    def _effort_term(self) -> EffortTerm | None:
+    def _torque_velocity_cost(self) -> TorqueVelocityCost | None:
         tau, v = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.v
         phi = self.terms.effort_cost(tau, v)
-        return None if phi is None else EffortTerm(tau, v, phi, self.compile)
+        return None if phi is None else TorqueVelocityCost(tau, v, phi, self.compile)
 
     def _derivatives(self) -> str:
         if self.analytic:
-            return "derivatives: Pinocchio's analytic ones (C++), since every joint has them"
+            return "derivatives: analytic (C++), which all joints support"
         joints = ", ".join(map(repr, self._without_kernel))
-        return f"derivatives: CasADi's, since there are no analytic second ones for {joints}"
+        return f"derivatives: CasADi's, since there are no analytic second derivatives for {joints}"
 
     def _left_out(self) -> list[str]:
         robot, keys = self.robot, {effect.key for effect in self.effects}
@@ -235,7 +235,7 @@ class Scene:
         return lines
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is cached, so that worker processes build their own functions."""
+        """The fields without cached functions, which worker processes build themselves."""
         names = ("robot", "effects", "passive", "compile", "model")
         state = {name: getattr(self, name) for name in names}
         return {**state, "model": PortableModel.of(self.model)}
@@ -246,23 +246,23 @@ class Scene:
 
 
 def require_known_joints(robot: Robot) -> None:
-    """Raise ModelError for a robot with joints on which nothing can be planned."""
+    """Raise ModelError for a robot with joints that do not support planning."""
     if robot.unplanned_joints:
         joints = ", ".join(repr(joint) for joint in robot.unplanned_joints)
         raise ModelError(
-            f"robot {robot.name!r} cannot be planned on: it has joints of no known kind, {joints}: "
-            "known ones move by numbers that add or on SO(2), SE(2), SO(3) or SE(3); lock these "
-            "joints with load_robot(..., locked=[...])."
+            f"robot {robot.name!r} does not support planning: it has joints of an unknown kind, "
+            f"{joints}; supported ones move on a vector space, SO(2), SE(2), SO(3) or SE(3): lock "
+            "these joints with load_robot(..., locked=[...])."
         )
     for coupling in robot.couplings:
         try:
             check_coupling(robot.model, coupling)
         except ModelError as wrong:
-            raise ModelError(f"robot {robot.name!r} cannot be planned on: {wrong}") from None
+            raise ModelError(f"robot {robot.name!r} does not support planning: {wrong}") from None
 
 
 def _as_effects(given: object) -> tuple[Effect, ...]:
-    """Effects as a tuple. Raises SceneError for what is no effect, or stands without a list."""
+    """Effects as a tuple. Raises SceneError for anything but a list of effects."""
     effects = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
     if not isinstance(effects, tuple) or not all(isinstance(each, Effect) for each in effects):
         raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")
@@ -272,7 +272,7 @@ def _as_effects(given: object) -> tuple[Effect, ...]:
 def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     """The names of passive joints, checked."""
     if isinstance(names, str):
-        raise SceneError(f"passive is a list of joint names, not the text {names!r}.")
+        raise SceneError(f"passive is a list of joint names, not the string {names!r}.")
     for name in names:
         if name not in robot.joint_names:
             raise SceneError(
@@ -280,5 +280,5 @@ def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
             )
     chosen = tuple(name for name in robot.joint_names if name in names)
     if chosen and len(chosen) == len(robot.joint_names):
-        raise SceneError("every joint is passive; a motion needs one that carries torque.")
+        raise SceneError("every joint is passive; a motion needs at least one actuated joint.")
     return chosen

@@ -1,4 +1,4 @@
-"""Squares of residuals at points in a diagonal metric, and what their Jacobians make of them."""
+"""Weighted squares of residuals at points, and their gradients."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def expand_squares(
     """1/2 r^T diag(R) r at each point, (P,), and J^T (diag(R) r + force), (P, k).
 
     residuals: r, shape (P, n). metric: R, shape (n,). jacobian: J = dr/dx, shape (P, n, k).
-    force: what pulls at the residuals besides, shape (P, n); nothing when None.
+    force: added to diag(R) r, shape (P, n); none when None.
     """
     points, _, k = jacobian.shape
     values, gradient = np.empty(points), np.empty((points, k))

@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 
 
 def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
-    """L = 1/2 |q^(k)|^2 on R^n: cubic splines for k = 2, quintic ones (least jerk) for k = 3.
+    """L = 1/2 |q^(k)|^2 on R^n: cubic splines for k = 2, quintic ones (minimum jerk) for k = 3.
 
     n: dimension, 1 or more. derivatives: k, 1 or more. Raises InputError otherwise.
     [ColomboFerraroMartin2016, examples of sections 3 and 4]
@@ -28,12 +28,12 @@ def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
 
 
 def mechanics(scene: Scene) -> CasadiLagrangian:
-    """L = 1/2 v^T (M(q) + A(q)) v - V(q) on TQ, in [J]: the robot under its gravity, k = 1.
+    """L = 1/2 v^T (M(q) + A(q)) v - V(q) on TQ, in [J]: the robot under gravity, k = 1.
 
-    A: the inertia of effects whose torque has a part A(q) a. What effects add besides, and what
-    the motion of a base brings with it, are not in it: see `scene_force`.
-    Raises ModelError for joints of no known kind, SceneError for effects whose torque depends on
-    the acceleration in another way.
+    A: the inertia of effects whose torque has a term A(q) a. Other torques of effects and those of
+    a moving base are not included: see `scene_force`.
+    Raises ModelError for joints of an unsupported kind, SceneError for effects whose torque
+    depends on the acceleration in another way.
     """
     require_known_joints(scene.robot)
     functions = casadi_functions(scene.model)
@@ -49,9 +49,9 @@ def mechanics(scene: Scene) -> CasadiLagrangian:
 def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
     """L = 1/2 g(D_t v, D_t v) for the robot's own metric g = M(q), k = 2.
 
-    With D_t v = M^-1 (M a + C(q, v) v), the acceleration that needs no torque taken away.
-    Effects count only as far as they change the masses (armature).
-    Raises ModelError for joints of no known kind.
+    D_t v = M^-1 (M a + C(q, v) v) is the covariant acceleration, zero along geodesics.
+    Only effects that change the mass matrix of the model count.
+    Raises ModelError for joints of an unsupported kind.
     [NoakesHeinzingerPaden1989; ColomboFerraroMartin2016, equation of special Lagrangians]
     """
     model = scene.model.copy()

@@ -1,4 +1,4 @@
-"""What the effects of a scene add, as expressions of the same symbols."""
+"""The terms that the effects of a scene add, as expressions of the same symbols."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class SceneTerms:
-    """The sums of what effects add to RNEA and to the cost.
+    """The sums of the terms that effects add to RNEA and to the cost.
 
     robot: of the scene. effects: its effects.
-    Everything raises SceneError for an effect that touches what it does not say.
+    Properties raise SceneError for an effect that modifies more than its `touches`.
     """
 
     robot: Robot
@@ -32,7 +32,7 @@ class SceneTerms:
 
     @cached_property
     def symbols(self) -> SceneSymbols:
-        """What the expressions are written in, the motion of the base included."""
+        """The symbols of the expressions, with the motion of the base."""
         symbols = SceneSymbols.of(self.robot)
         motions = [effect.base(self.robot, symbols) for effect in self.effects]
         named = [motion for motion in motions if motion is not None]
@@ -40,28 +40,28 @@ class SceneTerms:
 
     @cached_property
     def torque(self) -> ca.SX | None:
-        """What the effects add to RNEA, a column of nv; or None."""
+        """The torque that effects add to RNEA, a column of nv; or None."""
         return self._sum(Touch.TORQUE, "torque", self.symbols)
 
     @cached_property
     def potential(self) -> ca.SX | None:
-        """V of the effects, a number; or None."""
+        """V of the effects, a scalar; or None."""
         return self._sum(Touch.COST, "potential", self.symbols)
 
     def effort_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """phi(tau, v) of the effects, a number; or None."""
+        """phi(tau, v) of the effects, a scalar; or None."""
         return self._sum(Touch.COST, "effort_cost", tau, v)
 
     @cached_property
     def effort_weight(self) -> Array:
-        """R of the effect that states it, or ones, shape (nv,)."""
+        """R of the effect that defines it, or ones, shape (nv,)."""
         weights = [effect.effort_weight(self.robot) for effect in self.effects]
         named = [weight for weight in weights if weight is not None]
         return named[0] if named else np.ones(self.robot.nv)
 
     @cached_property
     def timed(self) -> tuple[str, ...]:
-        """Keys of the effects whose torque, cost or motion of the base depends on the time."""
+        """Keys of the effects whose torque, cost or base motion depends on time."""
         resting, robot = dataclasses.replace(self.symbols, base=None), self.robot
         timed = []
         for effect in self.effects:
@@ -86,7 +86,7 @@ class SceneTerms:
                 continue
             if touch not in effect.touches:
                 raise SceneError(
-                    f"effect {effect.key!r} adds to the {touch} without saying so: put "
-                    f"Touch.{touch.name} into its `touches`."
+                    f"effect {effect.key!r} adds to the {touch} without declaring it: add "
+                    f"Touch.{touch.name} to its `touches`."
                 )
             yield added

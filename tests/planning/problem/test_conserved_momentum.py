@@ -139,7 +139,7 @@ def test_friction_on_the_base_is_no_free_fall() -> None:
 def test_parts_of_an_orientation_cannot_be_free_alone() -> None:
     task = spacecraft()
     goal = dataclasses.replace(task.goal, free=("root_joint[3]", "root_joint[4]"))
-    with pytest.raises(InputError, match="the place, one turn, all turns or everything"):
+    with pytest.raises(InputError, match="the position, one rotation, all rotations or everything"):
         hovi.plan(task.scene, task.start, goal, 1.0)
 
 

@@ -109,7 +109,7 @@ def test_one_irregular_interval_is_enough_to_refuse(two_link: Robot) -> None:
 def test_a_mimic_joint_with_a_multiplier_on_a_turn_is_named_with_the_remedy() -> None:
     robot = load_robot(half_turning())
     start = State(robot.neutral())
-    with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimics.*lock one"):
+    with pytest.raises(ModelError, match=r"does not support planning.*'last' mimics.*lock one"):
         problem(robot, start, start)
 
 

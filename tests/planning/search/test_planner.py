@@ -325,7 +325,7 @@ def test_a_whole_number_of_starts_may_be_a_float(arm_scene: Scene) -> None:
 
 def test_a_robot_that_cannot_be_planned_on_is_refused_before_any_work() -> None:
     robot = load_robot(half_turning())
-    with pytest.raises(ModelError, match=r"cannot be planned on.*'last' mimic"):
+    with pytest.raises(ModelError, match=r"does not support planning.*'last' mimic"):
         plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0)
 
 

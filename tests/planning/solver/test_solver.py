@@ -481,7 +481,7 @@ def test_a_path_between_other_ends_is_moved_to_them(arm_scene: Scene, reach: Sol
 
 def test_an_inconsistent_path_is_refused(arm_scene: Scene, reach: Solution) -> None:
     path = reach.trajectory.path
-    with pytest.raises(InputError, match="guess's z is not that of its q and v"):
+    with pytest.raises(InputError, match="guess's z does not match its q and v"):
         solve(problem_on(arm_scene), dataclasses.replace(path, z=path.z + 1.0))
 
 

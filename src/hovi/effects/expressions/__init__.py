@@ -1,1 +1,1 @@
-"""The CasADi expressions and joint-wise numbers that effects are written with."""
+"""CasADi expressions and joint values of which effects are built."""

@@ -1,6 +1,6 @@
-"""Formulas that a scene file may hold: arithmetic over named symbols, and nothing else.
+"""Formulas in scene files: arithmetic over named symbols, and nothing else.
 
-A formula is read by Python's parser and walked node by node; nothing of it is ever executed.
+A formula is parsed by Python's `ast` and translated node by node; it is never executed.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from hovi.errors import SceneError, nearest
 Number = float | str
 """A number, or a formula."""
 Symbols = Mapping[str, ca.SX | Mapping[str, ca.SX]]
-"""What each name stands for; q["elbow"] is looked up in the mapping `q`."""
+"""Symbols by name; q["elbow"] is looked up in the mapping `q`."""
 
-LONGEST = 2000
-_DEEPEST = 100
+MAX_CHARACTERS = 2000
+_MAX_DEPTH = 100
 _FUNCTIONS: dict[str, Callable[..., ca.SX]] = {
     "sin": ca.sin,
     "cos": ca.cos,
@@ -38,7 +38,7 @@ _FUNCTIONS: dict[str, Callable[..., ca.SX]] = {
     "min": ca.fmin,
     "max": ca.fmax,
 }
-_TWO = ("atan2", "min", "max")
+_BINARY = ("atan2", "min", "max")
 _OPERATORS: dict[type[ast.operator], Callable[[ca.SX, ca.SX], ca.SX]] = {
     ast.Add: lambda x, y: x + y,
     ast.Sub: lambda x, y: x - y,
@@ -51,10 +51,10 @@ _OPERATORS: dict[type[ast.operator], Callable[[ca.SX, ca.SX], ca.SX]] = {
 def expression(what: str, given: Number, symbols: Symbols) -> ca.SX:
     """A number or a formula as a CasADi expression.
 
-    what: the effect and its key, to begin a sentence with.
-    given: a finite number, or a text of + - * / **, brackets, pi, sin, cos, tan, asin, acos, atan,
-        atan2, exp, log, sqrt, tanh, abs, min, max and the symbols.
-    Raises SceneError in one sentence.
+    what: the effect and its key, the start of messages.
+    given: a finite number, or a string of + - * / **, brackets, pi, sin, cos, tan, asin, acos,
+        atan, atan2, exp, log, sqrt, tanh, abs, min, max and the symbols.
+    Raises SceneError.
     """
     if isinstance(given, str):
         value = _walk(_parsed(what, given), _Reader(what, given, symbols), 0)
@@ -66,25 +66,25 @@ def expression(what: str, given: Number, symbols: Symbols) -> ca.SX:
 
 
 class _Reader:
-    """What a formula is read with."""
+    """The symbols of a formula, and its error messages."""
 
     def __init__(self, what: str, text: str, symbols: Symbols) -> None:
         self.what, self.text, self.symbols = what, text, symbols
 
     def refused(self, reason: str) -> SceneError:
-        """The sentence for a formula that makes no sense."""
+        """The error for an invalid formula."""
         text = self.text if len(self.text) <= 60 else self.text[:57] + "..."
         end = "" if reason.endswith(("?", ".")) else "."
         return SceneError(f"{self.what}: the formula {text!r} {reason}{end}")
 
     def symbol(self, name: str) -> ca.SX:
-        """A name that stands alone."""
+        """The symbol of a name without brackets."""
         if name == "pi":
             return ca.SX(math.pi)
         found = self.symbols.get(name)
         if isinstance(found, Mapping):
             raise self.refused(
-                f'needs a joint behind {name!r}, as in {name}["{next(iter(found), "joint")}"]'
+                f'needs a joint after {name!r}, as in {name}["{next(iter(found), "joint")}"]'
             )
         if found is None:
             names = [*self.symbols, "pi", *_FUNCTIONS]
@@ -92,20 +92,24 @@ class _Reader:
         return found
 
     def entry(self, name: str, key: object) -> ca.SX:
-        """A name with a joint behind it."""
+        """The symbol of a name with a joint in brackets."""
         table = self.symbols.get(name)
         if not isinstance(table, Mapping) or not isinstance(key, str):
-            raise self.refused('may use brackets only behind q, v and a, as in q["joint"]')
+            raise self.refused('may use brackets only after q, v and a, as in q["joint"]')
         if key not in table:
             raise self.refused(f"names the joint {key!r}, which is unknown: {nearest(key, table)}")
         return table[key]
 
 
 def _parsed(what: str, text: str) -> ast.expr:
-    if len(text) > LONGEST:
-        raise SceneError(f"{what}: a formula has at most {LONGEST} characters, not {len(text)}.")
+    if len(text) > MAX_CHARACTERS:
+        raise SceneError(
+            f"{what}: a formula has at most {MAX_CHARACTERS} characters, not {len(text)}."
+        )
     try:
-        with warnings.catch_warnings():  # of strange escapes in a string that is refused anyway
+        with (
+            warnings.catch_warnings()
+        ):  # about invalid escapes in strings, which are refused anyway
             warnings.simplefilter("ignore")
             return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -113,7 +117,7 @@ def _parsed(what: str, text: str) -> ast.expr:
 
 
 def _walk(node: ast.expr, reader: _Reader, depth: int) -> ca.SX:
-    if depth > _DEEPEST:
+    if depth > _MAX_DEPTH:
         raise reader.refused("is nested too deeply")
     match node:
         case ast.Constant(value=bool()):
@@ -132,20 +136,20 @@ def _walk(node: ast.expr, reader: _Reader, depth: int) -> ca.SX:
             return _OPERATORS[type(operator)](*sides)
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             return _call(name, arguments, reader, depth)
-    raise reader.refused("holds more than numbers, names, + - * / **, brackets and functions")
+    raise reader.refused("may contain only numbers, names, + - * / **, brackets and functions")
 
 
 def _constant(value: float, reader: _Reader) -> ca.SX:
     try:
         return ca.SX(float(value))
     except OverflowError:
-        raise reader.refused("holds a number that is too large") from None
+        raise reader.refused("contains a number that is too large") from None
 
 
 def _call(name: str, arguments: list[ast.expr], reader: _Reader, depth: int) -> ca.SX:
     if name not in _FUNCTIONS:
         raise reader.refused(f"calls {name!r}, which is unknown: {nearest(name, _FUNCTIONS)}")
-    wanted = 2 if name in _TWO else 1
+    wanted = 2 if name in _BINARY else 1
     if len(arguments) != wanted:
         raise reader.refused(f"calls {name!r} with {len(arguments)} arguments; it takes {wanted}")
     return _FUNCTIONS[name](*(_walk(each, reader, depth + 1) for each in arguments))

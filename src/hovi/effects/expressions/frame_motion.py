@@ -1,4 +1,4 @@
-"""A frame of the robot on its way: placement, velocity, and the joint torques of a wrench on it."""
+"""The motion of a frame: placement, velocity, and the joint torques of a wrench on it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class FrameMotion:
     """A frame in the world as expressions of a scene's symbols.
 
-    rotation: R, the frame's axes in the world, (3, 3). position: p, its origin, (3,) in [m].
-    velocity: dp/dt, (3,) in [m/s].
+    rotation: R of the frame, (3, 3). position: p of its origin, (3,) in [m].
+    velocity: dp/dt, (3,) in [m/s]. rate: q', (nq,).
     """
 
     symbols: SceneSymbols
@@ -31,9 +31,9 @@ class FrameMotion:
     velocity: ca.SX
 
     def joint_torque(self, force: ca.SX, moment: ca.SX | None = None) -> ca.SX:
-        """J^T (f, m): what joint torques do the work of a wrench on the frame, (nv,).
+        """J^T (f, m): the joint torques equivalent to a wrench on the frame, (nv,).
 
-        With virtual displacements, f . dp + m . dw = (J^T (f, m)) . dq, where the turn dw has
+        By virtual work, f . dp + m . dw = (J^T (f, m)) . dq, where the rotation dw satisfies
         m . dw = 1/2 <[m] R, dR>. [Featherstone2008, sec. 5.3]
 
         force: at the frame's origin, world axes, (3,) in [N]. moment: (3,) in [N m].
@@ -47,7 +47,7 @@ class FrameMotion:
 
 
 def frame_motion(robot: Robot, symbols: SceneSymbols, frame: str) -> FrameMotion:
-    """The motion of a frame, that of a moving base included.
+    """The motion of a frame, including that of a moving base.
 
     frame: one of robot.frame_names.
     """

@@ -1,4 +1,4 @@
-"""Numbers of an effect that belong to joints: one for all, a list, or a table by name."""
+"""Parameters of an effect with a value per joint: one for all, a list, or a table by name."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 JointValues = float | tuple[float, ...] | Mapping[str, float]
-"""One number for every coordinate, a list of nv, or a table by joint: the others are zero."""
+"""One number for all coordinates, a list of nv, or a table by joint with default zero."""
 
 
 def joint_values(robot: Robot, what: str, given: JointValues, least: float = -np.inf) -> Array:
     """One number per velocity coordinate, shape (nv,).
 
-    what: the effect and its key, to begin a sentence with. least: the smallest number allowed.
+    what: the effect and its key, the start of messages. least: the smallest valid number.
     Raises SceneError for unknown joints, wrong lengths, and numbers not finite or too small.
     """
     names = robot.coordinate_names
@@ -42,21 +42,21 @@ def joint_values(robot: Robot, what: str, given: JointValues, least: float = -np
     return values
 
 
-def of_urdf(robot: Robot, effect: str, held: str, values: Array) -> Array:
-    """What the URDF states of the joints. Raises SceneError where it states nothing.
+def of_urdf(robot: Robot, effect: str, quantity: str, values: Array) -> Array:
+    """The given values of the URDF. Raises SceneError if all are zero.
 
-    held: what that is, in words.
+    quantity: name of the property.
     """
     if not values.any():
         raise SceneError(
             f"effect {effect!r}: from_urdf = true, but the URDF of robot {robot.name!r} states no "
-            f"{held}; give the numbers here."
+            f"{quantity}; give the numbers here."
         )
     return values
 
 
 def require_one_source(effect: str, key: str, given: object, from_urdf: bool) -> None:
-    """Raise SceneError unless the numbers come from exactly one place."""
+    """Raise SceneError unless exactly one of the value and `from_urdf` is given."""
     if (given is None) != from_urdf:
         count = "both were" if from_urdf else "neither was"
         raise SceneError(
@@ -65,7 +65,7 @@ def require_one_source(effect: str, key: str, given: object, from_urdf: bool) ->
 
 
 def in_words(given: JointValues | None, unit: str) -> str:
-    """The numbers with their unit, for the account of a scene."""
+    """The numbers with their unit, for the description of a scene."""
     if given is None:
         return "as the URDF states"
     if isinstance(given, Mapping):
@@ -76,7 +76,7 @@ def in_words(given: JointValues | None, unit: str) -> str:
 
 
 def _coordinates(robot: Robot, what: str, joint: str) -> list[int]:
-    """Places in v of a joint, or of one of its coordinates."""
+    """Indices in v of a joint, or of one of its coordinates."""
     names = robot.coordinate_names
     if joint in names:
         return [names.index(joint)]

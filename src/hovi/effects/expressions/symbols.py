@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneSymbols:
-    """The CasADi symbols that an effect's expressions are written in.
+    """The CasADi symbols in the expressions of effects.
 
-    q: shape (nq,). v, a: shape (nv,). t: a number, in [s].
-    base: where the base is at t, (x, y, z, yaw, pitch, roll) in [m] and [rad]; None where it rests.
+    q: shape (nq,). v, a: shape (nv,). t: scalar, in [s].
+    base: pose of the base at t, (x, y, z, yaw, pitch, roll) in [m] and [rad]; None if it is fixed.
     """
 
     q: ca.SX

@@ -14,7 +14,7 @@ TimeVector = tuple[Number, Number, Number]
 def time_vector(what: str, given: TimeVector, t: ca.SX) -> ca.SX:
     """The three components at time t, shape (3,).
 
-    what: the effect and its key, to begin a sentence with. Raises SceneError.
+    what: the effect and its key, the start of messages. Raises SceneError.
     """
     names = ("x", "y", "z")
     if len(given) != 3:
@@ -27,5 +27,5 @@ def time_vector(what: str, given: TimeVector, t: ca.SX) -> ca.SX:
 
 
 def in_words(given: TimeVector) -> str:
-    """The components for the account of a scene."""
+    """The components, for the description of a scene."""
     return "(" + ", ".join(each if isinstance(each, str) else f"{each:g}" for each in given) + ")"

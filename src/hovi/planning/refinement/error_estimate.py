@@ -19,7 +19,7 @@ import numpy.typing as npt
 from hovi.discrete.discrete_lagrangian import Expansion
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
-from hovi.discrete.motion_error import MotionError, deviation, places
+from hovi.discrete.motion_error import MotionError, deviation, sample_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -126,7 +126,7 @@ def _solved(
     if not solution.success or solution.problem is None:
         return None
     coarse, finer = motion(problem, path), solution.trajectory
-    k, s = places(coarse)
+    k, s = sample_points(coarse)
     t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, finer.duration)
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)

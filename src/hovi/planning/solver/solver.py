@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, moved, named_curve, stretched, with_turns
-from hovi.discrete.nodal_momenta import carried_momenta
+from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
@@ -181,7 +181,7 @@ def _trajectory(result: MethodResult) -> Trajectory:
     if problem.clearance is not None and problem.distances is not None:
         metadata["clearance"] = problem.clearance.to_dict()
     derivatives = problem.ld.derivatives(result.path, result.forces, result.jets)
-    momenta = carried_momenta(derivatives)
+    momenta = accumulated_momenta(derivatives)
     return Trajectory(problem.grid, result.path, momenta, problem.scene, metadata)
 
 
