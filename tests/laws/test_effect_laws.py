@@ -1,4 +1,4 @@
-"""What holds for every effect: exact derivatives, nothing for nothing, files and back."""
+"""Laws of every effect: exact derivatives, no cost if unused, files and back."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from hovi.planning.task_file.writing import save_task
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from samples.sample_effects import powerless_effects, sample_effects
+from samples.sample_effects import sample_effects, zero_strength_effects
 
 Array = npt.NDArray[np.float64]
 
@@ -51,7 +51,7 @@ def points(robot: Robot, count: int = 4) -> tuple[Array, Array, Array, Array]:
 
 @pytest.fixture(scope="module")
 def kinova() -> Robot:
-    """An arm with joints that turn without end (nq = 2, nv = 1)."""
+    """An arm with continuous joints (nq = 2, nv = 1)."""
     return load_robot("kinova")
 
 
@@ -60,12 +60,12 @@ def with_gravity(effect: Effect) -> list[Effect]:
 
 
 def test_there_is_a_sample_of_every_effect(two_link: Robot) -> None:
-    assert set(sample_effects(two_link)) == set(powerless_effects(two_link)) == set(REGISTRY)
+    assert set(sample_effects(two_link)) == set(zero_strength_effects(two_link)) == set(REGISTRY)
 
 
 @pytest.mark.parametrize("key", REGISTRY)
 @pytest.mark.parametrize("name", ["two_link", "panda", "kinova"])
-def test_gradient_and_hessian_are_the_derivatives_of_the_cost(
+def test_gradient_and_hessian_match_finite_differences(
     request: pytest.FixtureRequest, name: str, key: str
 ) -> None:
     robot: Robot = request.getfixturevalue(name)
@@ -101,23 +101,25 @@ def test_the_kernel_and_the_expression_graph_agree(two_link: Robot, key: str) ->
 # Nothing for nothing
 
 
-def by_hand(robot: Robot) -> ca.Function:
-    """Gravity and inertia alone, written without any scene."""
+def inverse_dynamics_graph(robot: Robot) -> ca.Function:
+    """Gravity and inertia only, without a scene."""
     model = robot.model.copy()
     model.armature = np.zeros(model.nv)
     q, v, a, t = (ca.SX.sym(name, n) for name, n in zip("qvat", (*[model.nv] * 3, 1), strict=True))
     tau = casadi_functions(model).inverse_dynamics(q, v, a)
-    return ca.Function("by_hand", [q, v, a, t], [tau, ca.dot(ca.DM.ones(model.nv), tau**2) / 2])
+    return ca.Function(
+        "inverse_dynamics_graph", [q, v, a, t], [tau, ca.dot(ca.DM.ones(model.nv), tau**2) / 2]
+    )
 
 
 @pytest.mark.parametrize("key", [key for key in REGISTRY if key != "gravity"])
 @pytest.mark.parametrize("name", ["two_link", "panda"])
-def test_an_effect_that_is_not_named_costs_no_instruction(
+def test_an_unused_effect_adds_no_instruction(
     request: pytest.FixtureRequest, name: str, key: str
 ) -> None:
     robot: Robot = request.getfixturevalue(name)
     scene = Scene(robot, with_gravity(sample_effects(robot)[key]))
-    bare = by_hand(robot).n_instructions()
+    bare = inverse_dynamics_graph(robot).n_instructions()
     assert scene.without(key).graph().n_instructions() == bare
     if key == "payload" and robot.nv > 2:  # the hand has a full inertia already: other numbers
         assert scene.graph().n_instructions() == bare
@@ -125,11 +127,11 @@ def test_an_effect_that_is_not_named_costs_no_instruction(
         assert scene.graph().n_instructions() > bare
 
 
-def test_gravity_that_is_not_named_costs_no_instruction(panda: Robot) -> None:
+def test_unused_gravity_adds_no_instruction(panda: Robot) -> None:
     weightless = panda.model.copy()
     weightless.gravity.linear = np.zeros(3)
     scene = Scene(panda, [Gravity()])
-    expected = by_hand(load_robot(weightless)).n_instructions()
+    expected = inverse_dynamics_graph(load_robot(weightless)).n_instructions()
     assert scene.without("gravity").graph().n_instructions() == expected
     assert scene.graph().n_instructions() > expected
 
@@ -144,7 +146,7 @@ def test_gravity_that_is_not_named_costs_no_instruction(panda: Robot) -> None:
     ],
     ids=lambda each: getattr(each, "key", None),
 )
-def test_an_effect_costs_the_instructions_of_its_formula(
+def test_an_effect_adds_the_instructions_of_its_formula(
     panda: Robot, effect: Effect, a_joint: int, besides: int
 ) -> None:
     scene = Scene(panda, [Gravity(), effect])
@@ -158,7 +160,7 @@ def test_an_effect_of_strength_zero_changes_nothing(
     request: pytest.FixtureRequest, name: str, key: str
 ) -> None:
     robot: Robot = request.getfixturevalue(name)
-    scene = Scene(robot, with_gravity(powerless_effects(robot)[key]))
+    scene = Scene(robot, with_gravity(zero_strength_effects(robot)[key]))
     *jet, t = points(robot)
     bare = scene.without(key).effort_lagrangian().evaluate(*jet, t=t)
     for found, expected in zip(scene.effort_lagrangian().evaluate(*jet, t=t), bare, strict=True):
@@ -181,7 +183,7 @@ def test_every_effect_is_frozen_and_described_in_one_line(two_link: Robot, key: 
 
 
 @pytest.mark.parametrize("key", REGISTRY)
-def test_an_effect_touches_what_it_says_and_nothing_else(panda: Robot, key: str) -> None:
+def test_an_effect_touches_what_it_declares_and_nothing_else(panda: Robot, key: str) -> None:
     effect = sample_effects(panda)[key]
     scene, bare = Scene(panda, [effect]), Scene(panda)
     *jet, t = points(panda)
@@ -192,7 +194,7 @@ def test_an_effect_touches_what_it_says_and_nothing_else(panda: Robot, key: str)
     assert (named[1] is not None) <= (Touch.COST in effect.touches)
 
 
-def test_an_effect_that_touches_what_it_does_not_say_is_refused(two_link: Robot) -> None:
+def test_an_effect_that_touches_more_than_it_declares_is_refused(two_link: Robot) -> None:
     @dataclasses.dataclass(frozen=True)
     class Secret(Effect):
         key: ClassVar[str] = "secret"
@@ -212,7 +214,7 @@ def test_an_effect_that_touches_what_it_does_not_say_is_refused(two_link: Robot)
 
 
 @pytest.mark.parametrize("key", REGISTRY)
-def test_an_effect_is_json_and_back(two_link: Robot, key: str) -> None:
+def test_an_effect_survives_json(two_link: Robot, key: str) -> None:
     scene = Scene(two_link, [sample_effects(two_link)[key]])
     text = json.dumps(scene.to_dict())
     copy = Scene.from_dict(json.loads(text))
@@ -222,20 +224,20 @@ def test_an_effect_is_json_and_back(two_link: Robot, key: str) -> None:
 
 
 @pytest.mark.parametrize("key", REGISTRY)
-def test_an_effect_is_toml_and_back(two_link: Robot, tmp_path: Path, key: str) -> None:
+def test_an_effect_survives_toml(two_link: Robot, tmp_path: Path, key: str) -> None:
     scene = Scene(two_link, with_gravity(sample_effects(two_link)[key]))
     task = Task(scene, State([0.0, 0.0]), State([1.0, 0.5]), 1.0)
     assert load_task(save_task(task, tmp_path / "scene.toml")).scene.effects == scene.effects
 
 
-def test_effects_that_a_clock_drives_are_known(panda: Robot) -> None:
+def test_time_dependent_effects_are_detected(panda: Robot) -> None:
     scene = Scene(panda, list(sample_effects(panda).values()))
     timed = ("wrench", "drag", "moving_base", "custom", "reference_cost")
     assert set(scene.terms.timed) == set(timed)
-    assert Scene(panda, list(powerless_effects(panda).values())[:7]).terms.timed == ()
+    assert Scene(panda, list(zero_strength_effects(panda).values())[:7]).terms.timed == ()
 
 
-def test_a_free_duration_is_refused_where_a_clock_drives_the_scene(two_link: Robot) -> None:
+def test_a_free_duration_is_refused_for_a_time_dependent_scene(two_link: Robot) -> None:
     scene = Scene(two_link, [sample_effects(two_link)["moving_base"]])
     with pytest.raises(SceneError, match="'moving_base' depends on the time, and a free duration"):
         plan(scene, [0.0, 0.0], [1.0, 0.0], (0.5, 2.0))
@@ -266,7 +268,7 @@ def registered() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("registered")
-def test_a_registered_effect_travels_in_scene_files_and_with_motions(
+def test_a_registered_effect_is_stored_in_scene_and_motion_files(
     two_link: Robot, tmp_path: Path
 ) -> None:
     scene = Scene(two_link, [Gravity(), Cogging(0.2)])
@@ -281,7 +283,7 @@ def test_a_registered_effect_travels_in_scene_files_and_with_motions(
     np.testing.assert_allclose(loaded.sample(0.3).tau, motion.sample(0.3).tau, rtol=1e-12)
 
 
-def test_an_effect_that_is_not_registered_is_in_no_file(two_link: Robot) -> None:
+def test_an_unregistered_effect_cannot_be_stored(two_link: Robot) -> None:
     scene = Scene(two_link, [Cogging(0.2)])
     jet = points(two_link)[:3]
     added = scene.inverse_dynamics(*jet) - Scene(two_link).inverse_dynamics(*jet)

@@ -1,4 +1,4 @@
-"""Every kind of joint is planned on: the torques are Pinocchio's, by the kernel or by CasADi."""
+"""Every kind of joint supports planning, with Pinocchio's torques, by the kernel or CasADi."""
 
 from __future__ import annotations
 

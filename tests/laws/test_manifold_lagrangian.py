@@ -1,4 +1,4 @@
-"""L_d where configurations are no vectors: finite differences, symmetries, equivalent robots."""
+"""L_d on manifolds: finite differences, symmetries, equivalent robots."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def moved(robot: Robot, grid: Grid, path: DiscretePath, columns: Array) -> Discr
 
 @pytest.mark.parametrize("turn", [1e-9, 1.0, 3.0])
 @pytest.mark.parametrize("base", BASES)
-def test_gradient_and_hessian_are_those_of_finite_differences(base: str, turn: float) -> None:
+def test_gradient_and_hessian_match_finite_differences(base: str, turn: float) -> None:
     robot = load_robot(with_arm(base))
     grid = Grid(STEPS, (by_name("galerkin-1"), by_name("galerkin-2")))
     ld = DiscreteLagrangian(Scene(robot, [Gravity()]).effort_lagrangian(), grid)
@@ -78,7 +78,7 @@ def test_gradient_and_hessian_are_those_of_finite_differences(base: str, turn: f
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "planar", "continuous"])
-def test_d1_to_d4_are_the_nodal_gradient(base: str) -> None:
+def test_d1_to_d4_match_the_nodal_gradient(base: str) -> None:
     robot = load_robot(with_arm(base))
     grid = Grid.uniform(0.8, 3, by_name("galerkin-2"))
     ld = DiscreteLagrangian(Scene(robot).effort_lagrangian(), grid)
@@ -90,7 +90,7 @@ def test_d1_to_d4_are_the_nodal_gradient(base: str) -> None:
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "continuous"])
-def test_point_steps_are_what_a_step_does_to_first_order(base: str) -> None:
+def test_point_steps_match_finite_differences(base: str) -> None:
     robot = load_robot(with_arm(base))
     grid = Grid.uniform(0.5, 1, by_name("galerkin-2"))
     ld = DiscreteLagrangian(Scene(robot).effort_lagrangian(), grid)
@@ -105,7 +105,7 @@ def test_point_steps_are_what_a_step_does_to_first_order(base: str) -> None:
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "spherical", "planar"])
-def test_l_d_does_not_see_where_the_world_is(base: str) -> None:
+def test_l_d_is_invariant_under_rigid_motions_of_the_world(base: str) -> None:
     robot = load_robot(with_arm(base))
     grid = Grid.uniform(1.2, 3, by_name("galerkin-2"))
     ld = DiscreteLagrangian(Scene(robot).effort_lagrangian(), grid)

@@ -1,4 +1,4 @@
-"""Motions of robots whose configurations are no vectors: equivalent robots, symmetries, oracles."""
+"""Motions of robots on manifolds: equivalent robots, symmetries, oracles."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def solved(
 
 
 CONTINUOUS = {"j2s6s200_joint_1": 0, "j2s6s200_joint_4": 3, "j2s6s200_joint_6": 5}
-"""Kinova's continuous joints and their places in v."""
+"""Kinova's continuous joints and their indices in v."""
 
 
 # Without armature the light wrist makes a landscape in which hundreds of steps are taken.
 @pytest.mark.parametrize("armature", [0.0, 0.3])
 @pytest.mark.parametrize("T", [1.0, 2.0])
 @pytest.mark.parametrize("turns", [(0, 0, 0), (0, 0, 1), (0, 0, -3), (-3, 3, 2)], ids=str)
-def test_continuous_joints_move_as_revolute_ones(
+def test_continuous_joints_move_like_revolute_ones(
     turns: tuple[int, ...], T: float, armature: float
 ) -> None:
     robot = load_robot("kinova")
@@ -92,8 +92,8 @@ def test_a_guess_keeps_several_turns_within_one_interval() -> None:
 
 
 @pytest.mark.parametrize("turns", [1, 5, 20, 60])
-def test_a_body_spins_as_often_as_it_is_asked_to(turns: int) -> None:
-    """About a principal axis, in the least effort: theta is a cubic, the cost 6 (I theta)^2/T^3."""
+def test_a_body_makes_the_requested_turns(turns: int) -> None:
+    """About a principal axis, at minimum effort: theta is a cubic, the cost 6 (I theta)^2/T^3."""
     robot, T = rigid_body((0.7, 1.1, 1.6)), 2.0
     q = robot.neutral()
     goal = State(q, turns={"turn": [0, -turns, 0]})
@@ -108,7 +108,7 @@ def test_a_body_spins_as_often_as_it_is_asked_to(turns: int) -> None:
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "spherical", "planar"])
-def test_v_and_a_of_a_guess_of_many_turns_are_those_of_its_q(base: str) -> None:
+def test_v_and_a_of_a_guess_with_many_turns_are_derivatives_of_q(base: str) -> None:
     robot = load_robot(with_arm(base))
     q0, q1 = configurations(robot, 2, 3)
     random = np.random.default_rng(8)
@@ -124,13 +124,13 @@ def test_v_and_a_of_a_guess_of_many_turns_are_those_of_its_q(base: str) -> None:
     np.testing.assert_allclose((vp - vm) / (2 * h), a, rtol=1e-6, atol=1e-1)
 
 
-def test_turns_that_are_none_are_refused() -> None:
+def test_invalid_turns_are_refused() -> None:
     robot, free = load_robot("kinova"), load_robot(with_arm("free-flyer"))
     for bad, who, words in (
         ({"j2s6s200_joint_2": 1}, robot, "no joint 'j2s6s200_joint_2' that can make full turns"),
         ({"j2s6s200_joint_1": 0.5}, robot, "takes an integer"),
-        ({"j0": 1}, free, "three numbers of whole length"),
-        ({"j0": [0.5, 0.0, 0.0]}, free, "three numbers of whole length"),
+        ({"j0": 1}, free, "three numbers of integer length"),
+        ({"j0": [0.5, 0.0, 0.0]}, free, "three numbers of integer length"),
     ):
         with pytest.raises(InputError, match=words):
             State(who.neutral(), turns=bad).turns_on(who, "goal")
@@ -145,7 +145,7 @@ def test_turns_that_are_none_are_refused() -> None:
 # The world may be turned and shifted
 
 
-def test_a_motion_does_not_see_where_the_world_is() -> None:
+def test_a_motion_is_invariant_under_rigid_motions_of_the_world() -> None:
     robot = load_robot(with_arm("free-flyer"))
     q0, q1 = configurations(robot, 2, 3, 0.7)
     v0, v1 = 0.3 * np.random.default_rng(1).normal(size=(2, robot.nv))
@@ -167,14 +167,14 @@ def test_a_motion_does_not_see_where_the_world_is() -> None:
 # Oracles
 
 
-def test_a_riemannian_cubic_on_so3_obeys_its_equation() -> None:
+def test_a_riemannian_cubic_on_so3_satisfies_its_equation() -> None:
     """For a spherical inertia tau = w', so that the least |w'|^2 obeys w''' = w'' x w."""
     robot = rigid_body([1.0, 1.0, 1.0])
     q1 = robot.integrate(robot.neutral(), np.array([1.0, -0.6, 0.8]))
     v0, v1 = np.array([0.5, 1.0, -0.3]), np.array([-0.4, 0.2, 1.0])
 
     def equations(t: Array, y: Array) -> Array:
-        """(quaternion, w, w', w'') in the body's axes."""
+        """(quaternion, w, w', w'') in the body frame."""
         u, s, w, dw, ddw = y[:3], y[3], y[4:7], y[7:10], y[10:13]
         cross = lambda a, b: np.cross(a, b, axis=0)  # noqa: E731
         du = 0.5 * (s * w + cross(u, w))
@@ -185,7 +185,7 @@ def test_a_riemannian_cubic_on_so3_obeys_its_equation() -> None:
     assert_same_motion(solution, equations, *ends, lambda y: 0.5 * np.sum(y[7:10] ** 2, axis=0))
 
 
-def test_a_rigid_body_turns_as_pontryagin_says() -> None:
+def test_a_rigid_body_satisfies_pontryagins_equations() -> None:
     """Least |tau|^2 between two orientations: the equations of the costates, by SciPy."""
     inertia = np.array([1.0, 2.0, 3.5])
     robot = rigid_body(inertia)
@@ -318,7 +318,7 @@ def test_nodes_and_cost_have_their_orders_on_kinova() -> None:
 
 
 def test_nodes_and_cost_have_their_orders_on_kinova_without_rotors() -> None:
-    """It hangs, and its light wrist winds up to save the others' torque: grids must be fine."""
+    """The light wrist rotates fast to reduce the other torques, so grids must be fine."""
     robot = load_robot("kinova")
     hangs = robot.integrate(robot.neutral(), np.pi * np.array([0.0, 0.0, 1.0, 0.0, 1.0, 0.0]))
     goal = robot.integrate(hangs, 0.03 * np.random.default_rng(4).uniform(-1, 1, 6))

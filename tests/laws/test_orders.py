@@ -116,7 +116,7 @@ def test_three_inner_modes_are_at_round_off_with_32_intervals() -> None:
         (3, (24, 32, 40, 48)),
     ],
 )
-def test_between_the_nodes_the_orders_are_those_of_the_polynomial(
+def test_between_the_nodes_the_orders_are_of_the_polynomial(
     r: int, intervals: tuple[int, ...], name: str, loss: int
 ) -> None:
     errors = [error_between(f"galerkin-{r}", N, name) for N in intervals]

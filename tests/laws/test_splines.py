@@ -1,4 +1,4 @@
-"""Splines, for which everything has a closed form: basis, gamma, L_d, recursions, the long flow."""
+"""Splines against closed forms: basis, gamma, L_d, recursions, long flows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 
 def assert_close(value: Array, expected: Array, tolerance: float = 1e-13) -> None:
-    """Up to rounding of the largest number."""
+    """Equality up to rounding of the largest entry."""
     scale = np.abs(expected).max()
     np.testing.assert_allclose(value / scale, expected / scale, rtol=0, atol=tolerance)
 
@@ -36,7 +36,7 @@ def ends(k: int, n: int = 3) -> tuple[Array, Array]:
 # The paper's basis and matrix gamma, for every k
 
 
-def test_gamma_for_k_2_is_the_papers() -> None:
+def test_gamma_for_k_2_matches_the_paper() -> None:
     expected = np.array([[1 / (2 * np.sqrt(3)), 1 / 2], [0, 1]])
     np.testing.assert_allclose(gamma(2), expected, rtol=0, atol=1e-16)
     w = inverse_gamma(2) @ np.array([0.3, 0.8])  # w0 = 2 sqrt(3) (z0 - z1/2), w1 = z1
@@ -53,7 +53,7 @@ def test_the_basis_is_orthonormal_and_gamma_expands_the_end_weights_in_it(k: int
     np.testing.assert_allclose(gamma(k) @ b, a, rtol=0, atol=1e-14)
 
 
-def test_the_rows_of_any_order_are_those_of_order_two_at_order_two() -> None:
+def test_rows_of_any_order_match_those_of_order_two() -> None:
     s = np.linspace(0, 1, 9)
     for r in (0, 1, 5, 20, 40):
         np.testing.assert_allclose(jet_rows(s, 2, r), interval_rows(s, r), rtol=0, atol=3e-15)
@@ -61,7 +61,7 @@ def test_the_rows_of_any_order_are_those_of_order_two_at_order_two() -> None:
 
 @pytest.mark.parametrize("k", [1, 2, 3, 4])
 @pytest.mark.parametrize("r", [0, 1, 4])
-def test_the_curve_meets_the_end_data_whatever_its_inner_modes(k: int, r: int) -> None:
+def test_the_curve_meets_the_end_data_for_any_inner_modes(k: int, r: int) -> None:
     rng = np.random.default_rng(10 * k + r)
     x0, z, c = rng.normal(size=k), rng.normal(size=k), rng.normal(size=r)
     start, end = jet_rows(np.array([0.0, 1.0]), k, r) @ np.concatenate([x0[1:], z, c])
@@ -122,7 +122,7 @@ def jerk_matrix(h: float) -> Array:
 
 @pytest.mark.parametrize("h", [0.03, 0.5, 2.0])
 @pytest.mark.parametrize("r", [0, 1, 3])
-def test_the_exact_discrete_lagrangian_of_the_cubic_spline_is_the_papers(h: float, r: int) -> None:
+def test_the_exact_discrete_lagrangian_of_the_cubic_spline(h: float, r: int) -> None:
     x0, x1 = ends(2)
     ld = SchemeLagrangian(spline(3), galerkin(r), h)
     assert_close(ld.value(x0, x1), paper_value(h, x0, x1))
@@ -132,7 +132,7 @@ def test_the_exact_discrete_lagrangian_of_the_cubic_spline_is_the_papers(h: floa
 
 @pytest.mark.parametrize("h", [0.3, 2.0])
 @pytest.mark.parametrize("r", [0, 2])
-def test_the_exact_discrete_lagrangian_of_least_jerk_is_the_quintics(h: float, r: int) -> None:
+def test_the_exact_discrete_lagrangian_of_minimum_jerk(h: float, r: int) -> None:
     x0, x1 = ends(3)
     ld = SchemeLagrangian(spline(3, 3), galerkin(r, 3), h)
     data = np.concatenate([x0, x1], axis=1)  # (B, 6, n)
@@ -153,7 +153,7 @@ def test_the_action_is_half_of_h_w_squared(k: int) -> None:
     np.testing.assert_allclose(segment.inner, 0.0, atol=1e-14)
 
 
-def test_the_quintics_matrix_is_that_of_exact_arithmetic() -> None:
+def test_the_matrix_of_the_quintic_matches_exact_arithmetic() -> None:
     # q''' of the quintic through unit end data at h = 1, integrated without rounding
     powers = [
         [factorial(m) // factorial(m - j) if m >= j else 0 for m in range(6)] for j in (0, 1, 2)

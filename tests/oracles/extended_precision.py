@@ -1,4 +1,4 @@
-"""A CasADi graph, instruction by instruction, in mpmath; and Galerkin actions in its numbers."""
+"""Evaluates CasADi graphs and Galerkin actions in the extended precision of mpmath."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def graph(function: ca.Function) -> Callable[..., list[Any]]:
 
 
 def gauss(points: int) -> tuple[list[Any], list[Any]]:
-    """Nodes and weights of Gauss's rule on [0, 1], Newton from NumPy's."""
+    """Nodes and weights of the Gauss rule on [0, 1], by Newton's method from NumPy's."""
     nodes, weights = [], []
     for guess in np.polynomial.legendre.leggauss(points)[0]:
         x = mp.findroot(lambda y: mp.legendre(points, y), mp.mpf(float(guess)))
@@ -78,7 +78,7 @@ def gauss(points: int) -> tuple[list[Any], list[Any]]:
 
 
 def mode(degree: int) -> list[list[Any]]:
-    """Monomial coefficients of sqrt(2 m + 1) P_m(2 s - 1), twice integrated, once, as it is."""
+    """Monomial coefficients of the double integral, integral and value of sqrt(2 m + 1) P_m."""
     p = [
         mp.sqrt(2 * degree + 1)
         * (-1) ** (degree + i)

@@ -1,4 +1,4 @@
-"""Central differences of fourth order: the derivative of anything, without its help."""
+"""Derivatives of any function by central differences of fourth order."""
 
 from __future__ import annotations
 

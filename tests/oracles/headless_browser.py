@@ -42,7 +42,7 @@ class Tab:
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """One DevTools command and its answer; events on the way are noted."""
+        """Send a DevTools command and return its answer; events in between are recorded."""
         self._count += 1
         message = {"id": self._count, "method": method, "params": parameters}
         answer = self._loop.run_until_complete(asyncio.wait_for(self._ask(message), _SECONDS))
@@ -71,7 +71,7 @@ class Tab:
         return result["result"].get("value")
 
     def screenshot(self, path: Path | None = None) -> npt.NDArray[np.int16]:
-        """What the page looks like, shape (height, width, 3)."""
+        """A screenshot of the page, shape (height, width, 3)."""
         data = base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
         if path is not None:
             path.write_bytes(data)

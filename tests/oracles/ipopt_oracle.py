@@ -1,4 +1,4 @@
-"""The discrete action minimised by Ipopt, written down in CasADi interval by interval."""
+"""The discrete action, formulated in CasADi interval by interval and minimised by Ipopt."""
 
 from __future__ import annotations
 

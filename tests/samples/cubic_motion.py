@@ -1,4 +1,4 @@
-"""Motions whose every sample is known: a cubic in each joint, which all schemes reproduce."""
+"""Motions with known samples: a cubic in each joint, which all schemes reproduce."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def cubic_motion(
     steps: Array | None = None,
     seed: int = 0,
 ) -> tuple[Trajectory, Cubic]:
-    """A trajectory that is a cubic, and the cubic. `steps` are even when not given."""
+    """A trajectory that is a cubic, and the cubic. `steps` are uniform by default."""
     N, cubic = len(schemes), Cubic(scene.robot.nv, seed)
     steps = np.full(N, duration / N) if steps is None else steps
     grid = Grid(steps, tuple(by_name(name) for name in schemes))

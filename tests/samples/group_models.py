@@ -1,4 +1,4 @@
-"""One-joint Pinocchio models, a model per group."""
+"""Pinocchio models with one joint, one model per group."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random sums over intervals as dense matrices: what every block solver must agree with."""
+"""Random sums over intervals as dense matrices, the reference of all block solvers."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SIZES = [  # components n, inner modes of each of the N intervals
 
 @dataclass(frozen=True, eq=False)
 class IntervalProblem:
-    """One quadratic model three times: over nodal columns, over regular ones, and dense.
+    """One quadratic model in three forms: in nodal columns, in regularized columns, and dense.
 
     The unknowns are (q, v) of the inner nodes and the inner modes that exist, along the motion.
 
@@ -74,12 +74,12 @@ class IntervalProblem:
 
     @cached_property
     def regular_map(self) -> Array:
-        """The same in regular columns (q0, h v0, Z0, Z1, c)."""
+        """The same in regularized columns (q0, h v0, Z0, Z1, c)."""
         return np.einsum("ij,kjnu->kinu", self._regular, self.nodal_map)
 
     @cached_property
     def regular(self) -> IntervalSum:
-        """The model written in regular columns."""
+        """The model in regularized columns."""
         back = np.linalg.inv(self._regular)
         return IntervalSum(
             np.einsum("ij,kin->kjn", back, self.nodal.gradient),
@@ -112,7 +112,7 @@ class IntervalProblem:
         return np.linalg.solve(self.hessian + shift * self.metric, -self.gradient)
 
     def eigenvalues(self) -> Array:
-        """Of H relative to D: H + shift D is definite where shift exceeds minus the lowest."""
+        """Eigenvalues of H relative to D: H + shift D is definite if shift > -eigenvalues()[0]."""
         inverse = np.linalg.inv(np.linalg.cholesky(self.metric))
         return np.linalg.eigvalsh(inverse @ self.hessian @ inverse.T)
 

@@ -20,9 +20,9 @@ _NAMED = {
     "Ellipsoid": pin.JointModelEllipsoid(0.4, 0.3, 0.2),
 }
 _OF_OTHERS = "Composite", "Mimic"
-"""Types whose joints are made of others."""
+"""Types that are composed of other joints."""
 TYPES = tuple(name[10:] for name in dir(pin) if name.startswith("JointModel") and name[10:])
-"""Every type of joint that Pinocchio has."""
+"""All joint types of Pinocchio."""
 JOINTS: dict[str, pin.JointModel] = {
     name: _NAMED[name] if name in _NAMED else getattr(pin, f"JointModel{name}")()
     for name in TYPES

@@ -1,4 +1,4 @@
-"""Flows over many steps whose errors are known: what they conserve, what rounding becomes."""
+"""Flows over many steps with known errors: conservation laws and rounding."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def arm_energy(scene: Scene, r: int, steps: int) -> tuple[float, float]:
 
 
 def noether_errors(scene: Scene, N: int) -> tuple[float, float, float]:
-    """Spread of the carried J, and how far D_1, D_2 and D_3, D_4 are from the carried momenta."""
+    """Range of J along the flow, and errors of D_1, D_2 and D_3, D_4 as momenta of the flow."""
     L = scene.effort_lagrangian()
     x, p = legendre(L, *JET)
     ld = SchemeLagrangian(L, galerkin(2), 1.0 / N)
@@ -79,7 +79,7 @@ def noether_errors(scene: Scene, N: int) -> tuple[float, float, float]:
 
 
 def costless(scene: Scene, steps: int, v0: list[float]) -> Flow:
-    """A motion without torques, carried by the flow of the effort, h = 0.02."""
+    """A motion without torques under the flow of the effort, h = 0.02."""
     L = scene.effort_lagrangian()
     n = L.nv
     x = np.array([np.full(n, 0.4), v0])

@@ -1,4 +1,4 @@
-"""Robots whose joints move on groups, made of random bodies."""
+"""Robots with joints on groups and random bodies."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def chain(joints: Sequence[pin.JointModel], seed: int = 3) -> pin.Model:
 
 
 def with_arm(base: str, seed: int = 3) -> pin.Model:
-    """A base with three joints on it: one that turns, a continuous and a sliding one."""
+    """A base with three joints: revolute, continuous and prismatic."""
     arm = [pin.JointModelRX(), pin.JointModelRUBY(), pin.JointModelPZ()]
     return chain([BASES[base](), *arm], seed)
 
@@ -52,7 +52,7 @@ def mimicking() -> pin.Model:
 
 
 def half_turning() -> pin.Model:
-    """Two continuous joints, of which the last turns half as far as the first."""
+    """Two continuous joints, of which the last mimics the first with multiplier 1/2."""
     model = chain([pin.JointModelRUBX(), pin.JointModelRUBX()])
     model.names[2] = "last"
     return pin.transformJointIntoMimic(model, 1, 2, 0.5, 0.0)
@@ -77,7 +77,7 @@ def revolute(model: pin.Model) -> pin.Model:
 
 
 def rigid_body(inertia: Sequence[float], joint: pin.JointModel | None = None) -> Robot:
-    """A body that turns freely about its centre of mass, with given principal moments."""
+    """A body that rotates freely about its centre of mass, with given principal moments."""
     model = pin.Model()
     model.name = "body"
     index = model.addJoint(0, joint or pin.JointModelSpherical(), pin.SE3.Identity(), "turn")

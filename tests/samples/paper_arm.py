@@ -21,7 +21,7 @@ HANG = np.array([-np.pi / 2, 0.0])
 REACH_Q, REACH_V = np.array([0.3, 0.7]), np.array([0.5, -0.4])
 REST = np.zeros(2)
 REACH_COST = 20.2088008225
-"""Least 1/2 integral |tau|^2 from hanging at rest to (REACH_Q, REACH_V) in one second."""
+"""Minimum of 1/2 integral |tau|^2 from hanging at rest to (REACH_Q, REACH_V) in one second."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Discrete paths that obey no equation: random nodes, consistent z, random inner modes."""
+"""Random discrete paths: random nodes, consistent z, random inner modes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 
 def random_path(grid: Grid, n: int, seed: int = 0) -> DiscretePath:
-    """A path of about unit positions, velocities and accelerations."""
+    """A path with positions, velocities and accelerations of order one."""
     random = np.random.default_rng(seed)
     N, h = grid.intervals, grid.steps[:, None]
     v = np.cumsum(np.vstack([np.zeros(n), h * random.normal(size=(N, n))]), axis=0)

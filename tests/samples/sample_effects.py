@@ -1,4 +1,4 @@
-"""One of every effect, on any robot, at full strength and at none."""
+"""One of every effect for any robot, with nonzero and with zero strength."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from hovi.robot.robot import Robot
 
 
 def sample_effects(robot: Robot) -> dict[str, Effect]:
-    """Effects by key, none of them trivial."""
+    """Nontrivial effects by key."""
     placed = [robot.coordinate_names[i] for i in positioned(robot)]
     first, last, tip = placed[0], placed[-1], robot.tip_frame
     effects: list[Effect] = [
@@ -50,8 +50,8 @@ def sample_effects(robot: Robot) -> dict[str, Effect]:
     return {effect.key: effect for effect in effects}
 
 
-def powerless_effects(robot: Robot) -> dict[str, Effect]:
-    """The same effects with a strength of zero, where they have one."""
+def zero_strength_effects(robot: Robot) -> dict[str, Effect]:
+    """The same effects with zero strength, if they have one."""
     first, tip = robot.coordinate_names[0], robot.tip_frame
     effects: list[Effect] = [
         Gravity(0.0),

@@ -1,4 +1,4 @@
-"""Planar chains whose links have different masses: for mass ratios that break naive solvers."""
+"""Planar chains with links of different masses, for extreme mass ratios."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hovi.robot.urdf.planar_chain import chain
 
 
 def uneven_chain(masses: Sequence[float], path: Path) -> Robot:
-    """Rods of one metre with given masses in [kg]; their inertias are in proportion."""
+    """Rods of one metre with given masses in [kg]; with proportional inertias."""
     text = chain(len(masses), mass=1.0)
     for tag, attributes in (("mass", ["value"]), ("inertia", ["ixx", "iyy", "izz"])):
         parts = re.split(rf"(<{tag} [^>]*/>)", text)

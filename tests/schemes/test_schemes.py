@@ -1,4 +1,4 @@
-"""The tables: what they integrate exactly, which formula they are, and which are methods."""
+"""The tables: exact integration, formulas of the paper, regularity."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Effort = Callable[[Array, Array, Array], float]
 Polynomial = list[Fraction]  # coefficients of 1, s, s^2, ...
 
 ALL = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-5", "galerkin-20"]
-PLACES = np.linspace(0.0, 1.0, 33)  # exact in binary
+POINTS = np.linspace(0.0, 1.0, 33)  # exact in binary
 
 
 # The rows of an interval's curve, against exact rational arithmetic
@@ -43,7 +43,7 @@ def integral(p: Polynomial) -> Polynomial:
 
 
 def values(p: Polynomial) -> Array:
-    exact = [sum(c * Fraction(s) ** k for k, c in enumerate(p)) for s in PLACES]
+    exact = [sum(c * Fraction(s) ** k for k, c in enumerate(p)) for s in POINTS]
     return np.array([float(x) for x in exact])
 
 
@@ -67,8 +67,8 @@ def exact_jet(acceleration: Polynomial) -> Array:
 
 
 @pytest.mark.parametrize("j", [2, 3, 4, 7, 10, 20, 40])
-def test_an_inner_mode_is_the_exact_double_integral_of_its_legendre_polynomial(j: int) -> None:
-    mode = galerkin(j - 1).rows(PLACES)[:, :, j + 1]
+def test_inner_modes_are_exact_double_integrals_of_legendre_polynomials(j: int) -> None:
+    mode = galerkin(j - 1).rows(POINTS)[:, :, j + 1]
     exact = np.sqrt(2 * j + 1) * exact_jet(shifted_legendre(j))
     np.testing.assert_allclose(mode, exact, rtol=0, atol=2e-14)
 
@@ -76,15 +76,15 @@ def test_an_inner_mode_is_the_exact_double_integral_of_its_legendre_polynomial(j
 def test_the_first_three_columns_are_the_cubic_of_the_end_data() -> None:
     one, slope = [Fraction(1)], [Fraction(6), Fraction(-12)]  # 6 (1 - 2 s)
     Z1 = exact_jet([Fraction(1) - slope[0] / 2, -slope[1] / 2])
-    expected = [np.stack([values(integral(one)), values(one), 0 * PLACES], axis=1)]
+    expected = [np.stack([values(integral(one)), values(one), 0 * POINTS], axis=1)]
     expected += [exact_jet(slope), Z1]
     for r in (0, 3):
-        rows = galerkin(r).rows(PLACES)[:, :, :3]
+        rows = galerkin(r).rows(POINTS)[:, :, :3]
         np.testing.assert_allclose(rows, np.stack(expected, axis=2), rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("r", [1, 2, 9, 19, 40])
-def test_inner_modes_leave_both_ends_alone(r: int) -> None:
+def test_inner_modes_do_not_change_the_ends(r: int) -> None:
     ends = galerkin(r).rows(np.array([0.0, 1.0]))[:, :2, 3:]
     np.testing.assert_allclose(ends, 0.0, rtol=0, atol=1e-14)
 
@@ -118,7 +118,7 @@ def test_a_galerkin_table_holds_the_rows_at_its_points(r: int) -> None:
 # Lagrangians of other orders
 
 
-def test_gamma_2_is_the_one_printed() -> None:
+def test_gamma_2_is_as_printed_in_the_paper() -> None:
     expected = [[1 / (2 * np.sqrt(3)), 0.5], [0.0, 1.0]]
     np.testing.assert_allclose(gamma(2), expected, rtol=1e-15)
     expected = [[2 * np.sqrt(3), -np.sqrt(3)], [0.0, 1.0]]  # w0 = 2 sqrt(3) (z0 - z1 / 2)
@@ -126,7 +126,7 @@ def test_gamma_2_is_the_one_printed() -> None:
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 4, 7])
-def test_gamma_takes_the_orthonormal_basis_to_the_weights_of_the_end_data(k: int) -> None:
+def test_gamma_maps_the_orthonormal_basis_to_the_end_weights(k: int) -> None:
     x, w = np.polynomial.legendre.leggauss(k + 1)
     s, w = (x + 1) / 2, w / 2
     a, b = end_weights(s, k), end_basis(s, k)
@@ -136,8 +136,8 @@ def test_gamma_takes_the_orthonormal_basis_to_the_weights_of_the_end_data(k: int
 
 
 @pytest.mark.parametrize("r", [0, 1, 5])
-def test_jets_of_order_two_are_the_rows_of_an_interval(r: int) -> None:
-    np.testing.assert_allclose(jet_rows(PLACES, 2, r), interval_rows(PLACES, r), rtol=0, atol=5e-15)
+def test_jets_of_order_two_equal_interval_rows(r: int) -> None:
+    np.testing.assert_allclose(jet_rows(POINTS, 2, r), interval_rows(POINTS, r), rtol=0, atol=5e-15)
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 4])
@@ -147,7 +147,7 @@ def test_jets_of_any_order_meet_the_end_data_and_are_exact_on_polynomials(k: int
     assert (scheme.derivatives, scheme.inner_modes, scheme.order) == (k, r, 2 * (r + k))
     random = np.random.default_rng(10 * k + r)
     p = np.polynomial.Polynomial(random.normal(size=2 * k))  # as many numbers as end data
-    jets = np.stack([p.deriv(j)(PLACES) if j else p(PLACES) for j in range(k + 1)], axis=1)
+    jets = np.stack([p.deriv(j)(POINTS) if j else p(POINTS) for j in range(k + 1)], axis=1)
     jets[:, 0] -= p(0)
     start, end = ([p.deriv(j)(s) if j else p(s) for j in range(k)] for s in (0.0, 1.0))
     # Z_j: what Taylor's polynomial of the start misses of the end, one derivative after another
@@ -155,7 +155,7 @@ def test_jets_of_any_order_meet_the_end_data_and_are_exact_on_polynomials(k: int
     Z = np.array(end) - taylor
     columns = np.concatenate([start[1:], Z, np.zeros(r)])
     scale = np.abs(jets).max()
-    np.testing.assert_allclose(scheme.rows(PLACES) @ columns, jets, rtol=0, atol=1e-14 * scale)
+    np.testing.assert_allclose(scheme.rows(POINTS) @ columns, jets, rtol=0, atol=1e-14 * scale)
     modes = scheme.rows(np.array([0.0, 1.0]))[:, :k, 2 * k - 1 :]
     np.testing.assert_allclose(modes, 0.0, rtol=0, atol=1e-14)
     np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
@@ -176,7 +176,7 @@ def test_orders_out_of_range_are_refused(k: int) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_weights_sum_to_one_inside_the_interval(name: str) -> None:
+def test_weights_sum_to_one_and_points_are_inside_the_interval(name: str) -> None:
     scheme = by_name(name)
     assert scheme.name == name
     assert scheme.weights.sum() == pytest.approx(1.0, rel=1e-15)
@@ -185,7 +185,7 @@ def test_weights_sum_to_one_inside_the_interval(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_nodal_and_regular_tables_are_the_same_map(name: str) -> None:
+def test_nodal_and_regular_tables_are_equivalent(name: str) -> None:
     scheme = by_name(name)
     q0, hv0, q1, hv1, *c = np.random.default_rng(2).normal(size=4 + scheme.inner_modes)
     Z = [q1 - q0 - hv0, hv1 - hv0]
@@ -260,7 +260,7 @@ FORMULAS = {
 
 @pytest.mark.parametrize("name", CLASSIC)
 @pytest.mark.parametrize("h", [1e-3, 0.1, 2.0])
-def test_a_classic_table_is_its_formula_on_the_arm(name: str, h: float) -> None:
+def test_a_classic_table_matches_its_formula_on_the_arm(name: str, h: float) -> None:
     scheme = by_name(name)
     for ends in np.random.default_rng(4).normal(size=(5, 4, 2)):
         q0, v0, q1, v1 = ends * np.array([1, 1, h, 1])[:, None]  # a motion of about unit speed
@@ -353,7 +353,7 @@ def test_det_w_d_of_the_cubic_with_other_quadratures(
 
 
 @pytest.mark.parametrize("name", ["hermite-simpson", "galerkin-0", "galerkin-2"])
-def test_w_d_is_that_of_the_exact_spline(name: str) -> None:
+def test_w_d_equals_that_of_the_exact_spline(name: str) -> None:
     # L_d^e = 6 (q0 - q1)^2 + 6 (q0 - q1)(v0 + v1) + 2 (v0^2 + v0 v1 + v1^2) at h = 1
     exact = [[-12.0, 6.0], [-6.0, 2.0]]
     np.testing.assert_allclose(regularity_matrix(by_name(name)), exact, rtol=0, atol=1e-12)
@@ -361,7 +361,7 @@ def test_w_d_is_that_of_the_exact_spline(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["mean-difference", "trapezoid-difference"])
 def test_degenerate_schemes_are_refused_with_the_reason(name: str) -> None:
-    with pytest.raises(SchemeError, match="rank 1 instead of 2, so nothing ties the positions"):
+    with pytest.raises(SchemeError, match="rank 1 instead of 2, so positions and velocities are"):
         require_regular(by_name(name))
 
 
@@ -385,7 +385,7 @@ def test_the_other_schemes_are_accepted(name: str) -> None:
         ("", "valid names are"),
     ],
 )
-def test_an_unknown_name_is_answered_with_the_nearest(name: str, hint: str) -> None:
+def test_an_unknown_name_is_refused_with_the_nearest(name: str, hint: str) -> None:
     with pytest.raises(SchemeError, match="there is no scheme") as raised:
         by_name(name)
     assert hint in str(raised.value)
@@ -397,7 +397,7 @@ def test_inner_modes_out_of_range_are_refused(r: Any) -> None:
         galerkin(r)
 
 
-def test_numpys_whole_numbers_are_whole_numbers() -> None:
+def test_numpy_integers_are_accepted() -> None:
     assert galerkin(np.int64(3)).name == "galerkin-3"  # type: ignore[arg-type]
 
 
@@ -408,7 +408,7 @@ def test_a_name_with_too_many_inner_modes_is_refused() -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("r", [0, 1, 3])
-def test_a_member_of_a_family_bears_its_name(family: str, r: int) -> None:
+def test_a_member_of_a_family_has_its_name(family: str, r: int) -> None:
     scheme = by_name(f"{family}-{r}")
     assert (scheme.name, scheme.inner_modes) == (f"{family}-{r}", r)
     np.testing.assert_array_equal(scheme.table, FAMILIES[family](r).table)

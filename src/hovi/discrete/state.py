@@ -84,7 +84,7 @@ class State:
             given = np.atleast_1d(np.asarray(turns, dtype=np.float64))
             size = float(np.linalg.norm(given)) if np.isfinite(given).all() else 0.5
             if given.shape != (len(indices),) or abs(size - round(size)) > 1e-9:
-                expected = "an integer" if len(indices) == 1 else "a vector of integer length"
+                expected = "an integer" if len(indices) == 1 else "three numbers of integer length"
                 raise InputError(f"{name}.turns: {joint!r} takes {expected}, got {turns!r}.")
             full[indices] = given
         return full

@@ -1,7 +1,7 @@
 """Schemes: tables that turn a Lagrangian into a discrete Lagrangian.
 
-This file is their one list: a scheme in CLASSIC, or a family of schemes in FAMILIES, has a name
-that Python, scene files, motion files and the command line know.
+This file lists them: a scheme in CLASSIC, or a family in FAMILIES, can be named in Python, scene
+files, motion files and on the command line.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ FAMILIES: dict[str, Callable[[int], Scheme]] = {"galerkin": galerkin}
 
 
 def by_name(name: str) -> Scheme:
-    """The scheme that a file or the command line calls `name`.
+    """The scheme with a name, as in files and on the command line.
 
     name: one of CLASSIC, or `FAMILY-R` with R inner modes, as `galerkin-2`. Raises SchemeError
-        otherwise.
+        for an unknown name.
     """
     if name in CLASSIC:
         return CLASSIC[name]()

@@ -1,8 +1,8 @@
-"""The paper's discrete Lagrangians and Hermite-Simpson, each as its table.
+"""The tables of the paper's discrete Lagrangians and of Hermite-Simpson.
 
 Columns are (h v0, Z0, Z1), with Z0 = q1 - q0 - h v0 and Z1 = h v1 - h v0. The Taylor
-accelerations of the paper are a0 = 2/h^2 (q1 - q0 - h v0), that is h^2 a0 = 2 Z0, and
-a1 = 2/h^2 (q0 - q1 + h v1), that is h^2 a1 = 2 (Z1 - Z0).
+accelerations of the paper are a0 = 2/h^2 (q1 - q0 - h v0), so h^2 a0 = 2 Z0, and
+a1 = 2/h^2 (q0 - q1 + h v1), so h^2 a1 = 2 (Z1 - Z0).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _DIFFERENCE: Row = (0, 0, 1)
 
 
 def _scheme(name: str, order: int, points: list[float], rows: list[list[Row]]) -> Scheme:
-    """Equal weights; a table from nested lists."""
+    """A scheme with equal weights and a table given by nested lists."""
     weights = np.full(len(points), 1 / len(points))
     return Scheme(name, order, np.array(points), weights, np.array(rows, dtype=np.float64))
 

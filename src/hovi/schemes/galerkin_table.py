@@ -1,4 +1,4 @@
-"""The Galerkin family: a table for every number of inner modes, and every order of Lagrangian."""
+"""The Galerkin family: a table for every number of inner modes and order of the Lagrangian."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ MAX_DERIVATIVES = 4
 
 
 def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
-    """A polynomial k-th derivative with r inner modes, integrated with r + k Gauss points.
+    """A polynomial k-th derivative with r inner modes, and r + k Gauss points.
 
-    The order of the nodes is 2 (r + k): 4, 6, 8, 10, ... for k = 2.
+    The order at the nodes is 2 (r + k): 4, 6, 8, 10, ... for k = 2.
 
-    inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian: 1 for mechanics, 2
-        for torques and accelerations, 3 for jerk. Raises SchemeError outside.
+    inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian, from 1 to 4: 1 for
+        mechanics, 2 for torques and accelerations, 3 for jerk. Raises SchemeError otherwise.
     """
     if not (isinstance(inner_modes, Integral) and 0 <= inner_modes <= MAX_INNER_MODES):
         raise SchemeError(
@@ -39,7 +39,7 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
 
 @cache
 def _table(inner_modes: int, derivatives: int) -> Scheme:
-    """The table, made once: nobody writes into a scheme."""
+    """The scheme, cached since schemes are immutable."""
     x, w = np.polynomial.legendre.leggauss(inner_modes + derivatives)
     points, weights = (x + 1) / 2, w / 2
     order = 2 * (inner_modes + derivatives)

@@ -1,9 +1,9 @@
 """The curve of an interval for Lagrangians of any order k: basis b^[k], matrix gamma^[k], rows.
 
 [ColomboFerraroMartin2016, section 2]. With Q^[k](s) = h^k q^(k) the k-th derivative on [0, 1], the
-end data fix its moments w_j = <b_j, Q^[k]>, j < k, and nothing else: what is left of the curve
-lies in the orthogonal complement and is written in the next Legendre polynomials, the inner
-modes (the paper's E and E-perp).
+end data fix exactly its moments w_j = <b_j, Q^[k]>, j < k. The rest of the curve is in the
+orthogonal complement, spanned by the next Legendre polynomials, the inner modes (the paper's E and
+E-perp).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 
 def end_degrees(k: int) -> list[int]:
-    """Degrees of b^[k]_0 .. b^[k]_{k-1}: they fall, as those of a^[k]_j do."""
+    """Degrees of b^[k]_0 .. b^[k]_{k-1}, in descending order like those of a^[k]_j."""
     return [k - 1 - j for j in range(k)]
 
 
@@ -33,7 +33,7 @@ def end_basis(s: Array, k: int) -> Array:
 
 
 def end_weights(s: Array, k: int) -> Array:
-    """The paper's a^[k]_j(s) = (1 - s)^(k-j-1) / (k-j-1)!, of which z_j = <a_j, Q^[k]>, (k, M)."""
+    """The paper's a^[k]_j(s) = (1 - s)^(k-j-1) / (k-j-1)!, with z_j = <a_j, Q^[k]>, (k, M)."""
     s = np.asarray(s, dtype=np.float64)
     return np.array([(1 - s) ** m / factorial(m) for m in end_degrees(k)])
 
@@ -61,8 +61,8 @@ def inverse_gamma(k: int) -> Array:
 def repeated_integral(coefficients: Array, times: int) -> Array:
     """Legendre coefficients of the m-fold integral from 0, in x = 2 s - 1, of a Legendre series.
 
-    The integral of P_j is (P_{j+1} - P_{j-1}) / (2 (2 j + 1)), that of P_0 is (P_0 + P_1) / 2:
-    exact to rounding, where monomials would cancel.
+    The integral of P_j is (P_{j+1} - P_{j-1}) / (2 (2 j + 1)), for j = 0 it is (P_0 + P_1) / 2.
+    There is no cancellation, as there would be with monomials.
     coefficients: shape (degree + 1,). Returns shape (degree + 1 + times,).
     """
     for _ in range(times):
@@ -94,7 +94,7 @@ def _stacked(columns: list[Array], s: Array, k: int) -> Array:
 
 
 def _taylor_column(s: Array, k: int, i: int) -> Array:
-    """What h^i q0^(i) adds to each derivative: s^(i-j) / (i-j)!, shape (M, k + 1)."""
+    """Coefficients of h^i q0^(i) in each derivative: s^(i-j) / (i-j)!, shape (M, k + 1)."""
     column = np.zeros((len(s), k + 1))
     for j in range(i + 1):
         column[:, j] = s ** (i - j) / factorial(i - j)
@@ -102,7 +102,7 @@ def _taylor_column(s: Array, k: int, i: int) -> Array:
 
 
 def _mode_column(s: Array, k: int, degree: int) -> Array:
-    """sqrt(2 m + 1) P_m(2 s - 1) and its k integrals, as rows from the last, shape (M, k + 1)."""
+    """The k integrals of sqrt(2 m + 1) P_m(2 s - 1), the k-fold one first, shape (M, k + 1)."""
     series = np.zeros(degree + 1)
     series[degree] = np.sqrt(2 * degree + 1)
     column = np.zeros((len(s), k + 1))

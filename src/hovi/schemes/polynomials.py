@@ -1,8 +1,8 @@
 """Orthonormal shifted Legendre polynomials on [0, 1], their integrals, and an interval's curve.
 
 [ColomboFerraroMartin2016, section 2 and appendix]: the acceleration is written in the basis
-b_j; the first two coefficients are fixed by the end data, the others are inner modes, which
-leave both ends alone.
+b_j; the first two coefficients are fixed by the end data, the others are inner modes, which do
+not change the ends.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def legendre(x: Array, degree: int) -> Array:
 def inner_mode_rows(s: Array, inner_modes: int) -> Array:
     """(double integral, integral, value) of b_2, b_3, ... at s, shape (M, 3, r).
 
-    Integrals come from P_{j+1} - P_{j-1}: integrating monomials would move the end velocity by
-    3e-10 at b_10 and by 5e-3 at b_20.
+    Integrals are computed from P_{j+1} - P_{j-1}: with monomials, rounding would change the end
+    velocity by 3e-10 at b_10 and by 5e-3 at b_20.
     """
     P = legendre(2 * s - 1, inner_modes + 3).T  # (M, r + 4)
     j = np.arange(2, 2 + inner_modes)

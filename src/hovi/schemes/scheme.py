@@ -1,7 +1,7 @@
-"""A scheme is a table of numbers: what each quadrature point of an interval sees of its end data.
+"""A scheme is a table of numbers: (q, v, a) at quadrature points as functions of the end data.
 
 It depends neither on the step h, nor on the robot, nor on the number of joints. It is the
-higher-order sibling of a Butcher tableau.
+higher-order counterpart of a Butcher tableau.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Scheme:
     with Z0 = q1 - q0 - h v0 and Z1 = h v1 - h v0 (h^2 and h^2 times the regularized coordinates
     z0, z1) and c the interval's inner modes. [ColomboFerraroMartin2016, sections 2 and 5]
 
-    name: how the scheme is called in files and on the command line.
-    order: order of the nodes; 0 for a table that does not define a method.
-    points: node of each quadrature point in [0, 1], shape (Q,).
-    weights: quadrature weights, shape (Q,), of sum 1.
+    name: in files and on the command line.
+    order: of accuracy at the nodes; 0 for a table that does not define a method.
+    points: quadrature points in [0, 1], shape (Q,).
+    weights: quadrature weights, shape (Q,), with sum 1.
     table: shape (Q, 3, 3 + r) with r inner modes.
     """
 
@@ -51,20 +51,20 @@ class Scheme:
 
     @property
     def derivatives(self) -> int:
-        """Order k of the Lagrangians that the table discretises: 2 except for `galerkin(r, k)`.
+        """Order k of the Lagrangians that the table discretizes: 2 except for `galerkin(r, k)`.
 
-        The table of any k has shape (Q, k + 1, 2 k - 1 + r), with the columns of `jet_rows`.
+        For any k the table has shape (Q, k + 1, 2 k - 1 + r), with the columns of `jet_rows`.
         """
         return int(self.table.shape[1]) - 1
 
     @property
     def key(self) -> bytes:
-        """What makes two schemes the same: their numbers."""
+        """The numbers of the scheme as bytes; equal schemes have equal keys."""
         return b"".join(x.tobytes() for x in (self.points, self.weights, self.table))
 
     @cached_property
     def regular_table(self) -> Array:
-        """The table for (q0, h v0, Z0, Z1, c), the configuration's base point included.
+        """The table for (q0, h v0, Z0, Z1, c), with a column for q0.
 
         Shape (Q, 3, 4 + r), for any k (Q, k + 1, 2 k + r).
         """
@@ -81,14 +81,14 @@ class Scheme:
     def series(self) -> Array:
         """Legendre coefficients of the polynomial through values at the points, (Q, Q).
 
-        Degree by value; points may coincide.
+        Rows are degrees, columns are values; points may coincide.
         """
         return np.asarray(np.linalg.pinv(legendre(2 * self.points - 1, len(self.points) - 1).T))
 
     def rows(self, s: Array) -> Array:
         """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).
 
-        s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite where r = 0.
+        s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite for r = 0.
         """
         if self.derivatives != 2:
             return jet_rows(s, self.derivatives, self.inner_modes)
@@ -99,7 +99,7 @@ class Scheme:
 
 
 def regular_from_nodal(inner_modes: int) -> Array:
-    """Matrix R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r)."""
+    """R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r)."""
     R = np.eye(4 + inner_modes)
     R[:4, :4] = _REGULAR_COLUMNS
     return R

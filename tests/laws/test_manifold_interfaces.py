@@ -1,4 +1,4 @@
-"""Robots on manifolds at every door: limits, files, pictures, numbers by name, bad input."""
+"""Robots on manifolds in all interfaces: limits, files, figures, named coordinates, bad input."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def free_motion() -> Solution:
 # Limits
 
 
-def test_limits_hold_where_joints_turn_without_end(kinova: Robot) -> None:
+def test_limits_hold_for_continuous_joints(kinova: Robot) -> None:
     scene = Scene(kinova, [Gravity(), Armature(0.1)])
     q0 = kinova.integrate(kinova.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
     q1 = kinova.integrate(q0, np.array([1.5, 0.4, -0.5, 2.0, 0.5, -2.5]))
@@ -73,7 +73,7 @@ def test_limits_hold_where_joints_turn_without_end(kinova: Robot) -> None:
     assert solution.cost > free.cost
 
 
-def test_position_limits_are_for_joints_that_have_positions(kinova: Robot) -> None:
+def test_position_limits_need_joints_with_positions(kinova: Robot) -> None:
     limits = as_limits(kinova, {"base": "none", "q": {"j2s6s200_joint_2": [1.0, 2.0]}})
     np.testing.assert_array_equal(limits.lower[0, 1], 1.0)
     with pytest.raises(InputError, match="'j2s6s200_joint_1' has no position limits"):
@@ -83,7 +83,7 @@ def test_position_limits_are_for_joints_that_have_positions(kinova: Robot) -> No
 # Files and pictures
 
 
-def test_a_motion_comes_back_from_its_file(free_motion: Solution, tmp_path: Path) -> None:
+def test_a_motion_survives_its_file(free_motion: Solution, tmp_path: Path) -> None:
     trajectory = free_motion.trajectory
     trajectory.save(tmp_path / "free.npz")
     loaded = Trajectory.load(tmp_path / "free.npz")
@@ -92,7 +92,7 @@ def test_a_motion_comes_back_from_its_file(free_motion: Solution, tmp_path: Path
         np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
-def test_angles_are_shown_without_jumps(kinova: Robot, free_motion: Solution) -> None:
+def test_angles_are_unwrapped_in_figures(kinova: Robot, free_motion: Solution) -> None:
     angle = np.linspace(0.0, 20.0, 200)
     q = kinova.integrate(kinova.neutral(), angle[:, None] * np.eye(6)[5])
     np.testing.assert_allclose(unwrapped(kinova.space, q)[:, 5], angle, atol=1e-12)
@@ -103,7 +103,7 @@ def test_angles_are_shown_without_jumps(kinova: Robot, free_motion: Solution) ->
     np.testing.assert_allclose(shown[:, 3:6], turn[:, 3:6], atol=1e-9)
 
 
-def test_pictures_of_a_base_name_what_they_draw(free_motion: Solution) -> None:
+def test_figures_of_a_base_are_labeled(free_motion: Solution) -> None:
     trajectory = free_motion.trajectory
     figure = motion_figure(trajectory)
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
@@ -118,7 +118,7 @@ def test_pictures_of_a_base_name_what_they_draw(free_motion: Solution) -> None:
     assert peaks(trajectory).shown[:4] == ("j0[x]", "j0[y]", "j0[z]", "j0[rx]")
 
 
-def test_a_certificate_stands_on_every_leg(free_motion: Solution) -> None:
+def test_every_part_of_a_certificate_holds(free_motion: Solution) -> None:
     certificate = certify(free_motion, estimate=False)
     assert certificate.hamiltonian is not None
     assert certificate.hamiltonian.spread < 1e-4
@@ -131,7 +131,7 @@ def test_a_certificate_stands_on_every_leg(free_motion: Solution) -> None:
 # Search and replanning
 
 
-def test_replanning_follows_a_goal_that_moves(free_motion: Solution) -> None:
+def test_replanning_follows_a_moving_goal(free_motion: Solution) -> None:
     problem = free_motion.problem
     assert problem is not None
     robot = problem.robot
@@ -142,7 +142,7 @@ def test_replanning_follows_a_goal_that_moves(free_motion: Solution) -> None:
     np.testing.assert_allclose(robot.difference(again.trajectory.q[-1], goal), 0.0, atol=1e-13)
 
 
-def test_several_starts_try_other_turns(kinova: Robot) -> None:
+def test_several_starts_try_different_turns(kinova: Robot) -> None:
     scene = Scene(kinova, [Gravity(), Armature(0.1)])
     q0 = kinova.integrate(kinova.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
     q1 = kinova.integrate(q0, np.array([0.5, 0.2, 0.1, 0.5, 0.2, 3.0]))
@@ -151,7 +151,7 @@ def test_several_starts_try_other_turns(kinova: Robot) -> None:
     assert len(solution.minima) > 1
 
 
-def test_a_turn_over_takes_intervals_enough_for_its_charts() -> None:
+def test_a_full_rotation_needs_enough_intervals_for_its_charts() -> None:
     robot = load_robot(with_arm("free-flyer"))
     q = robot.neutral()
     goal = State(q, turns={"j0": [0, 1, 0]})
@@ -166,7 +166,7 @@ def test_a_turn_over_takes_intervals_enough_for_its_charts() -> None:
     assert np.linalg.norm(shown[-1, 3:6]) == pytest.approx(2 * np.pi, abs=1e-6)
 
 
-def test_an_orientation_is_followed_past_half_a_turn() -> None:
+def test_an_orientation_is_continuous_beyond_half_a_turn() -> None:
     robot = load_robot(with_arm("spherical"))
     grid, axis = Grid.uniform(1.0, 1, galerkin(0)), np.array([0.6, 0.0, 0.8, 0, 0, 0])
     q0, v = robot.neutral(), np.zeros((2, robot.nv))
@@ -182,7 +182,7 @@ def test_an_orientation_is_followed_past_half_a_turn() -> None:
     assert ld.turns(path)[0] == pytest.approx(4.0, abs=1e-12)
 
 
-def test_a_joint_condition_bends_as_finite_differences_say() -> None:
+def test_second_derivatives_of_a_joint_condition_match_finite_differences() -> None:
     robot = load_robot(with_arm("free-flyer"))
     q, target = configurations(robot, 2, 5)
     v, n = np.zeros(robot.nv), robot.nv
@@ -218,7 +218,7 @@ j2s6s200_joint_6 = 0.0
 """
 
 
-def test_a_continuous_joint_is_named_by_its_angle_or_its_two_numbers(tmp_path: Path) -> None:
+def test_a_continuous_joint_takes_an_angle_or_two_numbers(tmp_path: Path) -> None:
     (tmp_path / "reach.toml").write_text(KINOVA)
     goal = load_task(tmp_path / "reach.toml").goal
     assert isinstance(goal, State)
@@ -235,7 +235,7 @@ def test_a_continuous_joint_is_named_by_its_angle_or_its_two_numbers(tmp_path: P
         ("[0.0, 1.0]", "[0.0, 1.0, 0.0]", "must be 2 numbers"),
     ],
 )
-def test_what_is_no_configuration_is_refused_with_its_line(
+def test_an_invalid_configuration_is_refused_with_its_line(
     tmp_path: Path, old: str, new: str, words: str
 ) -> None:
     (tmp_path / "reach.toml").write_text(KINOVA.replace(old, new))
@@ -244,7 +244,7 @@ def test_what_is_no_configuration_is_refused_with_its_line(
 
 
 @pytest.mark.parametrize("factor", [0.0, 1.01, 1.0 + 3e-6, np.nan])
-def test_a_quaternion_is_of_unit_norm_at_the_door(factor: float) -> None:
+def test_a_quaternion_without_unit_norm_is_refused(factor: float) -> None:
     robot = load_robot(with_arm("free-flyer"))
     q = robot.neutral()
     q[3:7] = factor * np.array([0.5, 0.5, 0.5, 0.5])
@@ -254,7 +254,7 @@ def test_a_quaternion_is_of_unit_norm_at_the_door(factor: float) -> None:
     assert np.linalg.norm(State(q).on(robot, "goal")[0][3:7]) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_a_wrong_length_says_which_joints_take_more() -> None:
+def test_a_wrong_length_lists_joints_with_several_coordinates() -> None:
     robot = load_robot(with_arm("free-flyer"))
     with pytest.raises(InputError, match="j0 takes 7: a position and a unit quaternion"):
         State(np.zeros(9)).on(robot, "goal")
@@ -263,7 +263,7 @@ def test_a_wrong_length_says_which_joints_take_more() -> None:
     assert pin.isNormalized(robot.model, robot.neutral())
 
 
-def test_tables_and_reports_tell_angles_of_continuous_joints(kinova: Robot, tmp_path: Path) -> None:
+def test_tables_and_reports_give_angles_of_continuous_joints(kinova: Robot, tmp_path: Path) -> None:
     start, goal = kinova.neutral(), kinova.neutral()
     goal[:2] = np.cos(1.2), np.sin(1.2)
     motion = plan(Scene(kinova, [Armature(0.1)]), start, goal, 2.0, intervals=8).trajectory
@@ -277,7 +277,7 @@ def test_tables_and_reports_tell_angles_of_continuous_joints(kinova: Robot, tmp_
     ]
 
 
-def test_torques_of_a_base_without_motors_get_no_scale_of_their_own(models: Path) -> None:
+def test_torques_of_a_passive_base_have_no_separate_scale(models: Path) -> None:
     axes = motion_figure(plan_task(load_task(models / "spacecraft_reorients.toml")).trajectory).axes
     torque, force = (
         next(ax for ax in axes if ax.get_ylabel() == label)
