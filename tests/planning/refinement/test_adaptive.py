@@ -14,7 +14,7 @@ from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tolerance
-from hovi.planning.refinement.candidate import ROUNDING
+from hovi.planning.refinement.candidate import ROUNDING_FLOOR
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
@@ -114,7 +114,7 @@ def test_no_error_below_rounding_is_claimed(arm_scene: Scene) -> None:
     accuracy = accuracy_of(found)
     assert found.success
     assert not accuracy.reached
-    assert accuracy.error >= ROUNDING
+    assert accuracy.error >= ROUNDING_FLOOR
     assert "stopped early: rounding allows no smaller error" in found.message
 
 

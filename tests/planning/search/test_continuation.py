@@ -1,4 +1,4 @@
-"""The ladder: minima that the direct way does not find, and budgets that are kept."""
+"""Continuation: minima that the direct solve does not find, and limits on time and steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.search.continuation import climb, may_help
+from hovi.planning.search.continuation import may_help, solve_by_continuation
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
@@ -23,12 +23,12 @@ from samples.paper_arm import HANG, REACH_Q
 from samples.uneven_chain import uneven_chain
 
 STEPS = 300
-"""Too few for the direct way to a light hand, which takes some 500, and enough for every rung."""
+"""Too few steps for a direct solve with a light hand, which takes some 500; enough per stage."""
 
 
 @pytest.fixture(scope="module")
 def light_hand(tmp_path_factory: pytest.TempPathFactory) -> Scene:
-    """Two rods of which the second has a millionth of the first one's mass."""
+    """Two rods, the second with a millionth of the mass of the first."""
     path = tmp_path_factory.mktemp("chain") / "chain.urdf"
     return Scene(uneven_chain([1.0, 1e-6], path), [Gravity(9.8)])
 
@@ -50,7 +50,7 @@ def failed(job: Job) -> Solution:
     return solve(job.problem(), max_iterations=STEPS)
 
 
-def test_masses_of_a_million_to_one_are_reached_over_heavier_rotors(
+def test_masses_of_a_million_to_one_are_solved_with_decreasing_rotor_inertia(
     light_hand: Scene, failed: Solution
 ) -> None:
     assert failed.status is Status.ITERATION_LIMIT
@@ -58,7 +58,9 @@ def test_masses_of_a_million_to_one_are_reached_over_heavier_rotors(
     assert found.status is Status.MINIMUM
     assert found.n_neg == 0
     assert found.minima == (found.cost,)
-    assert "The direct way ended in iteration_limit; continuation in inertia led" in found.message
+    assert (
+        "The direct solve ended in iteration_limit; continuation in inertia found" in found.message
+    )
     assert found.problem is not None
     assert not found.problem.scene.model.armature.any()
     again = solve(found.problem, found.trajectory)
@@ -78,7 +80,7 @@ def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Sol
     )
 
 
-def test_a_valley_of_positive_curvature_is_followed_on(arm_scene: Scene) -> None:
+def test_a_valley_of_positive_curvature_gets_more_steps(arm_scene: Scene) -> None:
     stopped = plan(
         arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5, continuation=False
     )
@@ -86,29 +88,31 @@ def test_a_valley_of_positive_curvature_is_followed_on(arm_scene: Scene) -> None
     assert stopped.n_neg == 0
     found = plan(arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5)
     assert found.status is Status.MINIMUM
-    assert "continuation in steps led here over 1 rung and" in found.message
+    assert "continuation in steps found this minimum in 1 stage and" in found.message
 
 
-def test_every_rung_is_told_in_rising_shares(job: Job, failed: Solution) -> None:
-    told: list[tuple[str, float]] = []
-    found = climb(job, failed, progress=lambda text, share: told.append((text, share)))
+def test_every_stage_is_reported_with_increasing_progress(job: Job, failed: Solution) -> None:
+    reports: list[tuple[str, float]] = []
+    found = solve_by_continuation(
+        job, failed, progress=lambda text, share: reports.append((text, share))
+    )
     assert found.success
-    shares = [share for _, share in told]
+    shares = [share for _, share in reports]
     assert shares == sorted(shares)
     assert 0 <= shares[0] <= shares[-1] <= 1
-    assert "continuation in inertia: rotors of" in told[0][0]
-    assert told[-1][0].endswith("the task itself")
+    assert "continuation in inertia: rotors of" in reports[0][0]
+    assert reports[-1][0].endswith("the task itself")
 
 
-def test_a_deadline_ends_the_climb_with_the_best_so_far(job: Job, failed: Solution) -> None:
-    late = climb(job, failed, deadline=Deadline(0.0))
+def test_a_deadline_ends_the_continuation_with_the_best_so_far(job: Job, failed: Solution) -> None:
+    late = solve_by_continuation(job, failed, deadline=Deadline(0.0))
     assert (late.success, late.status) == (False, Status.TIME_LIMIT)
     assert late.cost == failed.cost
     assert "Continuation in inertia was ended by time_limit" in late.message
 
 
 @pytest.mark.parametrize("where", ["within a rung", "between two"])
-def test_an_interrupt_ends_the_climb_with_the_best_so_far(
+def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     job: Job, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:
     value, calls = ActionObjective.value, 0
@@ -124,17 +128,19 @@ def test_an_interrupt_ends_the_climb_with_the_best_so_far(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(ActionObjective, "value", interrupted)
-    found = climb(job, failed, progress=interrupt if where == "between two" else None)
+    found = solve_by_continuation(
+        job, failed, progress=interrupt if where == "between two" else None
+    )
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
     assert found.cost == failed.cost
     assert "was ended by interrupted" in found.message
     assert calls <= 31
 
 
-def test_a_climb_that_leads_nowhere_names_the_ways(job: Job) -> None:
+def test_a_continuation_that_fails_names_what_was_tried(job: Job) -> None:
     hurried = job.with_options(max_iterations=2)
     failed = solve(hurried.problem(), max_iterations=2)
-    found = climb(hurried, failed)
+    found = solve_by_continuation(hurried, failed)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
     assert found.cost <= failed.cost
     assert found.nit == 2
@@ -142,7 +148,7 @@ def test_a_climb_that_leads_nowhere_names_the_ways(job: Job) -> None:
     assert f"Continuation in {ways} found no minimum" in found.message
 
 
-def test_what_no_step_can_change_is_not_climbed_for(arm_scene: Scene) -> None:
+def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) -> None:
     limits = as_limits(arm_scene.robot, {"base": "none", "v": 0.1})
     grid = Grid.uniform(1.0, 8, galerkin(2))
     job = Job(

@@ -1,4 +1,4 @@
-"""Durations that are free: Pontryagin's Hamiltonian is the weight of time."""
+"""Free durations: Pontryagin's Hamiltonian equals the weight of time."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_the_duration_found_is_where_a_sweep_has_its_minimum() -> None:
     )
 
 
-def test_a_weight_that_no_duration_repays_ends_at_the_bound() -> None:
+def test_a_large_weight_ends_at_the_bound() -> None:
     fast = reach((1.0, 2.0), time_weight=1e4)
     assert fast.trajectory.duration == 1.0
     assert "kept at its bound" in fast.message
@@ -89,7 +89,7 @@ def test_limits_hold_while_the_duration_is_found() -> None:
     assert solution.cost < min(costs)
 
 
-def test_a_search_that_is_cut_short_is_no_success() -> None:
+def test_a_search_that_runs_out_of_time_is_no_success() -> None:
     solution = reach((0.5, 4.0), time_weight=WEIGHT, time_limit=1e-3)
     assert not solution.success
     assert solution.status is hovi.Status.TIME_LIMIT
@@ -98,7 +98,7 @@ def test_a_search_that_is_cut_short_is_no_success() -> None:
 def test_bad_durations_are_refused() -> None:
     with pytest.raises(InputError, match="0 < lower < upper"):
         reach((2.0, 1.0))
-    with pytest.raises(InputError, match="a weight of time needs a free duration"):
+    with pytest.raises(InputError, match="time_weight needs a free duration"):
         reach(1.0, time_weight=1.0)
     with pytest.raises(InputError, match="a number or a pair"):
         reach((1.0, 2.0, 3.0))

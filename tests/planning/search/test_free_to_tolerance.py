@@ -1,4 +1,4 @@
-"""The best duration and a tolerance at once: both hold, and the estimate is of what is returned."""
+"""A free duration with a tolerance: both are met, and the estimate belongs to the result."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_cost_and_duration_are_those_of_the_limit(
     true = abs(found.cost - reference.cost) / motion
     assert true <= tolerance
     assert accuracy.error / 10 <= true <= 10 * accuracy.error
-    # the cost is flat along the duration
+    # the cost is stationary in the duration
     assert reference.trajectory.duration == pytest.approx(T, rel=np.sqrt(accuracy.error))
     assert found.minima == (found.cost,)
 
@@ -79,7 +79,7 @@ def test_the_slope_of_the_cost_vanishes_on_the_final_grid(task: Task) -> None:
     assert "estimated error" in found.message
 
 
-def test_a_tip_is_where_it_should_be_in_the_duration_that_is_told(task: Task) -> None:
+def test_the_tip_is_within_the_tolerance_at_the_returned_duration(task: Task) -> None:
     found = freed(task, tolerance="0.01 mm")
     T = found.trajectory.duration
     ends = task.scene, task.start, task.goal, T
@@ -104,7 +104,7 @@ def test_a_duration_at_its_bound_is_kept(arm_scene: Scene) -> None:
     assert found.cost - 1e4 * 0.8 == pytest.approx(fixed.cost, rel=1e-6)
 
 
-def test_nothing_is_claimed_where_no_minimum_was_found(arm_scene: Scene) -> None:
+def test_no_accuracy_is_claimed_without_a_minimum(arm_scene: Scene) -> None:
     options = {"limits": "none", "max_iterations": 2, "continuation": False, "tolerance": 1e-6}
     found = plan(arm_scene, HANG, -HANG, (2.0, 4.0), processes=1, **options)  # type: ignore[arg-type]
     assert found.status is Status.ITERATION_LIMIT
@@ -113,19 +113,19 @@ def test_nothing_is_claimed_where_no_minimum_was_found(arm_scene: Scene) -> None
 
 
 def in_vain(solution: Solution) -> Solution:
-    """Refining that is out of time when it begins."""
+    """Refinement whose time is up at the start."""
     return refine_to_tolerance(solution, Tolerance(1e-14), time_limit=0.0)
 
 
 @pytest.mark.parametrize(
     ("later_steps", "later_refine", "reason"),
     [
-        (0, None, "as the finer one gave none (iteration_limit): "),
-        (None, None, "as the finer one gave none (interrupted): "),
-        (500, in_vain, "as the finer one gave none (the tolerance was not reached again): "),
+        (0, None, "on a finer grid failed (iteration_limit); "),
+        (None, None, "on a finer grid failed (interrupted); "),
+        (500, in_vain, "on a finer grid failed (the tolerance was not reached again); "),
     ],
 )
-def test_what_was_within_the_tolerance_is_kept_where_a_later_turn_fails(
+def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(
     task: Task,
     later_steps: int | None,
     later_refine: Callable[[Solution], Solution] | None,

@@ -1,4 +1,4 @@
-"""Easier versions of a job: what they change, against Pinocchio and the laws of mechanics."""
+"""Homotopies: the changes of a job, against Pinocchio and the laws of mechanics."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_rotors_fall_from_more_than_every_link_to_less_than_any(job: Job, limite
     np.testing.assert_array_equal(first.upper[:3], limited.limits.upper[:3])
 
 
-def test_gravity_grows_from_nothing_where_there_is_some(job: Job) -> None:
+def test_gravity_increases_from_zero_if_there_is_any(job: Job) -> None:
     pulls = [-rung.job.scene.model.gravity.linear[2] for rung in growing_gravity(job)]
     np.testing.assert_allclose(pulls, 9.8 * np.array([0, 0.25, 0.5, 0.75]))
     floating = dataclasses.replace(job, scene=Scene(job.scene.robot))
@@ -92,7 +92,7 @@ def test_intervals_are_doubled_up_to_those_of_the_job(job: Job) -> None:
 
 
 def test_another_duration_without_gravity_is_the_same_motion(job: Job) -> None:
-    # tau scales like 1/T^2, so that the cost scales like 1/T^3
+    # tau scales like 1/T^2, hence the cost like 1/T^3
     grid = Grid.uniform(1.0, 8, galerkin(2))
     floating = dataclasses.replace(job, scene=Scene(job.scene.robot), grid=grid)
     whole = solve(floating.problem())
@@ -102,15 +102,13 @@ def test_another_duration_without_gravity_is_the_same_motion(job: Job) -> None:
         np.testing.assert_allclose(other.trajectory.q, whole.trajectory.q, atol=1e-7)
 
 
-def test_durations_are_shorter_for_effort_alone_and_longer_within_limits(
-    job: Job, limited: Job
-) -> None:
+def test_durations_are_shorter_without_limits_and_longer_with_them(job: Job, limited: Job) -> None:
     assert [rung.job.grid.duration for rung in other_durations(job)] == [0.125, 0.25, 0.5]
     longer = [rung.job.grid.duration for rung in other_durations(limited)]
     np.testing.assert_allclose(longer, [2, 1.5, 1.25, 1.1])
 
 
-def test_limits_narrow_about_their_middle(job: Job, limited: Job) -> None:
+def test_limits_narrow_about_their_centers(job: Job, limited: Job) -> None:
     assert narrowing_limits(job) == []
     rungs = narrowing_limits(limited)
     shares = np.array([8, 4, 2, 1.5, 1.25, 1.1])

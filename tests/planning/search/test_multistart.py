@@ -1,4 +1,4 @@
-"""Many starts: distinct minima, the same from any number of processes, whatever ends the search."""
+"""Multi-start: distinct minima, independent of the number of processes, and early ends."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_a_pool_past_its_deadline_gives_every_guess_back(job: Job, guesses: list
         np.testing.assert_array_equal(solution.trajectory.q, guess.q)
 
 
-def test_there_is_a_processor(job: Job) -> None:
+def test_there_is_at_least_one_processor(job: Job) -> None:
     assert default_processes() >= 1
 
 
@@ -117,7 +117,7 @@ def test_only_minima_count_where_there_is_one(any_solution: Solution) -> None:
     assert [solution.cost for solution in found] == [5.0]
 
 
-def test_without_a_minimum_the_best_of_the_rest_is_kept(any_solution: Solution) -> None:
+def test_without_a_minimum_the_best_other_solution_is_kept(any_solution: Solution) -> None:
     diverged = fake(any_solution, np.nan, Status.DIVERGED)
     rest = [fake(any_solution, cost, Status.TIME_LIMIT) for cost in (3.0, 2.0)]
     assert [s.cost for s in distinct([diverged, *rest])] == [2.0]
@@ -151,7 +151,7 @@ def test_more_starts_are_never_worse(job: Job, guesses: list) -> None:
     assert best == sorted(best, reverse=True)
 
 
-def test_a_seed_is_a_search(job: Job, guesses: list) -> None:
+def test_equal_seeds_give_equal_searches(job: Job, guesses: list) -> None:
     one, again, other = (
         [solution.cost for solution in search(job, guesses, 12, seed)] for seed in (3, 3, 4)
     )
@@ -170,18 +170,18 @@ def test_the_number_of_processes_changes_nothing(job: Job, guesses: list) -> Non
 
 
 def test_progress_rises_to_one(job: Job, guesses: list) -> None:
-    told: list[tuple[str, float]] = []
-    explore(Pool(job, 1), guesses[0], 20, 0, lambda text, share: told.append((text, share)))
-    shares = [share for _, share in told]
+    reports: list[tuple[str, float]] = []
+    explore(Pool(job, 1), guesses[0], 20, 0, lambda text, share: reports.append((text, share)))
+    shares = [share for _, share in reports]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    assert "20 of 20 starts" in told[-1][0]
+    assert "20 of 20 starts" in reports[-1][0]
 
 
 # Ends before the last start
 
 
-def test_a_deadline_ends_the_search_with_what_was_found(job: Job, guesses: list) -> None:
+def test_a_deadline_ends_the_search_with_the_solutions_so_far(job: Job, guesses: list) -> None:
     late = Pool(job, 1, Deadline(-1.0))
     found = explore(late, guesses[0], 1000, 0, silent)
     assert found.done == 1
@@ -189,7 +189,7 @@ def test_a_deadline_ends_the_search_with_what_was_found(job: Job, guesses: list)
     assert [solution.status for solution in found.minima] == [Status.TIME_LIMIT]
 
 
-def test_an_interrupt_between_rounds_keeps_what_was_found(job: Job, guesses: list) -> None:
+def test_an_interrupt_between_rounds_keeps_the_solutions_so_far(job: Job, guesses: list) -> None:
     def interrupt(text: str, fraction: float) -> None:
         raise KeyboardInterrupt
 

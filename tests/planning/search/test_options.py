@@ -1,4 +1,4 @@
-"""Options of a plan: each is said once, and is there wherever options are taken."""
+"""Options of a plan: each is described once, and accepted wherever options are."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hovi.errors import InputError
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.search.job import Job
-from hovi.planning.search.option_fields import about
+from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.scene.scene import Scene
 from samples.paper_arm import HANG, REACH_Q
@@ -32,7 +32,7 @@ def test_every_option_is_a_keyword_of_plan_with_its_default_and_is_explained() -
         for documented in (hovi.plan, PlanOptions):
             assert f"\n{option.name}: " in (documented.__doc__ or "")
     assert "{options}" not in (hovi.plan.__doc__ or "")
-    assert all(known.doc.endswith(".") for known in about(PlanOptions).values())
+    assert all(known.doc.endswith(".") for known in option_infos(PlanOptions).values())
 
 
 @pytest.mark.parametrize("taking", ["plan", "plan_task", "with_options", "with_changes"])
@@ -48,7 +48,7 @@ def test_an_unknown_option_is_refused_with_the_nearest_name(arm_scene: Scene, ta
         take(toleranse=1e-6)
 
 
-def test_options_that_are_ready_take_changes(arm_scene: Scene) -> None:
+def test_ready_options_accept_changes(arm_scene: Scene) -> None:
     options = PlanOptions(intervals=8, limits="none")
     ready = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, options=options, scheme="galerkin-1")
     spelled = hovi.plan(
@@ -71,10 +71,10 @@ def test_a_scheme_is_a_name_or_a_table() -> None:
 
 
 def test_times_may_be_texts(arm_scene: Scene) -> None:
-    told = {"limits": "none", "time_limit": "1.5 min"}
-    one = hovi.plan(arm_scene, HANG, REACH_Q, "500 ms", **told)
+    fixed = {"limits": "none", "time_limit": "1.5 min"}
+    one = hovi.plan(arm_scene, HANG, REACH_Q, "500 ms", **fixed)
     assert one.cost == hovi.plan(arm_scene, HANG, REACH_Q, 0.5, limits="none").cost
-    free = hovi.plan(arm_scene, HANG, REACH_Q, ("300 ms", 0.6), **told)
+    free = hovi.plan(arm_scene, HANG, REACH_Q, ("300 ms", 0.6), **fixed)
     assert 0.3 <= free.trajectory.duration <= 0.6
     assert hovi.Via("500 ms", hovi.State(HANG)).time == 0.5  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the duration '1 sec' has the unit 'sec'"):
@@ -88,7 +88,7 @@ def test_distances_of_a_clearance_are_built_once_whatever_else_changes() -> None
     assert options.with_changes(margin=0.1).clearance.margin == 0.1
 
 
-def test_options_of_a_robot_hold_limits_and_a_tolerance_in_place_of_words(
+def test_options_are_resolved_for_a_robot(
     arm_scene: Scene,
 ) -> None:
     options = PlanOptions(tolerance="0.1 mm").on(arm_scene.robot)
@@ -98,7 +98,7 @@ def test_options_of_a_robot_hold_limits_and_a_tolerance_in_place_of_words(
         PlanOptions(tolerance="1 mm at foot").on(arm_scene.robot)
 
 
-def test_a_job_travels_without_its_guess(arm_scene: Scene) -> None:
+def test_a_job_is_pickled_without_its_guess(arm_scene: Scene) -> None:
     motion = hovi.plan(arm_scene, HANG, REACH_Q, 1.0, limits="none").trajectory
     options = PlanOptions(guess=motion, starts=7)
     job = Job(arm_scene, motion.grid, hovi.State(HANG), hovi.State(REACH_Q), options)

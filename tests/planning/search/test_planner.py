@@ -1,4 +1,4 @@
-"""plan: the motion without the machinery, and one sentence for everything that is no problem."""
+"""plan: one call to a motion, and one sentence for every invalid input."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
 from hovi.planning.search.planner import plan
-from hovi.planning.search.refining import REFINED
+from hovi.planning.search.refining import MAX_REFINED
 from hovi.planning.search.search import COARSE_INTERVALS
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve
@@ -35,7 +35,7 @@ GOAL = State(REACH_Q, REACH_V)
 
 
 def swing_up(scene: Scene, **options: Any) -> Solution:
-    """Three seconds from hanging to standing; there are many minima."""
+    """A swing-up in three seconds, which has many minima."""
     options = {"intervals": 12, "scheme": "galerkin-1", "processes": 1, "limits": "none"} | options
     return plan(scene, HANG, -HANG, 3.0, **options)
 
@@ -50,10 +50,10 @@ def assert_same(one: Solution, other: Solution) -> None:
     assert one.trajectory.momenta.tobytes() == other.trajectory.momenta.tobytes()
 
 
-# The answer
+# The solution
 
 
-def test_plan_is_the_front_door() -> None:
+def test_plan_is_a_public_name() -> None:
     assert public_plan is plan
 
 
@@ -127,9 +127,7 @@ def test_a_plan_can_be_replanned(arm_scene: Scene) -> None:
 
 @pytest.mark.parametrize("intervals", [8, 12, 16])
 @pytest.mark.parametrize("limits", [{"v": 6.0}, {"v": [5.0, 8.0]}, {"v": [3.0, 6.0]}])
-def test_limits_that_bind_are_held(
-    arm_scene: Scene, intervals: int, limits: dict[str, Any]
-) -> None:
+def test_active_limits_are_held(arm_scene: Scene, intervals: int, limits: dict[str, Any]) -> None:
     free = plan(arm_scene, HANG, GOAL, 1.0, intervals=intervals, limits="none")
     bound = plan(arm_scene, HANG, GOAL, 1.0, intervals=intervals, limits={"base": "none"} | limits)
     t = np.linspace(0.0, 1.0, 501)
@@ -141,7 +139,7 @@ def test_limits_that_bind_are_held(
 
 
 def test_a_plan_under_limits_can_be_replanned(arm_scene: Scene) -> None:
-    # so few intervals have to be halved for the limit to hold between the points
+    # with so few intervals, some are halved so that the limit holds between the points
     limits = {"base": "none", "a": 30.0}
     planned = plan(arm_scene, HANG, GOAL, 1.0, intervals=6, limits=limits)
     assert planned.status is Status.MINIMUM
@@ -174,14 +172,14 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not(arm_scene: Scen
     assert one.minima != other.minima
 
 
-def test_minima_are_ranked_on_the_grid_that_was_asked_for(arm_scene: Scene) -> None:
+def test_minima_are_ranked_on_the_requested_grid(arm_scene: Scene) -> None:
     N = 2 * COARSE_INTERVALS + 10
     found = swing_up(arm_scene, starts=8, intervals=N, scheme="taylor-midpoint")
     motion = found.trajectory
     assert motion.grid.intervals == N
     assert {scheme.name for scheme in motion.grid.schemes} == {"taylor-midpoint"}
     assert found.status is Status.MINIMUM
-    assert 2 <= len(found.minima) <= REFINED
+    assert 2 <= len(found.minima) <= MAX_REFINED
     assert list(found.minima) == sorted(found.minima)
     assert found.minima[0] == found.cost
     assert found.problem is not None
@@ -194,16 +192,16 @@ def test_minima_are_ranked_on_the_grid_that_was_asked_for(arm_scene: Scene) -> N
     assert abs(found.cost - coarse.cost) > 1e-6  # the cost is not the coarse grid's
 
 
-def test_progress_is_text_and_a_rising_share(arm_scene: Scene) -> None:
-    told: list[tuple[str, float]] = []
+def test_progress_is_text_and_an_increasing_fraction(arm_scene: Scene) -> None:
+    reports: list[tuple[str, float]] = []
     options = {"starts": 20, "intervals": 2 * COARSE_INTERVALS + 2}
-    swing_up(arm_scene, progress=lambda text, share: told.append((text, share)), **options)
-    assert told
-    for text, share in told:
+    swing_up(arm_scene, progress=lambda text, share: reports.append((text, share)), **options)
+    assert reports
+    for text, share in reports:
         assert text
         assert "\n" not in text
         assert 0 <= share <= 1
-    assert any("refining" in text for text, _ in told)
+    assert any("refining" in text for text, _ in reports)
 
 
 # Budgets
@@ -217,14 +215,14 @@ def test_a_time_limit_ends_a_search_of_any_length(arm_scene: Scene) -> None:
     np.testing.assert_array_equal(found.trajectory.q[-1], -HANG)
 
 
-def test_a_time_limit_leaves_time_for_the_grid_that_was_asked_for(arm_scene: Scene) -> None:
+def test_a_time_limit_leaves_time_for_the_requested_grid(arm_scene: Scene) -> None:
     N = 2 * COARSE_INTERVALS + 10
     found = swing_up(arm_scene, starts=500, intervals=N, time_limit=0.5)
     assert found.trajectory.grid.intervals == N
     assert found.status in (Status.MINIMUM, Status.TIME_LIMIT)
 
 
-def test_no_time_gives_the_guess_and_says_so(arm_scene: Scene) -> None:
+def test_without_time_the_guess_is_returned_with_its_status(arm_scene: Scene) -> None:
     found = swing_up(arm_scene, time_limit=1e-9)
     assert (found.success, found.status) == (False, Status.TIME_LIMIT)
     assert "time limit was reached" in found.message
@@ -257,17 +255,14 @@ def test_an_interrupt_gives_the_best_so_far(
     np.testing.assert_array_equal(found.trajectory.q[-1], -HANG)
 
 
-def test_an_interrupt_before_the_grid_that_was_asked_for_is_no_success(arm_scene: Scene) -> None:
+def test_an_interrupt_before_the_requested_grid_is_no_success(arm_scene: Scene) -> None:
     def interrupt(text: str, share: float) -> None:
         raise KeyboardInterrupt
 
     N = 2 * COARSE_INTERVALS + 10
     found = swing_up(arm_scene, starts=1000, intervals=N, progress=interrupt)
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
-    assert (
-        "interrupted before the grid or the duration that was asked for was reached"
-        in found.message
-    )
+    assert "interrupted before the requested grid or the best duration was reached" in found.message
 
 
 # Refusals
@@ -310,7 +305,7 @@ def test_an_interrupt_before_the_grid_that_was_asked_for_is_no_success(arm_scene
         ({"seed": 1.5, "starts": 2}, InputError, "seed"),
     ],
 )
-def test_what_makes_no_problem_is_refused_in_a_sentence(
+def test_invalid_input_is_refused_in_one_sentence(
     arm_scene: Scene, options: dict[str, Any], error: type[HoviError], sentence: str
 ) -> None:
     problem: dict[str, Any] = {"start": HANG, "goal": GOAL, "duration": 1.0, "processes": 1}
@@ -323,13 +318,13 @@ def test_a_whole_number_of_starts_may_be_a_float(arm_scene: Scene) -> None:
     assert swing_up(arm_scene, starts=2.0).success
 
 
-def test_a_robot_that_cannot_be_planned_on_is_refused_before_any_work() -> None:
+def test_an_invalid_robot_is_refused_before_any_work() -> None:
     robot = load_robot(half_turning())
     with pytest.raises(ModelError, match=r"does not support planning.*'last' mimic"):
         plan(Scene(robot, [Gravity()]), robot.neutral(), robot.neutral(), 1.0)
 
 
-def test_limits_that_are_far_do_not_limit_the_accuracy(two_link: Robot) -> None:
+def test_distant_limits_do_not_limit_the_accuracy(two_link: Robot) -> None:
     scene = Scene(two_link, [Gravity(9.8)])
     ends = [-np.pi / 2, 0.0], [np.pi / 2, 0.0]
     near = plan(scene, *ends, 2.0, tolerance=1e-6)
@@ -340,17 +335,17 @@ def test_limits_that_are_far_do_not_limit_the_accuracy(two_link: Robot) -> None:
     assert near.problem.limits is not None
 
 
-def test_what_is_no_scene_or_no_via_point_is_refused(two_link: Robot) -> None:
+def test_invalid_scenes_and_via_points_are_refused(two_link: Robot) -> None:
     with pytest.raises(InputError, match=r"plan takes a hovi\.Scene"):
         plan(two_link, [0.0, 0.0], [1.0, 0.0], 1.0)
-    with pytest.raises(InputError, match=r"via is a list of hovi\.Via"):
+    with pytest.raises(InputError, match=r"via must be a list of hovi\.Via"):
         plan(Scene(two_link), [0.0, 0.0], [1.0, 0.0], 2.0, via=[(1.0, [1.0, 1.0])])
     for wrong in (Gravity(9.8), [Gravity], ["gravity"]):
         with pytest.raises(SceneError, match="effects is a list such as"):
             Scene(two_link, wrong)
 
 
-def test_a_task_is_planned_with_all_that_it_says() -> None:
+def test_a_task_is_planned_with_all_its_options() -> None:
     task = load_task(example("ur5_around_sphere"))
     solution = plan_task(task.with_options(intervals=8), max_iterations=2, continuation=False)
     assert [each.name for each in solution.problem.clearance.obstacles] == ["ball"]

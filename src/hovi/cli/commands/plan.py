@@ -71,11 +71,13 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     """The plan options given as flags. Raises InputError."""
     from hovi.cli.commands.durations import positive_seconds
     from hovi.errors import InputError, nearest
-    from hovi.planning.search.option_fields import about
+    from hovi.planning.search.option_fields import option_infos
     from hovi.planning.search.options import PlanOptions
 
     values = {name: value for name, value in flags.items() if value is not None}
-    given: dict[str, Any] = {name: values[name] for name in about(PlanOptions) if name in values}
+    given: dict[str, Any] = {
+        name: values[name] for name in option_infos(PlanOptions) if name in values
+    }
     if "time_limit" in given:
         given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
     limits = given.get("limits", "none")

@@ -1,1 +1,1 @@
-"""Many starts, continuation, free duration: everything behind `plan`."""
+"""The search behind `plan`: multi-start, continuation, free duration."""

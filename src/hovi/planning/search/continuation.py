@@ -1,4 +1,4 @@
-"""The ladder of continuations: what `plan` climbs by itself when the direct way fails."""
+"""Automatic continuation: `plan` solves easier problems in order if the direct solve fails."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.search.homotopies import (
-    Rung,
-    Way,
+    Homotopy,
+    Stage,
     finer_grids,
     growing_gravity,
     lighter_rotors,
@@ -22,7 +22,7 @@ from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
 
-WAYS: dict[str, Way] = {
+HOMOTOPIES: dict[str, Homotopy] = {
     "inertia": lighter_rotors,
     "the intervals": finer_grids,
     "gravity": growing_gravity,
@@ -30,82 +30,88 @@ WAYS: dict[str, Way] = {
     "the limits": narrowing_limits,
 }
 STEPS = "steps"
-"""The name of the way that just goes on from the best motion so far."""
-UNLIMITED = "inertia", "the intervals", "gravity", "the duration"
-LIMITED = "the limits", "the duration", "the intervals", "inertia", "gravity"
-"""Ways in the order in which they are tried, the most promising first."""
-INFEASIBLE = "the limits", "the duration"
-"""Ways when no motion within the limits was found: the others change none of them."""
-AGAIN = 12
-"""Solves that go on from the best motion so far."""
-ENDED = Status.TIME_LIMIT, Status.INTERRUPTED
-"""What ends a climb whatever is left to try."""
-WITHOUT_MOTION = Status.DIVERGED, Status.INFEASIBLE
-"""What is worse than any motion that is only unfinished."""
-HELPED = Status.ITERATION_LIMIT, Status.SADDLE, Status.DIVERGED, Status.INFEASIBLE
-"""What a direct solve ends in when climbing may help."""
+"""The continuation that takes more steps from the best motion so far."""
+UNLIMITED_ORDER = "inertia", "the intervals", "gravity", "the duration"
+LIMITED_ORDER = "the limits", "the duration", "the intervals", "inertia", "gravity"
+"""Homotopies in the order in which they are tried, the most promising first."""
+INFEASIBLE_ORDER = "the limits", "the duration"
+"""Homotopies for an infeasible problem; the others do not relax the limits."""
+MAX_RESTARTS = 12
+"""Maximum number of solves from the best motion so far."""
+STOPPED = Status.TIME_LIMIT, Status.INTERRUPTED
+"""Statuses that end the continuation."""
+UNUSABLE = Status.DIVERGED, Status.INFEASIBLE
+"""Statuses without a useful motion."""
+CONTINUABLE = Status.ITERATION_LIMIT, Status.SADDLE, Status.DIVERGED, Status.INFEASIBLE
+"""Statuses of a direct solve after which continuation may find a minimum."""
 
 
 def may_help(solution: Solution) -> bool:
-    """Whether climbing can find what a direct solve did not.
+    """Whether continuation may find a minimum that a direct solve did not.
 
-    Not where limits and ends contradict each other or where the guess has no finite cost, both of
-    which are seen without a step.
+    Not if limits and ends contradict each other or the guess has no finite cost, both of which are
+    detected before the first step.
     """
-    return solution.status in HELPED and solution.nit > 0
+    return solution.status in CONTINUABLE and solution.nit > 0
 
 
-def climb(
+def solve_by_continuation(
     job: Job,
     failed: Solution,
     guess: str | Trajectory = "cubic",
     deadline: Deadline | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """A minimum that the direct way did not find, by the first continuation that leads to it.
+    """A minimum that the direct solve did not find, by the first continuation that reaches one.
 
-    failed: what the direct way ended in. guess: for the first rung of every way.
-    deadline: for all ways together; none when None.
-    progress: told of every rung.
-    Returns the minimum, or the best that there is; the message says which way was taken. nit
-    counts the steps of the last solve alone.
+    failed: result of the direct solve. guess: for the first stage of every homotopy.
+    deadline: of all stages together; none if None.
+    progress: called before every stage.
+    Returns the minimum, or the best motion found; the message names the continuation. nit counts
+    the steps of the last solve only.
     """
-    ladder = _Ladder(job, guess, deadline or Deadline(), progress)
+    run = _Continuation(job, guess, deadline or Deadline(), progress)
     best, tried = failed, []
     names = _order(job, failed)
     for i, name in enumerate(names):
-        ladder.begin(name, i / len(names), (i + 1) / len(names))
+        run.begin(name, i / len(names), (i + 1) / len(names))
         try:
-            found = ladder.go_on(best) if name == STEPS else ladder.climb(WAYS[name](job))
+            found = run.restart(best) if name == STEPS else run.follow(HOMOTOPIES[name](job))
         except KeyboardInterrupt:
             record_interrupt()
-            found, ladder.ended = None, Status.INTERRUPTED
-        if ladder.rungs > 0:
+            found, run.ended = None, Status.INTERRUPTED
+        if run.stages > 0:
             tried.append(name)
         if found is not None and found.success:
-            return _told(found, f"The direct way ended in {failed.status}; {ladder.told}.")
+            sentence = f"The direct solve ended in {failed.status}; {run.summary}."
+            return _with_sentence(found, sentence)
         best = _better(best, found)
-        if ladder.ended is not None:
-            best = dataclasses.replace(best, status=ladder.ended)
-            return _told(best, f"Continuation in {name} was ended by {ladder.ended}.")
-    return _told(best, f"Continuation in {', '.join(tried)} found no minimum." if tried else "")
+        if run.ended is not None:
+            best = dataclasses.replace(best, status=run.ended)
+            return _with_sentence(best, f"Continuation in {name} was ended by {run.ended}.")
+    sentence = f"Continuation in {', '.join(tried)} found no minimum." if tried else ""
+    return _with_sentence(best, sentence)
 
 
 def _order(job: Job, failed: Solution) -> list[str]:
-    """The names of the ways in the order in which they are tried.
+    """The names of the continuations in the order in which they are tried.
 
-    A direct way that ran out of steps in a valley of positive curvature is followed on first.
+    More steps come first if the direct solve reached its iteration limit at positive curvature.
     """
     if failed.status is Status.INFEASIBLE:
-        return list(INFEASIBLE)
-    ways = LIMITED if job.limits.bounded.any() else UNLIMITED
+        return list(INFEASIBLE_ORDER)
+    order = LIMITED_ORDER if job.limits.bounded.any() else UNLIMITED_ORDER
     first = failed.status is Status.ITERATION_LIMIT and failed.n_neg == 0
-    return [STEPS, *ways] if first else [*ways, STEPS]
+    return [STEPS, *order] if first else [*order, STEPS]
 
 
 @dataclass(eq=False)
-class _Ladder:
-    """What the ways share: where they start, what they may take, and how far the last one came."""
+class _Continuation:
+    """State shared by all continuations, and the progress of the current one.
+
+    stages, steps: of the current continuation. shares: its range of the overall progress.
+    ended: status that ended it, if any.
+    """
 
     job: Job
     guess: str | Trajectory
@@ -113,69 +119,69 @@ class _Ladder:
     progress: Progress | None
     name: str = field(default="", init=False)
     steps: int = field(default=0, init=False)
-    rungs: int = field(default=0, init=False)
+    stages: int = field(default=0, init=False)
     shares: tuple[float, float] = field(default=(0.0, 1.0), init=False)
     ended: Status | None = field(default=None, init=False)
 
     def begin(self, name: str, first: float, last: float) -> None:
-        """A new way, between two shares of all that can be done."""
-        self.name, self.steps, self.rungs, self.shares = name, 0, 0, (first, last)
+        """Start a continuation that covers progress from `first` to `last`."""
+        self.name, self.steps, self.stages, self.shares = name, 0, 0, (first, last)
 
     @property
-    def told(self) -> str:
-        """How the way led to a minimum."""
-        rungs = "1 rung" if self.rungs == 1 else f"{self.rungs} rungs"
-        return f"continuation in {self.name} led here over {rungs} and {self.steps} steps"
+    def summary(self) -> str:
+        """The continuation that found the minimum, and its effort."""
+        stages = "1 stage" if self.stages == 1 else f"{self.stages} stages"
+        return f"continuation in {self.name} found this minimum in {stages} and {self.steps} steps"
 
-    def climb(self, rungs: list[Rung]) -> Solution | None:
-        """The solution of the job at the end of a way; None where the way breaks off."""
-        if not rungs:
+    def follow(self, stages: list[Stage]) -> Solution | None:
+        """The solution of the job at the end of a homotopy; None if a stage fails."""
+        if not stages:
             return None
         guess = self.guess
-        for i, rung in enumerate([*rungs, Rung("the task itself", self.job)]):
-            solution = self._solve(rung, guess, i / (len(rungs) + 1))
+        for i, stage in enumerate([*stages, Stage("the task itself", self.job)]):
+            solution = self._solve(stage, guess, i / (len(stages) + 1))
             if solution is None or solution.status is Status.INFEASIBLE or self.ended is not None:
                 return None
             if solution.status is not Status.DIVERGED:
                 guess = solution.trajectory
         return solution
 
-    def go_on(self, best: Solution) -> Solution | None:
-        """More steps from the best motion so far; None where it is not just unfinished."""
+    def restart(self, best: Solution) -> Solution | None:
+        """More steps from the best motion so far; None unless it is at its iteration limit."""
         found: Solution | None = None
-        rung = Rung("on from the best so far", self.job)
-        for i in range(AGAIN):
+        stage = Stage("more steps from the best motion", self.job)
+        for i in range(MAX_RESTARTS):
             if self.ended is not None or best.status is not Status.ITERATION_LIMIT:
                 break
-            found = self._solve(rung, best.trajectory, i / AGAIN)
+            found = self._solve(stage, best.trajectory, i / MAX_RESTARTS)
             best = best if found is None else found
         return found
 
-    def _solve(self, rung: Rung, guess: str | Trajectory, share: float) -> Solution | None:
-        """One rung; None where it makes no problem."""
+    def _solve(self, stage: Stage, guess: str | Trajectory, share: float) -> Solution | None:
+        """Solve one stage; None if its problem is invalid."""
         if self.progress is not None:
             first, last = self.shares
-            text = f"continuation in {self.name}: {rung.name}"
+            text = f"continuation in {self.name}: {stage.name}"
             self.progress(text, first + share * (last - first))
         left = self.deadline.seconds_left
         try:
-            problem, most = rung.job.problem(), self.job.options.max_iterations
+            problem, most = stage.job.problem(), self.job.options.max_iterations
             solution = solve(problem, guess, max_iterations=most, time_limit=left)
         except HoviError:
             return None
         self.steps += solution.nit
-        self.rungs += 1
-        self.ended = solution.status if solution.status in ENDED else None
+        self.stages += 1
+        self.ended = solution.status if solution.status in STOPPED else None
         return solution
 
 
 def _better(best: Solution, found: Solution | None) -> Solution:
-    """The cheaper of two motions, of which neither is a minimum."""
-    if found is None or found.status in WITHOUT_MOTION:
+    """The cheaper of two motions, neither of which is a minimum."""
+    if found is None or found.status in UNUSABLE:
         return best
-    return found if best.status in WITHOUT_MOTION or found.cost < best.cost else best
+    return found if best.status in UNUSABLE or found.cost < best.cost else best
 
 
-def _told(solution: Solution, sentence: str) -> Solution:
+def _with_sentence(solution: Solution, sentence: str) -> Solution:
     message = f"{solution.message} {sentence}".rstrip()
     return dataclasses.replace(solution, message=message, problem=None)

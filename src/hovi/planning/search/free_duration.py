@@ -1,13 +1,12 @@
 """The duration of least cost plus weight times duration.
 
-Where the cost J(T) of the motion that solves the problem in time T is least together with w T, its
-derivative is J'(T) = -w: Pontryagin's Hamiltonian is w. The derivative comes exactly from the
-discrete action (see DiscreteLagrangian.duration_derivative), every motion is the guess of the
-next, and the root is bracketed, so that limits and equations need nothing of their own.
+With J(T) the minimal cost for the duration T, J(T) + w T has a minimum where J'(T) = -w, that is,
+where Pontryagin's Hamiltonian equals w. The derivative of the discrete action is exact (see
+DiscreteLagrangian.duration_derivative). Each motion is the guess for the next, and the root is
+bracketed; limits and constraints need no special treatment.
 
-With a tolerance two searches alternate: the best duration on a grid, and a grid that is fine enough
-for the motion of that duration. A finer grid hardly moves the duration, and another duration hardly
-asks for another grid.
+With a tolerance two searches alternate: for the best duration on a grid, and for a grid that is
+fine enough at that duration. Each hardly changes the result of the other.
 """
 
 from __future__ import annotations
@@ -27,28 +26,28 @@ from hovi.planning.solver.status import Status
 from hovi.system.interruption import record_interrupt
 
 SolveFor = Callable[[float, Trajectory], Solution]
-"""The solution for a duration in [s], from a guess."""
+"""Solves for a duration in [s], from a guess."""
 OnGrid = Callable[[Grid], SolveFor]
-"""What solves on a grid that is stretched to a duration."""
+"""Returns a solver on a grid, scaled to each duration."""
 Refine = Callable[[Solution], Solution]
-"""The motion within the tolerance, for its duration; on its own grid where that is fine enough."""
+"""Refines a motion of fixed duration to the tolerance; keeps its grid if that is fine enough."""
 
 MAX_GRIDS = 4
-"""Grids on which the best duration is looked for."""
+"""Maximum number of grids on which the best duration is computed."""
 FINER_GRID_STRIDE = 1.001
-"""Ratio of the first two durations that are tried on a finer grid."""
-STRIDE = 1.3
-"""Ratio of two durations while a bracket is looked for."""
-PRECISION = 1e-12
-"""Of the duration, relative."""
+"""Ratio of the first two durations on a finer grid."""
+MAX_STRIDE = 1.3
+"""Maximum ratio of successive durations while a bracket is sought."""
+DURATION_PRECISION = 1e-12
+"""Relative tolerance of the duration."""
 
 
 @dataclass(frozen=True)
 class FreeDuration:
     """Bounds and weight of a free duration.
 
-    lower, upper: in [s]. weight: w, in cost per [s]; 0 asks for the cost alone.
-    Raises InputError for bounds that do not rise or a weight that is not finite.
+    lower, upper: in [s]. weight: w, in cost per [s]; 0 minimises the cost alone.
+    Raises InputError unless 0 < lower < upper and the weight is finite and not negative.
     """
 
     lower: float
@@ -58,7 +57,7 @@ class FreeDuration:
     def __post_init__(self) -> None:
         if not (0 < self.lower < self.upper < np.inf):
             raise InputError(
-                f"a free duration is a pair 0 < lower < upper in seconds, got "
+                f"a free duration must be a pair 0 < lower < upper in seconds, got "
                 f"({self.lower}, {self.upper})."
             )
         if not (np.isfinite(self.weight) and self.weight >= 0):
@@ -66,7 +65,7 @@ class FreeDuration:
 
     @property
     def first(self) -> float:
-        """Where the search starts: the geometric mean of the bounds, in [s]."""
+        """The first duration of the search: the geometric mean of the bounds, in [s]."""
         return float(np.sqrt(self.lower * self.upper))
 
 
@@ -74,7 +73,7 @@ class FreeDuration:
 class BestDuration:
     """The motion at the best duration, its cost without w T.
 
-    steps: of the optimiser, in all solves. ending: what is to be said before the duration.
+    steps: of the optimiser, in all solves. ending: words of the message before the duration.
     """
 
     free: FreeDuration
@@ -100,13 +99,13 @@ class BestDuration:
 
 
 def best_duration(
-    free: FreeDuration, solve: SolveFor, first: Solution, stride: float = STRIDE
+    free: FreeDuration, solve: SolveFor, first: Solution, stride: float = MAX_STRIDE
 ) -> BestDuration:
     """A motion whose duration is a local minimum of cost + w T between the bounds.
 
-    first: a solution for some duration between them; its valley is followed.
-    stride: ratio of the first two durations; its square is the next, up to STRIDE.
-    A motion that is not a minimum is returned as it is.
+    first: a solution for some duration between them, which is followed to other durations.
+    stride: ratio of the first two durations; it is squared in each step, up to MAX_STRIDE.
+    A motion that is not a minimum is returned unchanged.
     """
     search = _Search(free, solve, first, stride)
     best = search.run()
@@ -114,12 +113,12 @@ def best_duration(
 
 
 def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
-    """As best_duration, with a cost that includes w T."""
+    """As best_duration, with w T included in the cost."""
     return best_duration(free, solve, first).with_time()
 
 
 class _Search:
-    """A bracket by strides from the first duration, then Brent's root of J' + w."""
+    """Brackets the root of J' + w by strides from the first duration, then uses Brent's method."""
 
     def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution, stride: float) -> None:
         self.free = free
@@ -139,7 +138,7 @@ class _Search:
                 self.ending = "The duration is kept at its bound,"
                 break
             further = T / self.stride if slope > 0 else T * self.stride
-            self.stride = min(self.stride**2, STRIDE)
+            self.stride = min(self.stride**2, MAX_STRIDE)
             further = float(np.clip(further, self.free.lower, self.free.upper))
             try:
                 next_slope = self.at(further)
@@ -148,16 +147,16 @@ class _Search:
                     break
             except _FailedError as failed:
                 return self.unfinished(failed.solution)
-            except KeyboardInterrupt:  # between two solves, each of which hears its own
+            except KeyboardInterrupt:  # between two solves, which handle their own
                 record_interrupt()
-                self.ending = "The search for a better one was interrupted; the last duration is"
+                self.ending = "The search for the best one was interrupted; the last duration is"
                 return dataclasses.replace(self.best, success=False, status=Status.INTERRUPTED)
             T, slope = further, next_slope
         return self.best
 
     def between(self, known: dict[float, float]) -> None:
-        """Brent's method on a bracket, of which both slopes are known, to where J' + w vanishes."""
-        from scipy.optimize import brentq  # a quarter of a second, for free durations alone
+        """Brent's method for the root of J' + w. known: slopes at both ends of a bracket."""
+        from scipy.optimize import brentq  # takes a quarter of a second to import
 
         def slope_at(T: float) -> float:
             if T not in known:
@@ -165,15 +164,15 @@ class _Search:
             return known[T]
 
         a, b = known
-        xtol, rtol = PRECISION * min(a, b), 4 * np.finfo(float).eps
+        xtol, rtol = DURATION_PRECISION * min(a, b), 4 * np.finfo(float).eps
         root = float(brentq(slope_at, a, b, xtol=xtol, rtol=rtol, disp=False))
         if self.best.trajectory.duration != root:
             self.at(root)
 
     def at(self, T: float) -> float:
-        """Solve for a duration from the best motion so far; J' + w there.
+        """Solve for a duration from the best motion so far; returns J' + w.
 
-        Raises _FailedError where that is no minimum.
+        Raises _FailedError if no minimum is found.
         """
         solution = self.solve(T, self.best.trajectory)
         self.steps += solution.nit
@@ -187,9 +186,9 @@ class _Search:
         return solution.duration_derivative + self.free.weight
 
     def unfinished(self, failed: Solution) -> Solution:
-        """The last minimum, with the reason why the search went no further."""
+        """The last minimum, with the reason why the search ended."""
         T = failed.trajectory.duration
-        self.ending = f"For {T:.6g} s none was found ({failed.status}); the last duration is"
+        self.ending = f"For {T:.6g} s no minimum was found ({failed.status}); the last duration is"
         return dataclasses.replace(self.best, success=False, status=failed.status)
 
 
@@ -204,18 +203,18 @@ class _FailedError(Exception):
 def free_to_tolerance(
     free: FreeDuration, on_grid: OnGrid, refine: Refine, first: Solution
 ) -> Solution:
-    """A motion whose duration is the best one on a grid that brings it within a tolerance.
+    """A motion within a tolerance, whose duration is the best one on its grid.
 
     first: a solution for some duration between the bounds, on a coarse grid.
-    The accuracy is that of the motion among those of its duration, relative in the cost without
-    w T. That J' + w vanishes on the grid and not in the limit costs the square of a small error.
-    Where a later turn fails, the motion within the tolerance of the one before is returned; after
-    an interrupt it is no success, as elsewhere.
+    The accuracy is that of the motion for its fixed duration, relative to the cost without w T.
+    Since J' + w vanishes, an error of the duration changes the cost to second order only.
+    If a later round fails, the motion within the tolerance of the round before is returned; after
+    an interrupt it counts as no success.
     """
     found = best_duration(free, on_grid(first.trajectory.grid), first)
     steps, rounds = found.steps, tuple[Round, ...]()
     kept: BestDuration | None = None
-    for turn in range(MAX_GRIDS):
+    for number in range(MAX_GRIDS):
         if not found.solution.success:
             break
         refined = refine(found.solution)
@@ -227,26 +226,26 @@ def free_to_tolerance(
         if not refined.accuracy.reached:
             break
         kept = found
-        if settled or turn == MAX_GRIDS - 1:
+        if settled or number == MAX_GRIDS - 1:
             break
         found = best_duration(free, on_grid(refined.trajectory.grid), refined, FINER_GRID_STRIDE)
         steps += found.steps - refined.nit
-    best = found if kept is None or kept is found else _held(kept, found.solution)
-    return _told(dataclasses.replace(best, steps=steps), rounds)
+    best = found if kept is None or kept is found else _with_failure(kept, found.solution)
+    return _with_rounds(dataclasses.replace(best, steps=steps), rounds)
 
 
-def _held(kept: BestDuration, failed: Solution) -> BestDuration:
-    """The last motion within the tolerance, with what became of the search for a better one."""
+def _with_failure(kept: BestDuration, failed: Solution) -> BestDuration:
+    """The last motion within the tolerance, with the reason why the next round failed."""
     reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
-    ending = f"Its duration is the best on a coarser grid, as the finer one gave none ({reason}):"
+    ending = f"The search on a finer grid failed ({reason}); the best duration on a coarser one is"
     solution = kept.solution
-    if failed.status is Status.INTERRUPTED:  # so that no other motion is tried either
+    if failed.status is Status.INTERRUPTED:  # so that the search ends
         solution = dataclasses.replace(solution, success=False, status=failed.status)
     return dataclasses.replace(kept, solution=solution, ending=ending)
 
 
-def _told(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
-    """The motion with all rounds, and with its accuracy in the message if it was estimated."""
+def _with_rounds(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
+    """The solution with all rounds, and with its accuracy in the message if it was estimated."""
     solution = found.with_time()
     if solution.accuracy is None:
         return solution

@@ -1,6 +1,6 @@
-"""Ways to a hard job: easier versions of it in order, each a guess for the next.
+"""Homotopies: sequences of easier problems, each solution the guess for the next.
 
-A way is a family of jobs in one parameter, which starts where the action has few stationary
+A homotopy is a family of jobs in one parameter that starts where the action has few stationary
 motions and ends at the job itself. [AllgowerGeorg2003]
 """
 
@@ -31,83 +31,84 @@ if TYPE_CHECKING:
     from hovi.robot.robot import Robot
 
 
-HEAVIEST = 10.0
-"""First rotors, over the largest inertia that a joint of the robot moves."""
-LIGHTER = 10.0
-"""By which factor rotors become lighter from rung to rung."""
-LIGHTEST = 0.1
-"""Last rotors, over the least eigenvalue of the mass matrix."""
-GRAVITY = 0.0, 0.25, 0.5, 0.75
-SHORTER = 0.125, 0.25, 0.5
-LONGER = 2.0, 1.5, 1.25, 1.1
-"""Durations over the job's: shorter for effort alone, longer where limits bind."""
-FEWEST = 6
-"""Intervals of the coarsest grid, at least."""
-ROOM = 8.0, 4.0, 2.0, 1.5, 1.25, 1.1
-"""Ranges of relaxed limits over those of the job."""
+FIRST_ROTOR_RATIO = 10.0
+"""Rotor inertia of the first stage, relative to the largest diagonal entry of the mass matrix."""
+ROTOR_REDUCTION = 10.0
+"""Factor by which the rotor inertia is reduced from stage to stage."""
+LAST_ROTOR_RATIO = 0.1
+"""Smallest rotor inertia, relative to the smallest eigenvalue of the mass matrix."""
+GRAVITY_SHARES = 0.0, 0.25, 0.5, 0.75
+"""Gravity of the stages, relative to the job's."""
+SHORTER_DURATIONS = 0.125, 0.25, 0.5
+LONGER_DURATIONS = 2.0, 1.5, 1.25, 1.1
+"""Durations of the stages, relative to the job's: shorter without limits, longer with them."""
+MIN_INTERVALS = 6
+"""Minimum number of intervals of the coarsest grid."""
+RANGE_RATIOS = 8.0, 4.0, 2.0, 1.5, 1.25, 1.1
+"""Ranges of relaxed limits, relative to the job's."""
 
 
 @dataclass(frozen=True, eq=False)
-class Rung:
-    """One job of a way, and what is easier about it in a few words."""
+class Stage:
+    """One job of a homotopy, and a few words on how it differs from the last one."""
 
     name: str
     job: Job
 
 
 Goal = TypeVar("Goal", State, State | FrameGoal)
-Way = Callable[[Job], list[Rung]]
-"""Rungs from the easiest; none where the way leads nowhere. The job itself is not among them."""
+Homotopy = Callable[[Job], list[Stage]]
+"""The stages, easiest first, without the job itself; empty if the homotopy does not apply."""
 
 
-def lighter_rotors(job: Job) -> list[Rung]:
-    """From joints on which heavy rotors turn: M(q) + c 1, c falling to zero.
+def lighter_rotors(job: Job) -> list[Stage]:
+    """Rotor inertia c on every joint, M(q) + c 1, with c decreasing to zero.
 
-    Torque limits wait for the last rung.
+    Torque limits apply in the last stage only.
     """
     robot = job.scene.robot
     q, _ = job.start.on(robot, "start")
     M = MassMatrix(job.scene.model)(q[None])[0]
-    inertia = HEAVIEST * float(M.diagonal().max())
-    least = LIGHTEST * float(np.linalg.eigvalsh(M)[0])
+    inertia = FIRST_ROTOR_RATIO * float(M.diagonal().max())
+    least = LAST_ROTOR_RATIO * float(np.linalg.eigvalsh(M)[0])
     free = _without_torque_limits(job)
-    rungs = []
+    stages = []
     while inertia > least:
-        scene = _eased(job.scene, HeavierRotors(inertia))
-        rungs.append(
-            Rung(f"rotors of {inertia:.2g} kg m^2", dataclasses.replace(free, scene=scene))
+        scene = _with_effect(job.scene, HeavierRotors(inertia))
+        stages.append(
+            Stage(f"rotors of {inertia:.2g} kg m^2", dataclasses.replace(free, scene=scene))
         )
-        inertia /= LIGHTER
-    return rungs
+        inertia /= ROTOR_REDUCTION
+    return stages
 
 
-def growing_gravity(job: Job) -> list[Rung]:
-    """From weightlessness."""
+def growing_gravity(job: Job) -> list[Stage]:
+    """Gravity increasing from zero."""
     if not job.scene.model.gravity.linear.any():
         return []
     return [
-        Rung(
+        Stage(
             f"{100 * share:.0f} % of gravity",
-            dataclasses.replace(job, scene=_eased(job.scene, WeakerGravity(share))),
+            dataclasses.replace(job, scene=_with_effect(job.scene, WeakerGravity(share))),
         )
-        for share in GRAVITY
+        for share in GRAVITY_SHARES
     ]
 
 
-def other_durations(job: Job) -> list[Rung]:
-    """From a shorter time, or from a longer one where limits bind; velocities in proportion."""
+def other_durations(job: Job) -> list[Stage]:
+    """Durations from shorter ones, or from longer ones with limits; velocities in proportion."""
     limited = bool(job.limits.bounded.any())
     return [
-        Rung(f"a duration of {share * job.grid.duration:.4g} s", _lasting(job, share))
-        for share in (LONGER if limited else SHORTER)
+        Stage(f"a duration of {share * job.grid.duration:.4g} s", _with_duration(job, share))
+        for share in (LONGER_DURATIONS if limited else SHORTER_DURATIONS)
     ]
 
 
-def finer_grids(job: Job) -> list[Rung]:
-    """From few intervals of galerkin-2, doubled each time."""
+def finer_grids(job: Job) -> list[Stage]:
+    """Grids from a few intervals of galerkin-2, doubled in each stage."""
     N = job.grid.intervals
-    rungs = []
-    while N >= 2 * FEWEST:
+    stages = []
+    while N >= 2 * MIN_INTERVALS:
         N = (N + 1) // 2
         grid = Grid.uniform(job.grid.duration, N, galerkin(2))
         if job.via:
@@ -115,24 +116,24 @@ def finer_grids(job: Job) -> list[Rung]:
                 grid = grid.with_nodes([via.time for via in job.via])
             except InputError:  # too few nodes for the via points
                 break
-        rungs.append(Rung(f"{N} intervals", job.on(grid)))
-    return rungs[::-1]
+        stages.append(Stage(f"{N} intervals", job.on(grid)))
+    return stages[::-1]
 
 
-def narrowing_limits(job: Job) -> list[Rung]:
-    """From limits of wider ranges."""
+def narrowing_limits(job: Job) -> list[Stage]:
+    """Limits from wider ranges."""
     if not job.limits.bounded.any():
         return []
     return [
-        Rung(
+        Stage(
             f"limits {share:g} times as wide",
             job.with_options(limits=_widened(job.limits, share)),
         )
-        for share in ROOM
+        for share in RANGE_RATIOS
     ]
 
 
-def _eased(scene: Scene, effect: Effect) -> Scene:
+def _with_effect(scene: Scene, effect: Effect) -> Scene:
     return dataclasses.replace(scene, effects=[*scene.effects, effect])
 
 
@@ -143,21 +144,21 @@ def _without_torque_limits(job: Job) -> Job:
 
 
 def _widened(limits: Limits, share: float) -> Limits:
-    """Limits whose ranges are `share` times as wide, about the same middle."""
+    """Limits whose ranges are `share` times as wide, with the same centers."""
     more = (share - 1) / 2 * limits.ranges
     return Limits(limits.lower - more, limits.upper + more, limits.tolerance)
 
 
-def _lasting(job: Job, share: float) -> Job:
-    """The job in another time, its ends passed through faster or slower in proportion."""
+def _with_duration(job: Job, share: float) -> Job:
+    """The job with its duration times `share`, and velocities of its ends in proportion."""
     grid = Grid(share * job.grid.steps, job.grid.schemes)
-    via = tuple(Via(share * each.time, _passed(each.goal, share)) for each in job.via)
-    start, goal = _passed(job.start, share), _passed(job.goal, share)
+    via = tuple(Via(share * each.time, _rescaled(each.goal, share)) for each in job.via)
+    start, goal = _rescaled(job.start, share), _rescaled(job.goal, share)
     return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
 
 
-def _passed(state: Goal, share: float) -> Goal:
-    """A state passed through faster by 1/share; goals of frames leave the velocity free."""
+def _rescaled(state: Goal, share: float) -> Goal:
+    """A state with its velocity divided by `share`; task-space goals are unchanged."""
     if isinstance(state, FrameGoal) or state.v is None:
         return state
     return dataclasses.replace(state, v=np.asarray(state.v) / share)
@@ -165,9 +166,9 @@ def _passed(state: Goal, share: float) -> Goal:
 
 @dataclass(frozen=True)
 class HeavierRotors(Effect):
-    """The same inertia on every joint, beside what the joints have: M(q) + inertia * 1.
+    """The same additional inertia on every joint: M(q) + inertia * 1.
 
-    With much of it the least effort is nearly that of a cubic spline, which has one minimum.
+    For large inertia the problem is close to a cubic spline, which has a single minimum.
 
     inertia: in [kg m^2], or [kg] at sliding joints.
     """
@@ -176,17 +177,17 @@ class HeavierRotors(Effect):
     key: ClassVar[str] = "heavier_rotors"
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """Rotors are simulated by Pinocchio itself."""
+        """Rotor inertia is part of Pinocchio's model."""
         model.armature = model.armature + self.inertia
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
-        return f"{self.inertia:.3g} kg m^2 or kg on every joint, to make planning easier"
+        """One line for the description of a scene."""
+        return f"{self.inertia:.3g} kg m^2 or kg on every joint, for continuation"
 
 
 @dataclass(frozen=True)
 class WeakerGravity(Effect):
-    """A share of the scene's gravity.
+    """The scene's gravity times a share.
 
     share: from 0 to 1.
     """
@@ -195,9 +196,9 @@ class WeakerGravity(Effect):
     key: ClassVar[str] = "weaker_gravity"
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
-        """Gravity is simulated by Pinocchio itself."""
+        """Gravity is part of Pinocchio's model."""
         model.gravity.linear = self.share * model.gravity.linear
 
     def describe(self) -> str:
-        """One line for the account of a scene."""
-        return f"{100 * self.share:.0f} % of gravity, to make planning easier"
+        """One line for the description of a scene."""
+        return f"{100 * self.share:.0f} % of gravity, for continuation"

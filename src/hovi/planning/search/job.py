@@ -1,4 +1,4 @@
-"""What to plan: everything that the search hands to its worker processes."""
+"""A planning job: the input of a search and of its worker processes."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 
 Progress = Callable[[str, float], None]
-"""What is told how far a search is: a line of text and the fraction done."""
-MOST_INTERVALS = 2000
-"""To which intervals are halved so that their charts hold the orientations of the first guess."""
+"""Called with a line of text and the completed fraction, in [0, 1]."""
+MAX_CHART_INTERVALS = 2000
+"""Maximum number of intervals after halving for the orientations of the initial guess."""
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """What a worker process needs to solve a problem: it builds its own functions.
+    """A problem to be solved, which worker processes build for themselves.
 
-    grid: on which it is solved; the scheme and the intervals of the options do not count.
-    options: of the plan, with limits and tolerance of the scene's robot.
+    grid: replaces the scheme and the intervals of the options.
+    options: of the plan, with limits and tolerance resolved for the scene's robot.
     """
 
     scene: Scene
@@ -51,12 +51,12 @@ class Job:
 
     @property
     def via(self) -> tuple[Via, ...]:
-        """What the motion passes through, in the order of time."""
+        """The via points, by ascending time."""
         return tuple(sorted(self.options.via, key=lambda each: each.time))
 
     @property
     def tolerance(self) -> Tolerance | None:
-        """The largest error that is allowed; None where the grid is given."""
+        """The largest allowed error; None for a given grid."""
         given = self.options.tolerance
         return None if given is None else Tolerance.of(given, self.scene.robot)
 
@@ -69,7 +69,7 @@ class Job:
         return dataclasses.replace(self, grid=grid)
 
     def problem(self) -> TrajectoryProblem:
-        """The trajectory problem, built once."""
+        """The trajectory problem, built on first use."""
         return self._problem
 
     @cached_property
@@ -80,15 +80,15 @@ class Job:
         return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, clearance)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the problem, so that worker processes build their own, and without the guess."""
+        """The state without the problem, which worker processes build, and without the guess."""
         kept = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
         return kept | {"options": self.options.with_changes(guess="cubic")}
 
 
-def with_room(job: Job, guess: str | Trajectory) -> Job:
-    """The job on a grid whose charts hold the orientations of the guess: intervals are halved.
+def split_for_charts(job: Job, guess: str | Trajectory) -> Job:
+    """The job with intervals halved until the charts contain the orientations of the guess.
 
-    Raises ChartError where that would take more than MOST_INTERVALS.
+    Raises ChartError if that takes more than MAX_CHART_INTERVALS.
     """
     if job.scene.robot.space.flat:
         return job
@@ -97,6 +97,6 @@ def with_room(job: Job, guess: str | Trajectory) -> Job:
             guess_path(job.problem(), guess)
             return job
         except ChartError:
-            if 2 * job.grid.intervals > MOST_INTERVALS:
+            if 2 * job.grid.intervals > MAX_CHART_INTERVALS:
                 raise
         job = job.on(job.grid.halved(np.ones(job.grid.intervals, dtype=bool)))

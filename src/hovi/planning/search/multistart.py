@@ -1,8 +1,7 @@
-"""Many starts on a coarse grid, in parallel processes: which minima are there?
+"""Multi-start exploration: solves from many initial guesses, in parallel processes.
 
-The least-torque landscape has dozens of minima, so more than one start is part of the answer.
-Each round perturbs the best minima found so far (basin hopping); the first ones the guess.
-[WalesDoye1997]
+Least-torque problems have dozens of minima. The first round perturbs the initial guess, each later
+one the best minima found so far (basin hopping). [WalesDoye1997]
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ from hovi.system.interruption import record_interrupt
 
 Array = npt.NDArray[np.float64]
 
-ROUND = 16
-"""Starts of one round; the result does not depend on the number of processes."""
-ELITE = 4
-"""Minima that a round perturbs."""
+STARTS_PER_ROUND = 16
+"""Starts per round; constant, so that results do not depend on the number of processes."""
+PERTURBED_MINIMA = 4
+"""Number of minima that a round perturbs."""
 SAME_COST = 1e-6
-"""Relative difference in cost below which two minima count as one."""
+"""Relative difference in cost up to which two minima count as the same."""
 
 
 @dataclass(eq=False)
 class Pool:
-    """Solves a job from many guesses, here or in worker processes.
+    """Solves a job from many guesses, in this process or in worker processes.
 
     deadline: of all solves together.
     """
@@ -51,12 +50,12 @@ class Pool:
     deadline: Deadline = field(default_factory=Deadline)
 
     def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
-        """Solutions in the order of the guesses."""
+        """The solutions, in the order of the guesses."""
         left = self.deadline.seconds_left
         count = min(self.processes, len(guesses))
         if count <= 1:
             return _solve_chunk(self.job, guesses, left)
-        import joblib  # here, since it takes 60 ms and one process does without
+        import joblib  # takes 60 ms to import, and is not needed for one process
 
         solve_chunk = joblib.delayed(_solve_chunk)
         chunks = [guesses[i::count] for i in range(count)]
@@ -70,18 +69,18 @@ class Pool:
 
 
 def _start_workers(count: int) -> None:
-    """Processes that do not hear Ctrl-C, which this one answers: it ends them.
+    """Start worker processes that ignore Ctrl-C; the main process handles it and ends them.
 
-    A terminal sends it to all of them, and one that still imports would complain.
+    A terminal sends SIGINT to all processes; a worker that is still importing would print an error.
     """
     import joblib
 
-    ensure_running()  # which Python would do later, and unblock Ctrl-C
-    heard = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    ensure_running()  # otherwise Python does so later and unblocks SIGINT
+    previous = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         joblib.Parallel(n_jobs=count)(joblib.delayed(abs)(i) for i in range(count))
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous)
 
 
 def _solve_chunk(
@@ -101,10 +100,10 @@ def _solve_chunk(
 
 @dataclass(frozen=True, eq=False)
 class Exploration:
-    """What a search from many starts found.
+    """The result of a multi-start exploration.
 
-    minima: distinct minima by ascending cost; the best of the rest where there are none.
-    done: how many of the starts were solved. interrupted: whether a person ended the search.
+    minima: distinct minima by ascending cost; the best other solution if there are none.
+    done: number of starts that were solved. interrupted: whether Ctrl-C ended the exploration.
     """
 
     minima: list[Solution]
@@ -115,10 +114,10 @@ class Exploration:
 def explore(
     pool: Pool, first: DiscretePath, starts: int, seed: int, progress: Progress
 ) -> Exploration:
-    """Solve from many starts, of which the first guess is the first.
+    """Solve from many starts, beginning with the first guess.
 
     starts: number of solves. seed: of the random bumps.
-    KeyboardInterrupt and the pool's deadline end the search with what was found.
+    KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far.
     """
     interrupted = False
     solutions: list[Solution] = []
@@ -142,7 +141,7 @@ def explore(
 
 
 def _ended(pool: Pool, solutions: Sequence[Solution]) -> bool:
-    """Whether time is up, or a person asked for an end."""
+    """Whether the deadline has passed or a solve was interrupted."""
     if any(solution.status is Status.INTERRUPTED for solution in solutions):
         return True
     return pool.deadline.passed
@@ -156,15 +155,15 @@ def _round(
     starts: int,
     seed: int,
 ) -> list[DiscretePath]:
-    """Guesses of the next round: bumps on the best minima, in the first round on the guess."""
+    """Guesses of the next round: the best minima with bumps, or the first guess in round one."""
     problem = job.problem()
     T, robot = job.grid.duration, problem.robot
     origin = Trajectory(job.grid, first, problem.ld.momenta(first), job.scene)
     bases = [origin]
-    if done > ROUND:
-        bases = [solution.trajectory for solution in found[:ELITE]] + [origin]
+    if done > STARTS_PER_ROUND:
+        bases = [solution.trajectory for solution in found[:PERTURBED_MINIMA]] + [origin]
     guesses = []
-    for i in range(done, min(done + ROUND, starts)):
+    for i in range(done, min(done + STARTS_PER_ROUND, starts)):
         base = stretched(bases[i % len(bases)], T)
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
         if robot.space.angles:
@@ -174,7 +173,7 @@ def _round(
 
 
 def _on_charts(problem: TrajectoryProblem, curve: Curve, base: Curve) -> DiscretePath:
-    """A curve on the grid, or what it was made from where it turns too far for a chart."""
+    """A curve on the grid, or its unperturbed base if it turns too far for a chart."""
     try:
         return problem.path(curve)
     except ChartError:
@@ -182,7 +181,7 @@ def _on_charts(problem: TrajectoryProblem, curve: Curve, base: Curve) -> Discret
 
 
 def _random_turns(robot: Robot, seed: int) -> Array:
-    """For every continuous joint a turn more or less, or mostly none, shape (nv,)."""
+    """A random turn of -1, 0 (mostly) or 1 for each continuous joint, shape (nv,)."""
     random = np.random.default_rng([seed, 1])
     turns = np.zeros(robot.nv)
     for factor in robot.space.angles:
@@ -191,7 +190,7 @@ def _random_turns(robot: Robot, seed: int) -> Array:
 
 
 def distinct(solutions: Sequence[Solution]) -> list[Solution]:
-    """Minima with different costs, ascending; where there are none, the best of the rest."""
+    """Minima with different costs, ascending; the best other solution if there are none."""
     minima = sorted((s for s in solutions if s.success), key=lambda s: s.cost)
     if not minima:
         usable = [s for s in solutions if s.status is not Status.DIVERGED] or list(solutions)
@@ -204,5 +203,5 @@ def distinct(solutions: Sequence[Solution]) -> list[Solution]:
 
 
 def default_processes() -> int:
-    """Processors that this process may use."""
+    """Number of processors available to this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

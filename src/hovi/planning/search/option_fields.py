@@ -1,4 +1,4 @@
-"""Fields of options: what each one means is said once, for help texts and for scene files."""
+"""Option fields: the one description of each option, for docstrings and for scene files."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ import numpy as np
 from hovi.errors import InputError, nearest
 
 WIDTH = 96
-"""Columns of an argument in a docstring."""
+"""Line length of the arguments in a docstring."""
 
 
 @dataclass(frozen=True)
 class SceneKey:
-    """The key of a scene file that holds an option which is one number, truth value or text.
+    """The scene-file key of an option that is a single number, boolean or text.
 
-    must_be: what ends the sentence "`key` must be ...".
-    written: whether a file that is written names it, from the options; where it is None, only a
-        value that is not the default is written.
+    must_be: end of the message "`key` must be ...".
+    written: whether to write the key, given the options; if None, only values other than the
+        default are written.
     """
 
     must_be: str
@@ -31,11 +31,11 @@ class SceneKey:
 
 
 @dataclass(frozen=True)
-class About:
-    """What is known of an option besides its name, type and default.
+class OptionInfo:
+    """Description of an option besides its name, type and default.
 
-    doc: what it means; ends with a full stop. key: None where scene files do not hold it as one
-    value. least, most: of a number. whole: whether it is a whole number.
+    doc: meaning, ending with a full stop. key: None if scene files do not hold it as a single
+    value. least, most: bounds of a number. whole: whether it is an integer.
     """
 
     doc: str
@@ -46,32 +46,32 @@ class About:
 
 
 def option(default: Any, doc: str, key: SceneKey | None = None, least: int | None = None) -> Any:
-    """A field of options, with what About says of it."""
-    return field(default=default, metadata={"about": About(doc, key, least)})
+    """A field of an options class, with its description."""
+    return field(default=default, metadata={"info": OptionInfo(doc, key, least)})
 
 
 def whole_number(
     default: Any, doc: str, least: int, most: int | None = None, key: SceneKey | None = None
 ) -> Any:
-    """A field that holds a whole number; as `option`."""
-    about = About(doc, key, least, most, whole=True)
-    return field(default=default, metadata={"about": about})
+    """As `option`, for an integer."""
+    info = OptionInfo(doc, key, least, most, whole=True)
+    return field(default=default, metadata={"info": info})
 
 
-def about(options: type) -> dict[str, About]:
-    """What is known of each option, by name."""
-    return {each.name: each.metadata["about"] for each in fields(options)}
+def option_infos(options: type) -> dict[str, OptionInfo]:
+    """The descriptions of all options, by name."""
+    return {each.name: each.metadata["info"] for each in fields(options)}
 
 
 def keep_whole_numbers(options: Any) -> None:
-    """Hold whole numbers as int. Raises InputError for what is none, or out of bounds."""
-    for name, known in about(type(options)).items():
+    """Convert integer options to int. Raises InputError for other numbers, or out of bounds."""
+    for name, known in option_infos(type(options)).items():
         number = getattr(options, name)
         if known.whole and number is not None:
             object.__setattr__(options, name, _whole(name, known, number))
 
 
-def _whole(name: str, known: About, number: Any) -> int:
+def _whole(name: str, known: OptionInfo, number: Any) -> int:
     least, most = known.least or 0, math.inf if known.most is None else known.most
     is_number = isinstance(number, int) or (
         isinstance(number, float | np.number) and math.isfinite(number)
@@ -83,30 +83,30 @@ def _whole(name: str, known: About, number: Any) -> int:
 
 
 def require_known(options: type, names: Iterable[str]) -> None:
-    """Raise InputError for a name that no option has."""
-    known = about(options)
+    """Raise InputError for unknown option names."""
+    known = option_infos(options)
     for name in names:
         if name not in known:
             raise InputError(f"there is no option {name!r}: {nearest(name, known)}")
 
 
 def described(options: type) -> str:
-    """What each option means, as a docstring lists arguments."""
+    """The descriptions of all options, in the format of a docstring's arguments."""
     return "\n".join(
         textwrap.fill(f"{name}: {known.doc}", WIDTH, subsequent_indent="    ")
-        for name, known in about(options).items()
+        for name, known in option_infos(options).items()
     )
 
 
 def explain(documented: Any, options: type) -> None:
-    """Say what the options mean in the place of {options} in a docstring."""
+    """Replace {options} in a docstring by the descriptions of the options."""
     documented.__doc__ = (inspect.getdoc(documented) or "").replace("{options}", described(options))
 
 
 def spell_out(function: Any, options: type) -> None:
-    """Give a function that takes options by keyword their names and meanings, for help()."""
+    """Set signature and docstring of a function that takes options by keyword, for help()."""
     explain(function, options)
     own = inspect.signature(function)
-    kept = [each for each in own.parameters.values() if each.kind is not each.VAR_KEYWORD]
+    own_parameters = [each for each in own.parameters.values() if each.kind is not each.VAR_KEYWORD]
     keywords = inspect.signature(options).parameters.values()
-    function.__signature__ = own.replace(parameters=[*kept, *keywords])
+    function.__signature__ = own.replace(parameters=[*own_parameters, *keywords])

@@ -1,4 +1,4 @@
-"""The options of a plan: every one is named, explained, given its default and checked here."""
+"""The options of a plan, with their defaults, descriptions and checks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from hovi.planning.search.option_fields import (
 from hovi.robot.robot import Robot
 from hovi.schemes import Scheme, by_name
 
-MOST_INTERVALS = 1_000_000
+MAX_INTERVALS = 1_000_000
 _CLEARANCE = ("obstacles", "margin", "self_collision")
 
 
@@ -37,13 +37,13 @@ def _always(options: PlanOptions) -> bool:
     return True
 
 
-def _where_kept(options: PlanOptions) -> bool:
+def _if_clearance(options: PlanOptions) -> bool:
     return options.clearance.wanted
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanOptions:
-    """How a motion is planned: what `hovi.plan` takes by keyword. Valid once built.
+    """The options of `hovi.plan`, which takes them by keyword. Valid once built.
 
     {options}
     Raises InputError, or SchemeError for an unknown scheme.
@@ -51,88 +51,88 @@ class PlanOptions:
 
     time_weight: float = option(
         0.0,
-        "cost per [s] of a duration that is free.",
-        SceneKey("a number, 0 or more: the cost of a second"),
+        "cost per [s] of a free duration.",
+        SceneKey("a number, 0 or more: the cost per second"),
         least=0,
     )
-    via: Sequence[Via] = option((), "what the motion passes through at given times.")
+    via: Sequence[Via] = option((), "goals that the motion meets at given times.")
     scheme: str | Scheme = option(
-        "galerkin-2", "how the action is discretised: a name as by_name takes it, or a Scheme."
+        "galerkin-2", "discretisation of the action: a name as for by_name, or a Scheme."
     )
     intervals: int = whole_number(
-        16, "N of equal length; limits may split them.", least=1, most=MOST_INTERVALS
+        16, "number of equal intervals; limits may split them.", least=1, most=MAX_INTERVALS
     )
     limits: str | Limits | Mapping[str, Any] = option(
         "urdf",
-        'on q, v, a and tau, holding everywhere along the motion: "urdf" (those of the URDF), '
-        '"none", a Limits, or a mapping as as_limits takes it.',
+        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", a '
+        "Limits, or a mapping as for as_limits.",
     )
     starts: int = whole_number(
         1,
-        "number of solves from seeded random perturbations; all minima found are refined on the "
-        "grid that was asked for and ranked after that.",
+        "number of solves from seeded random perturbations; the best minima found are refined on "
+        "the requested grid and ranked there.",
         least=1,
         key=SceneKey("a whole number, 1 or more", written=_always),
     )
     seed: int = whole_number(
         0,
-        "of the perturbations.",
+        "random seed of the perturbations.",
         least=0,
         key=SceneKey("a whole number, 0 or more", written=_always),
     )
     tolerance: float | str | Tolerance | None = option(
         None,
-        "the largest error over the whole motion, in place of a scheme: a number is relative in "
-        'the cost, "0.1 mm" at the robot\'s tip_frame, "0.1 mm at tool0" at another frame, '
-        '"0.01 deg" or "1e-4 rad" in the joints. The grid to begin with has the `intervals`, up '
-        "to 60, or two thirds of them where nothing makes kinks; the solution's `accuracy` says "
-        "what was reached.",
+        "the largest error over the whole motion, instead of a scheme: a number is relative to "
+        'the cost, "0.1 mm" applies to the robot\'s tip_frame, "0.1 mm at tool0" to another '
+        'frame, "0.01 deg" or "1e-4 rad" to the joints. The first grid has the `intervals`, up to '
+        "60, or two thirds of them for smooth motions; the solution's `accuracy` reports the "
+        "estimated error.",
     )
     obstacles: Sequence[Obstacle] = option(
         (),
-        "what the robot's collision shapes keep a distance of `margin` from, all along the "
-        "motion: hovi.Sphere, hovi.Capsule and hovi.Box.",
+        "hovi.Sphere, hovi.Capsule or hovi.Box, from which the robot's collision shapes keep a "
+        "distance of `margin` along the whole motion.",
     )
     margin: float = option(
         DEFAULT_MARGIN,
-        "the distance that is kept, in [m]: see Clearance.",
-        SceneKey("a length of 0 or more, in metres", written=_where_kept),
+        "minimum distance to obstacles, in [m]: see Clearance.",
+        SceneKey("a length of 0 or more, in metres", written=_if_clearance),
         least=0,
     )
     self_collision: bool = option(
         False,
-        "whether the robot's links keep that distance from each other, too.",
-        SceneKey("true or false", written=_where_kept),
+        "whether the robot's links keep this distance from each other, too.",
+        SceneKey("true or false", written=_if_clearance),
     )
     guess: str | Trajectory = option("cubic", '"cubic", "minimum-jerk" or a Trajectory.')
     turns: Mapping[str, int | Sequence[int]] | None = option(
-        None, "full turns that the guess makes on top of the shortest way, by joint: see State."
+        None, "full turns of the guess beyond the shortest path, by joint: see State."
     )
     weight: npt.ArrayLike | None = option(
         None, "weight of each joint's torque in the cost, shape (nv,)."
     )
     max_iterations: int = whole_number(
         500,
-        "of one solve; with limits of every round of it, of which a small number only makes more.",
+        "maximum number of steps of a solve; with limits, of each of its rounds.",
         least=1,
     )
     time_limit: float | str | None = option(
-        None, 'of everything, in [s] or as "2 min"; returns the best so far.'
+        None, 'of the whole plan, in [s] or as "2 min"; the best motion so far is returned.'
     )
     processes: int | None = whole_number(
-        None, "for the starts; all processors by default.", least=1
+        None, "number of processes for the starts; all processors by default.", least=1
     )
     continuation: bool = option(
         True,
-        "where no start ends in a minimum, solve easier problems that lead to this one, in "
-        "inertia, gravity, duration, intervals and limits; the message says which led there.",
+        "if no start ends in a minimum, solve easier problems that lead to this one, in inertia, "
+        "gravity, duration, intervals or limits; the message names the one that succeeded.",
     )
 
     def __post_init__(self) -> None:
         keep_whole_numbers(self)
         via, most = self.via, self.most_seconds
         if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
-            raise InputError(f"via is a list of hovi.Via(time, goal), not {via!r}.")
+            raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
         if most is not None and not most > 0:
             raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
         object.__setattr__(self, "via", tuple(via))
@@ -146,7 +146,7 @@ class PlanOptions:
 
     @property
     def table(self) -> Scheme:
-        """The scheme as its table."""
+        """The scheme as a Scheme."""
         return by_name(self.scheme) if isinstance(self.scheme, str) else self.scheme
 
     @property
@@ -156,24 +156,24 @@ class PlanOptions:
 
     @cached_property
     def clearance(self) -> Clearance:
-        """What the robot keeps away from."""
+        """Obstacles and self-collision, with their margin."""
         return Clearance(self.obstacles, self.margin, self.self_collision)
 
     def with_changes(self, **changes: Any) -> Self:
-        """These options, some of them changed.
+        """These options with some of them changed.
 
-        Raises InputError for an unknown option, and what makes no options.
+        Raises InputError for unknown options and invalid values.
         """
         require_known(type(self), changes)
         options = dataclasses.replace(self, **changes)
-        if not changes.keys() & set(_CLEARANCE):  # for which the distances were built already
+        if not changes.keys() & set(_CLEARANCE):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
         return options
 
     def on(self, robot: Robot) -> Self:
-        """These options with limits and a tolerance of this robot in the place of their words.
+        """These options with limits and tolerance resolved for a robot.
 
-        Raises InputError for what does not fit the robot.
+        Raises InputError for values that do not fit the robot.
         """
         wanted = None if self.tolerance is None else Tolerance.of(self.tolerance, robot)
         return self.with_changes(limits=as_limits(robot, self.limits), tolerance=wanted)

@@ -1,4 +1,4 @@
-"""plan: one call from a scene and two states to the motion between them."""
+"""plan: one call from a scene and two states to an optimal motion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.values import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.job import Job, Progress, with_room
+from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.refining import on_grid_of
@@ -52,10 +52,10 @@ class _Plan(Protocol[Keywords]):
         ...
 
 
-def _taking(
+def _with_option_keywords(
     options: Callable[Keywords, PlanOptions],
 ) -> Callable[[Callable[..., Solution]], _Plan[Keywords]]:
-    """A decorator: the options of a plan are keywords of the function, for help and for types."""
+    """A decorator that makes the options keywords of the function, for help and type checkers."""
 
     def taking(function: Callable[..., Solution]) -> _Plan[Keywords]:
         spell_out(function, PlanOptions)
@@ -64,7 +64,7 @@ def _taking(
     return taking
 
 
-@_taking(PlanOptions)
+@_with_option_keywords(PlanOptions)
 @one_blas_thread
 @interruptible
 def plan(
@@ -78,28 +78,30 @@ def plan(
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
 
-    scene: what is simulated.
+    scene: the robot with its effects.
     start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose; the goal
         may be a FrameGoal.
     duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
-        of these, between which the best one is looked for.
-    progress: called with a line of text and the fraction done.
-    options: a PlanOptions; what follows takes the place of what it says.
+        of these for a free duration.
+    progress: called with a line of text and the completed fraction, in [0, 1].
+    options: a PlanOptions; the following keywords override it.
     {options}
-    Raises InputError, ModelError, SceneError or SchemeError for input that makes no problem.
+    Raises InputError, ModelError, SceneError or SchemeError for invalid input.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):
-        raise InputError(f"plan takes a hovi.Scene, as in hovi.Scene(robot, [...]), not {scene!r}.")
+        raise InputError(
+            f"plan takes a hovi.Scene, such as hovi.Scene(robot, [...]), got {scene!r}."
+        )
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = options.with_changes(**changes).on(scene.robot)
     free, T = _time(scene, as_duration(duration), chosen)
     grid = _grid(T, chosen, scene.robot)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
-    job = with_room(Job(scene, grid, *ends, chosen), chosen.guess)
+    job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
     search = Search(job, Deadline(chosen.most_seconds), progress or _silent, free)
-    problem = job.problem()  # bad input speaks before any work is done
+    problem = job.problem()  # raises for invalid input before the search
     started = time.perf_counter()
     best, minima = search.run()
     return dataclasses.replace(
@@ -114,27 +116,27 @@ def plan(
 def _time(
     scene: Scene, T: float | tuple[float, float], options: PlanOptions
 ) -> tuple[FreeDuration | None, float]:
-    """The bounds of a free duration, None where it is given, and the first one that is solved for.
+    """The bounds of a free duration or None, and the duration of the first solve, in [s].
 
-    Raises SceneError for effects that a clock drives: the best duration is not known of them.
+    Raises SceneError for a free duration with effects that depend on time.
     """
     if not isinstance(T, tuple):
         if options.time_weight != 0:
-            raise InputError("a weight of time needs a free duration, a pair (lower, upper).")
+            raise InputError("time_weight needs a free duration: give a pair (lower, upper).")
         return None, T
     if options.via:
-        raise InputError("via points at given times need a given duration, not a free one.")
+        raise InputError("via points need a fixed duration: give it as one number.")
     free = FreeDuration(*T, options.time_weight)
     if scene.terms.timed:
         raise SceneError(
-            f"effect {scene.terms.timed[0]!r} depends on the time, and a free duration needs "
-            "effects that do not; give the duration as one number."
+            f"effect {scene.terms.timed[0]!r} depends on time, which a free duration does not "
+            "allow; give the duration as one number."
         )
     return free, free.first
 
 
 def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
-    """The grid that is asked for, or with which the way to a tolerance begins."""
+    """The requested grid, or the first grid of the refinement to a tolerance."""
     if options.tolerance is None:
         grid = Grid.uniform(T, options.intervals, options.table)
     else:
@@ -145,14 +147,14 @@ def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
 
 
 def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:
-    """The goal, with the turns that the guess makes on its way there."""
+    """The goal, with the turns of the initial guess."""
     if isinstance(goal, FrameGoal):
         if options.turns is not None:
-            raise InputError("turns are for a goal of the joints: give a State instead of a frame.")
+            raise InputError("turns need a joint goal: give a State instead of a FrameGoal.")
         return goal
     state = as_state(goal, robot)
     return state if options.turns is None else dataclasses.replace(state, turns=options.turns)
 
 
 def _silent(text: str, fraction: float) -> None:
-    """No progress."""
+    """Ignore progress."""

@@ -1,4 +1,4 @@
-"""From the minima of a search to what was asked for: the grid, the tolerance, the best duration."""
+"""Refinement of the minima of a search: to the requested grid, tolerance or best duration."""
 
 from __future__ import annotations
 
@@ -26,66 +26,66 @@ from hovi.planning.search.free_duration import (
     free_to_tolerance,
     solve_duration,
 )
-from hovi.planning.search.job import Job, Progress, with_room
+from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.solver import Solution, guess_path, solve
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
 
-CHART_ROUNDS = 4
-"""How often intervals are halved in which an orientation turns too far."""
-REFINED = 6
-"""Coarse minima that are refined and ranked on the grid that was asked for."""
+MAX_CHART_ROUNDS = 4
+"""Maximum number of rounds that halve intervals in which an orientation turns too far."""
+MAX_REFINED = 6
+"""Maximum number of coarse minima that are refined and ranked."""
 _Each = TypeVar("_Each")
 
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """What is done to the minima of a search.
+    """The refinement of the minima of a search.
 
-    fine: what was asked for. deadline: of the whole search.
+    fine: the requested job. deadline: of the whole search.
     """
 
     fine: Job
     deadline: Deadline
     progress: Progress
 
-    def on_the_grid(self, found: list[Solution]) -> list[Solution]:
-        """The best minima on the grid that was asked for, ranked there."""
+    def to_requested_grid(self, found: list[Solution]) -> list[Solution]:
+        """The best minima on the requested grid, ranked there."""
         problem = self.fine.problem()
-        guesses = [guess_path(problem, s.trajectory) for s in found[:REFINED]]
+        guesses = [guess_path(problem, s.trajectory) for s in found[:MAX_REFINED]]
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
         processes = self.fine.options.processes or default_processes()
         pool = Pool(self.fine, processes if len(guesses) > 1 else 1, self.deadline)
         return distinct(pool.solve_all(guesses))
 
     def to_tolerance(self, tolerance: Tolerance, found: list[Solution]) -> list[Solution]:
-        """The best minima to a tolerance, each on a grid of its own."""
+        """The best minima to a tolerance, each on its own grid."""
         problem, refined = self.fine.problem(), []
-        for i, solution in enumerate(self._in_time(found[:REFINED])):
-            which = f"minimum {i + 1} of {min(len(found), REFINED)}: " if len(found) > 1 else ""
+        for i, solution in enumerate(self._until_deadline(found[:MAX_REFINED])):
+            which = f"minimum {i + 1} of {min(len(found), MAX_REFINED)}: " if len(found) > 1 else ""
             known = dataclasses.replace(solution, problem=on_grid_of(problem, solution))
             refined.append(self._refined(tolerance, which, known))
         return distinct(refined)
 
-    def in_best_time(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
-        """The best minima, each with the duration that is best for it, the cheapest first."""
-        freed: list[Solution] = []
-        best = found[:REFINED]
-        for i, solution in enumerate(self._in_time(best)):
+    def with_best_durations(self, free: FreeDuration, found: list[Solution]) -> list[Solution]:
+        """The best minima, each with its best duration, the cheapest first."""
+        results: list[Solution] = []
+        best = found[:MAX_REFINED]
+        for i, solution in enumerate(self._until_deadline(best)):
             which = f"{i + 1} of {len(best)} motions"
             self.progress(f"best duration of {which}", 0.9)
-            freed.append(self._freed(free, solution, which))
-        return distinct(freed)
+            results.append(self._with_best_duration(free, solution, which))
+        return distinct(results)
 
     def in_charts(self, best: Solution) -> Solution:
-        """The solution where no orientation turns by half a turn within an interval.
+        """The solution on a grid on which no orientation turns by more than pi in an interval.
 
-        Intervals in which one does are halved, at most CHART_ROUNDS times.
+        Intervals in which one does are halved, at most MAX_CHART_ROUNDS times.
         """
         if self.fine.scene.robot.space.flat:
             return best
-        for _ in range(CHART_ROUNDS):
+        for _ in range(MAX_CHART_ROUNDS):
             if interrupted():
                 break
             on_its_grid = self.fine.on(best.trajectory.grid)
@@ -93,11 +93,11 @@ class Refinement:
             if not wide.any() or self.deadline.passed:
                 break
             finer = self.fine.on(on_its_grid.grid.halved(wide))
-            best = self._solve(with_room(finer, best.trajectory), best.trajectory)
+            best = self._solve(split_for_charts(finer, best.trajectory), best.trajectory)
         return best
 
-    def _in_time(self, found: Sequence[_Each]) -> Iterator[_Each]:
-        """Each of them until time is up or a person asks for an end, the first in any case."""
+    def _until_deadline(self, found: Sequence[_Each]) -> Iterator[_Each]:
+        """Each of them until the deadline or an interrupt; the first one in any case."""
         for i, each in enumerate(found):
             late = self.deadline.passed
             if i > 0 and (late or interrupted()):
@@ -105,7 +105,7 @@ class Refinement:
             yield each
 
     def _refined(self, tolerance: Tolerance, which: str, known: Solution) -> Solution:
-        """A minimum that knows its problem to a tolerance; limits that are far do not limit it."""
+        """A minimum to a tolerance, refined without its limits if it is far from them."""
         refine = partial(
             refine_to_tolerance,
             tolerance=tolerance,
@@ -122,8 +122,8 @@ class Refinement:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
         self.progress(text, 0.9)
 
-    def _freed(self, free: FreeDuration, solution: Solution, which: str) -> Solution:
-        """A minimum with its best duration, to the tolerance where there is one."""
+    def _with_best_duration(self, free: FreeDuration, solution: Solution, which: str) -> Solution:
+        """A minimum with its best duration, to the tolerance if there is one."""
         solve_for = self._stretched(self.fine.grid)
         first = solve_for(free.first, solution.trajectory)
         if self.fine.tolerance is None:
@@ -132,7 +132,7 @@ class Refinement:
         return free_to_tolerance(free, self._stretched, refine, first)
 
     def _stretched(self, grid: Grid) -> SolveFor:
-        """What solves on a grid that is stretched to a duration."""
+        """A solver on a grid that is scaled to each duration."""
 
         def solve_for(T: float, guess: Trajectory) -> Solution:
             stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
@@ -146,7 +146,7 @@ class Refinement:
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:
-    """The problem on the grid that the solution needed, where limits split its intervals."""
+    """The problem on the solution's grid, whose intervals may have been split for limits."""
     grid = solution.trajectory.grid
     same = np.array_equal(grid.steps, problem.grid.steps)
     return problem if same else problem.on(grid)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
-from hovi.planning.search.continuation import climb, may_help
+from hovi.planning.search.continuation import may_help, solve_by_continuation
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.job import Job, Progress, with_room
+from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.search.refining import Refinement
 from hovi.planning.solver.solver import Solution, guess_path
@@ -20,17 +20,17 @@ from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
 COARSE_INTERVALS = 60
-"""Grids with more than twice as many intervals are first solved on a grid of this many."""
-EXPLORING = 0.7
-"""Share of a time limit that the search may take when its minima are refined afterwards."""
+"""Number of intervals of the coarse grid, used first for grids with more than twice as many."""
+EXPLORATION_SHARE = 0.7
+"""Share of the time limit for the exploration, if its minima are refined afterwards."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
     """The search for the best motion of a job.
 
-    fine: what was asked for, its guess among its options. deadline: of everything.
-    free: bounds of a free duration; None where it is given.
+    fine: the requested job, with the guess among its options. deadline: of the whole search.
+    free: bounds of a free duration; None for a given one.
     """
 
     fine: Job
@@ -39,7 +39,7 @@ class Search:
     free: FreeDuration | None = None
 
     def run(self) -> tuple[Solution, tuple[float, ...]]:
-        """The best solution, and the costs of all minima on the grid that was asked for."""
+        """The best solution, and the costs of all minima on the requested grid."""
         job = self._coarse()
         explored = self._explored(job)
         found = explored.minima
@@ -53,7 +53,7 @@ class Search:
         return best, tuple(s.cost for s in found if s.success)
 
     def _coarse(self) -> Job:
-        """The job on the grid on which its minima are looked for."""
+        """The job on the grid of the exploration."""
         grid = self.fine.grid
         if grid.intervals <= 2 * COARSE_INTERVALS:
             return self.fine
@@ -63,45 +63,45 @@ class Search:
                 coarse = coarse.with_nodes([each.time for each in self.fine.via])
             except InputError:  # too few nodes for the via points
                 return self.fine
-        job = with_room(self.fine.on(coarse), self.fine.options.guess)
+        job = split_for_charts(self.fine.on(coarse), self.fine.options.guess)
         return job if job.grid.intervals < grid.intervals else self.fine
 
     def _explored(self, job: Job) -> Exploration:
-        """The minima from all starts, in a part of the time where refining takes some."""
+        """The minima from all starts; uses a share of the time if they are refined afterwards."""
         options = job.options
         whole = job is self.fine and job.tolerance is None
-        deadline = self.deadline if whole else self.deadline.part(EXPLORING)
+        deadline = self.deadline if whole else self.deadline.part(EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline)
         first = guess_path(job.problem(), options.guess)
         return explore(pool, first, options.starts, options.seed, self.progress)
 
-    def _climbed(self, job: Job, found: list[Solution]) -> list[Solution]:
-        """What continuation leads to where there is no minimum among what was found."""
+    def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
+        """The solutions, or the result of continuation if there is no minimum among them."""
         options = self.fine.options
         if interrupted() or not options.continuation or not may_help(found[0]):
             return found
-        return [climb(job, found[0], options.guess, self.deadline, self.progress)]
+        return [solve_by_continuation(job, found[0], options.guess, self.deadline, self.progress)]
 
     def _stages(self, job: Job, found: list[Solution]) -> Iterator[list[Solution]]:
-        """The minima of a job after each stage on their way to what was asked for.
+        """The minima after each stage: continuation, refinement, best duration.
 
-        Raises KeyboardInterrupt where a person asked for an end before that.
+        Raises KeyboardInterrupt if an interrupt came before the last stage.
         """
         refinement = Refinement(self.fine, self.deadline, self.progress)
-        yield (found := self._climbed(job, found))
+        yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
             yield (found := refinement.to_tolerance(self.fine.tolerance, found))
         elif job is not self.fine:
             raise_if_interrupted()
-            yield (found := self._climbed(self.fine, refinement.on_the_grid(found)))
+            yield (found := self._continued(self.fine, refinement.to_requested_grid(found)))
         yield (found := [refinement.in_charts(found[0]), *found[1:]])
         if self.free is not None:
             raise_if_interrupted()
-            yield refinement.in_best_time(self.free, found)
+            yield refinement.with_best_durations(self.free, found)
 
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
-        """The best solution with a message that says how the search ended, if early."""
+        """The best solution, with a note in its message if the search ended early."""
         starts = self.fine.options.starts
         if explored.done < starts:
             ended = f"The search ended after {explored.done} of {starts} starts."
@@ -113,10 +113,10 @@ class Search:
 
 
 def _interrupted(best: Solution) -> list[Solution]:
-    """The best so far when a person ends the search before what was asked for was reached."""
+    """The best solution so far, after an interrupt before the last stage."""
     message = (
-        "interrupted before the grid or the duration that was asked for was reached; the motion is "
-        f"the best so far, on {best.trajectory.grid.intervals} intervals: {best.message}"
+        "interrupted before the requested grid or the best duration was reached; the motion is the "
+        f"best so far, on {best.trajectory.grid.intervals} intervals: {best.message}"
     )
     status = Status.INTERRUPTED
     return [dataclasses.replace(best, success=False, status=status, message=message)]

@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
-from hovi.planning.search.option_fields import SceneKey, about
-from hovi.planning.search.options import MOST_INTERVALS, PlanOptions
+from hovi.planning.search.option_fields import SceneKey, option_infos
+from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
 
 def _kind(value: object) -> str:
@@ -149,8 +149,8 @@ class SchemeTable(Table):
     intervals: int = Field(
         default=PlanOptions.intervals,
         ge=1,
-        le=MOST_INTERVALS,
-        description=f"a whole number from 1 to {MOST_INTERVALS:,}",
+        le=MAX_INTERVALS,
+        description=f"a whole number from 1 to {MAX_INTERVALS:,}",
     )
 
 
@@ -203,14 +203,14 @@ class ShapedTable(Table):
 
 
 PLAIN: dict[str, SceneKey] = {
-    name: known.key for name, known in about(PlanOptions).items() if known.key is not None
+    name: known.key for name, known in option_infos(PlanOptions).items() if known.key is not None
 }
 """The options that a file holds as one value each."""
 
 
 def _plain_field(name: str) -> tuple[Any, Any]:
     """The field of an option: of its default's type, with its bounds."""
-    default, known = getattr(PlanOptions, name), about(PlanOptions)[name]
+    default, known = getattr(PlanOptions, name), option_infos(PlanOptions)[name]
     kind = FiniteFloat if isinstance(default, float) else type(default)
     must_be, least, most = PLAIN[name].must_be, known.least, known.most
     return kind, Field(default=default, description=must_be, ge=least, le=most)

@@ -10,7 +10,7 @@ import tomlkit
 
 from hovi.errors import SceneError, SchemeError
 from hovi.planning.problem.tolerance import as_number_or_text
-from hovi.planning.search.option_fields import about
+from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
 from hovi.planning.task_file.goal_tables import goal_table, state_table, via_table
@@ -99,13 +99,13 @@ def _option_keys(task: Task) -> dict[str, Any]:
         "intervals": None,
     }
     keys = plain | shaped
-    for name in about(PlanOptions):
+    for name in option_infos(PlanOptions):
         if name not in keys and not _is_default(name, options):
             raise SceneError(
                 f"a scene file cannot say {name!r}: give it to hovi.plan_task, and save the task "
                 "without it."
             )
-    return {name: keys[name] for name in about(PlanOptions) if name in keys}
+    return {name: keys[name] for name in option_infos(PlanOptions) if name in keys}
 
 
 def _plain(name: str, options: PlanOptions) -> Any:
