@@ -36,7 +36,7 @@ def main() -> None:
         "hovi.discrete.trajectory_file",
     ]
     with atheris.instrument_imports(
-        include=[*readers, "hovi.planning.task_file", "hovi.discrete.trajectory_file_check"]
+        include=[*readers, "hovi.planning.task_file", "hovi.discrete.node_continuity"]
     ):
         module = import_module(MODULES[kind])
         verdict = import_module("hard.verdict")

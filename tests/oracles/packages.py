@@ -40,7 +40,7 @@ INSIDE = {
         {"task_file"},
     ],
     "accuracy": [{""}, {"effect_study", "peers"}],
-    "cli": [{"reports"}, {"commands"}, {""}],
+    "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }
 
 

@@ -1,7 +1,7 @@
 // The whole evaluation of packs of points: included once per instruction set.
 #pragma once
 
-#include "pairs.hpp"
+#include "torque_hessian.hpp"
 
 namespace hovi::dynamics {
 namespace {

@@ -23,7 +23,7 @@ struct Joint {
 
   Force c_q, c_v, c_a;  // dtau_j/d(q,v,a)_i = S_j . c for the ancestors j of this joint i
   Vec r;                // 2 B_V^T S
-  Force e, k, h;        // second derivatives of phi: see pairs.hpp
+  Force e, k, h;        // second derivatives of phi: see torque_hessian.hpp
 };
 
 struct Workspace {

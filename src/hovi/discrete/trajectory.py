@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory_file import read_arrays, write_arrays
-from hovi.discrete.trajectory_file_check import require_continuous
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.robot.robot import Robot
 from hovi.robot.space.chart import Chart

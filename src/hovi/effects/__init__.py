@@ -21,7 +21,7 @@ from hovi.effects.moving_base import MovingBase
 from hovi.effects.payload import Payload
 from hovi.effects.power_cost import PowerCost
 from hovi.effects.reference_cost import ReferenceCost
-from hovi.effects.registry import REGISTRY, register
+from hovi.effects.registration import REGISTRY, register
 from hovi.effects.viscous_friction import ViscousFriction
 from hovi.effects.wrench import Wrench
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError, nearest
-from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.mimic_model import Coupling, couplings_of, uncoupled
 from hovi.robot.mimic_tags import held_values, leaders_first, read_couplings, with_mimics
 from hovi.robot.source import RobotSource
@@ -121,24 +120,6 @@ def frame_id(model: pin.Model, name: str) -> int:
     return next((i for i in same if model.frames[i].type == pin.BODY), same[0])
 
 
-def check_mass_matrix(model: pin.Model) -> None:
-    """Raise ModelError if the mass matrix M(q) is singular to working precision.
-
-    The test is lambda_min(M) <= 10 nv eps lambda_max(M) at four fixed random configurations. The
-    neutral one is no criterion: a pendulum that hangs straight down has no inertia about the
-    vertical. The message names the joints without inertia.
-    """
-    if model.nv == 0:
-        return
-    samples = np.array(list(_sample_configurations(model)))
-    values, vectors = np.linalg.eigh(MassMatrix(model)(samples))
-    free = values <= 10.0 * model.nv * np.finfo(float).eps * values[:, -1:]
-    if free.any():
-        first = int(np.argmax(free.any(axis=1)))
-        share = np.sum(vectors[first][:, free[first]] ** 2, axis=1)  # (nv,)
-        raise ModelError(_singular_mass_sentence(model, share))
-
-
 def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> pin.Model:
     pairs = tuple(armature)
     values = np.array(model.armature, dtype=float)
@@ -146,31 +127,3 @@ def _with_armature(model: pin.Model, armature: Iterable[tuple[str, float]]) -> p
         values[model.joints[joint].idx_v] = value
     model.armature = values
     return model
-
-
-def _sample_configurations(model: pin.Model) -> Iterator[Array]:
-    rng = np.random.default_rng(0)
-    for _ in range(4):
-        yield pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, model.nv))
-
-
-def _singular_mass_sentence(model: pin.Model, share: Array) -> str:
-    """A message that names the joints with the largest shares (nv,) in the null space of M."""
-    joints = [
-        index
-        for index, joint in enumerate(model.joints[1:], start=1)
-        if share[joint.idx_v : joint.idx_v + joint.nv].max(initial=0.0) >= 0.5 * share.max()
-    ]
-    names = [str(model.names[joint]) for joint in joints]
-    moved = ", ".join(f"{model.names[j]!r}{_link_of(model, j)}" for j in joints[:3])
-    more = f" and {len(joints) - 3} more" if len(joints) > 3 else ""
-    return (
-        f"the mass matrix of robot {model.name!r} is singular to working precision: there is no "
-        f"inertia at joint {moved}{more}; give the links that it moves a mass and an inertia, or "
-        f"lock it with locked={names!r}."
-    )
-
-
-def _link_of(model: pin.Model, joint: int) -> str:
-    frames = (f for f in model.frames if f.parentJoint == joint and f.type == pin.BODY)
-    return next((f" (link {frame.name!r})" for frame in frames), "")

@@ -22,6 +22,7 @@ from hovi.errors import InputError, ModelError, nearest
 from hovi.robot import model as robot_model
 from hovi.robot.description import describe
 from hovi.robot.geometry import Shapes, load_shapes
+from hovi.robot.mass_matrix import check_mass_matrix
 from hovi.robot.mimic_model import Coupling, PortableModel, couplings_of
 from hovi.robot.source import RobotSource
 from hovi.robot.space import pinocchio_configurations as configuration
@@ -304,8 +305,8 @@ class Robot:
         return configuration.check_vector(v, name, self.coordinate_names)
 
     def check_mass_matrix(self) -> None:
-        """Raise ModelError if M(q) is singular to working precision (see robot_model)."""
-        robot_model.check_mass_matrix(self.model)
+        """Raise ModelError if M(q) is singular to working precision."""
+        check_mass_matrix(self.model)
 
     # Text and files
 

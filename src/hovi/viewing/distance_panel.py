@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.clearance_violation import distances_over_time
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.clearance.violation import distances_over_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

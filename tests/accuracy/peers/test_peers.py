@@ -24,7 +24,7 @@ from hovi.accuracy.peers.collocation_table import (
 from hovi.accuracy.peers.external_method import ExternalMethod
 from hovi.accuracy.peers.ipopt_method import CollocationMethod, Kernels
 from hovi.accuracy.peers.tools import EXTERNAL, tool_peers
-from hovi.accuracy.peers.worker import Worker
+from hovi.accuracy.peers.worker_client import Worker
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import cubic

@@ -11,9 +11,9 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Obstacle, Sphere
-from hovi.planning.clearance.violation import approach_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction

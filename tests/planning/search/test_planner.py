@@ -13,8 +13,8 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
+from hovi.planning.search.final_stages import MAX_REFINED
 from hovi.planning.search.planner import plan
-from hovi.planning.search.refining import MAX_REFINED
 from hovi.planning.search.search import COARSE_INTERVALS
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve

@@ -16,7 +16,7 @@ from hovi.accuracy import Setting
 from hovi.accuracy.method import Answer, Method, Prepared
 from hovi.accuracy.peers.bare_urdf import bare_urdf
 from hovi.accuracy.peers.supported_scenes import require_supported
-from hovi.accuracy.peers.worker import Worker
+from hovi.accuracy.peers.worker_client import Worker
 
 Array = npt.NDArray[np.float64]
 

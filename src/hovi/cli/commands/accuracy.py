@@ -56,8 +56,8 @@ def accuracy(
     """
     from hovi.accuracy import work_precision
     from hovi.accuracy.tables import as_json
-    from hovi.cli.commands.files import find_scene
-    from hovi.cli.commands.progress import progress
+    from hovi.cli.arguments.files import find_scene
+    from hovi.cli.reports.progress import progress
     from hovi.errors import InputError, UnmeasurableError
     from hovi.planning.task_file.reading import load_task
 

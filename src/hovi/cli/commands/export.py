@@ -26,7 +26,7 @@ def export(
     rate: Annotated[float, typer.Option(help="Samples per second.")] = 1000.0,
 ) -> None:
     """Export a motion: t, q, v, a and tau as comma-separated values (csv)."""
-    from hovi.cli.commands.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import check_output, load_trajectory
     from hovi.exchange.formats import export_format
 
     chosen = export_format(_format_name(format_, csv))

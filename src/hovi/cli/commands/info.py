@@ -41,7 +41,7 @@ def info(
 
 
 def _scene(scene: str) -> str:
-    from hovi.cli.commands.files import find_scene
+    from hovi.cli.arguments.files import find_scene
     from hovi.cli.reports.task import describe_task
     from hovi.planning.task_file.reading import load_task
 

@@ -59,7 +59,7 @@ def plan(
 
     Exit code 0 for a minimum, 1 when none was found, 2 for invalid input.
     """
-    from hovi.cli.commands.files import check_output
+    from hovi.cli.arguments.files import check_output
 
     if out is not None:
         check_output(out, ".npz")
@@ -69,7 +69,7 @@ def plan(
 
 def _options(flags: dict[str, Any]) -> dict[str, Any]:
     """The plan options given as flags. Raises InputError."""
-    from hovi.cli.commands.durations import positive_seconds
+    from hovi.cli.arguments.durations import positive_seconds
     from hovi.errors import InputError, nearest
     from hovi.planning.search.option_fields import option_infos
     from hovi.planning.search.options import PlanOptions
@@ -101,7 +101,7 @@ def _tolerance_override(given: dict[str, Any]) -> dict[str, Any]:
 def _task(scene: str, options: dict[str, Any], compile: bool) -> Task:
     import dataclasses
 
-    from hovi.cli.commands.files import find_scene
+    from hovi.cli.arguments.files import find_scene
     from hovi.planning.task_file.reading import load_task
 
     task = load_task(find_scene(scene)).with_options(**options)
@@ -111,7 +111,7 @@ def _task(scene: str, options: dict[str, Any], compile: bool) -> Task:
 
 
 def _guess(guess: str) -> str | Trajectory:
-    from hovi.cli.commands.files import load_trajectory
+    from hovi.cli.arguments.files import load_trajectory
     from hovi.errors import InputError, nearest
 
     if guess in GUESSES:
@@ -125,8 +125,8 @@ def _guess(guess: str) -> str | Trajectory:
 
 def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     """Plan, write, print; returns the exit code."""
-    from hovi.cli.commands.progress import progress
     from hovi.cli.reports.plan import as_json, print_report
+    from hovi.cli.reports.progress import progress
     from hovi.errors import TrajectoryFileError
     from hovi.planning.task_file.task_plan import plan_task
 

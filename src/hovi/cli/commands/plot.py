@@ -19,7 +19,7 @@ def plot(
     ] = None,
 ) -> None:
     """Plot q, v and tau of a motion; for a planar two-link arm, its swept surface as well."""
-    from hovi.cli.commands.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import check_output, load_trajectory
     from hovi.viewing.plotting import plot_all
 
     target = out or file.with_suffix(".png")

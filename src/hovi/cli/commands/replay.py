@@ -24,12 +24,12 @@ def replay(
     ] = True,
 ) -> None:
     """Serve a page that plays a motion until Ctrl-C, or write the page to a file."""
-    from hovi.cli.commands.files import check_output, load_trajectory
+    from hovi.cli.arguments.files import check_output, load_trajectory
 
     if html is None:
         _serve(load_trajectory(file), speed, loop, browser)
         return
-    from hovi.viewing.playback import write_html
+    from hovi.viewing.replay_session import write_html
 
     check_output(html, ".html")
     write_html(load_trajectory(file), html, speed=speed, loop=loop)
@@ -41,7 +41,7 @@ def _serve(trajectory: Trajectory, speed: float, loop: bool, browser: bool) -> N
     import contextlib
     import threading
 
-    from hovi.viewing.playback import replay as play
+    from hovi.viewing.replay_session import replay as play
 
     with contextlib.suppress(KeyboardInterrupt):
         play(

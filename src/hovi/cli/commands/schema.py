@@ -16,7 +16,7 @@ def schema(
     """Write the JSON schema of scene files, for editors that complete and check TOML."""
     from json import dumps
 
-    from hovi.cli.commands.files import check_output
+    from hovi.cli.arguments.files import check_output
     from hovi.errors import InputError
     from hovi.planning.task_file.json_schema import json_schema
     from hovi.system.files import reason, whole_file

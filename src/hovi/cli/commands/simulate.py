@@ -43,7 +43,7 @@ def simulate(
 
     Exit code 0, or 2 for invalid input.
     """
-    from hovi.cli.commands.files import check_output, find_scene
+    from hovi.cli.arguments.files import check_output, find_scene
     from hovi.errors import InputError
     from hovi.planning.task_file.reading import load_task
 
@@ -78,7 +78,7 @@ def _simulate(
 ) -> Simulation:
     import math
 
-    from hovi.cli.commands.durations import positive_seconds
+    from hovi.cli.arguments.durations import positive_seconds
     from hovi.flows.simulator import simulate as simulate_motion
 
     longest = max(task.duration) if isinstance(task.duration, tuple) else task.duration
@@ -95,7 +95,7 @@ def _track(
     intervals: int | None,
     inner_modes: int,
 ) -> Tracking:
-    from hovi.cli.commands.files import load_trajectory
+    from hovi.cli.arguments.files import load_trajectory
     from hovi.flows.tracking import play
 
     return play(

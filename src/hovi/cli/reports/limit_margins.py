@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.clearance.distances import Distances
-from hovi.planning.clearance.violation import approach_along
 from hovi.planning.problem.limit_violation import AT_LIMIT
 from hovi.planning.problem.limit_violation import closeness as margins_along
 from hovi.planning.problem.limits import KINDS, Limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.clearance.violation import distance_in_words
+from hovi.planning.clearance.clearance_violation import distance_in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits

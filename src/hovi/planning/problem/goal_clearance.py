@@ -14,8 +14,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from hovi.planning.clearance.clearance_violation import distance_in_words
 from hovi.planning.clearance.distances import Distances, Pair
-from hovi.planning.clearance.violation import distance_in_words
 from hovi.planning.problem.frame_goal import FrameGoal
 
 POINT = coal.Sphere(0.0)

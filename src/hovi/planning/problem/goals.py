@@ -14,7 +14,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import InverseKinematicsResult, inverse_kinematics
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import Condition, JointCondition
-from hovi.planning.problem.values import seconds
+from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]

@@ -23,8 +23,7 @@ from hovi.planning.problem.goals import Via, goal_state, via_conditions
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import NodeCondition
-from hovi.robot.mass_matrix import MassMatrix
-from hovi.robot.model import check_mass_matrix
+from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene, require_known_joints
 from hovi.schemes import require_regular

@@ -13,7 +13,7 @@ import numpy as np
 
 from hovi.discrete.motion_error import MotionError
 from hovi.errors import InputError, nearest
-from hovi.planning.problem.values import ANGLES, LENGTHS, SHARES, number_and_unit
+from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
 
 

@@ -17,7 +17,7 @@ from hovi.planning.clearance.obstacles import Obstacle
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.tolerance import Tolerance
-from hovi.planning.problem.values import seconds
+from hovi.planning.problem.units import seconds
 from hovi.planning.search.option_fields import (
     SceneKey,
     explain,

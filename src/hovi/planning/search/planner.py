@@ -14,13 +14,13 @@ from hovi.discrete.state import State, as_state
 from hovi.errors import InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
-from hovi.planning.problem.values import Duration, as_duration
+from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
+from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.refining import on_grid_of
 from hovi.planning.search.search import Search
 from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot

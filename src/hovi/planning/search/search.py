@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
 from hovi.planning.search.continuation import may_help, solve_by_continuation
+from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
-from hovi.planning.search.refining import Refinement
 from hovi.planning.solver.solver import Solution, guess_path
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
@@ -87,18 +87,18 @@ class Search:
 
         Raises KeyboardInterrupt if an interrupt came before the last stage.
         """
-        refinement = Refinement(self.fine, self.deadline, self.progress)
+        stages = FinalStages(self.fine, self.deadline, self.progress)
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
-            yield (found := refinement.to_tolerance(self.fine.tolerance, found))
+            yield (found := stages.to_tolerance(self.fine.tolerance, found))
         elif job is not self.fine:
             raise_if_interrupted()
-            yield (found := self._continued(self.fine, refinement.to_requested_grid(found)))
-        yield (found := [refinement.in_charts(found[0]), *found[1:]])
+            yield (found := self._continued(self.fine, stages.to_requested_grid(found)))
+        yield (found := [stages.in_charts(found[0]), *found[1:]])
         if self.free is not None:
             raise_if_interrupted()
-            yield refinement.with_best_durations(self.free, found)
+            yield stages.with_best_durations(self.free, found)
 
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
         """The best solution, with a note in its message if the search ended early."""

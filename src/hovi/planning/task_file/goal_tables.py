@@ -11,7 +11,7 @@ from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.values import seconds
+from hovi.planning.problem.units import seconds
 from hovi.planning.task_file.joint_tables import read_configuration, read_velocity
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, GoalTable, ViaTable

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.problem.tolerance import Tolerance
-from hovi.planning.problem.values import as_duration
+from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via

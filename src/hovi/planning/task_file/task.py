@@ -10,7 +10,7 @@ from typing import Any, Self
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.values import as_duration
+from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import PlanOptions
 from hovi.scene.scene import Scene
 

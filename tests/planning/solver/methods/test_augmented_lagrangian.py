@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import hovi
 from hovi.errors import SceneError
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.multiplier_iteration import unmet_sentence
+from hovi.planning.solver.augmented_lagrangian_rounds import unmet_sentence
 from hovi.planning.solver.multipliers import Residuals
 
 ACROBOT, CART_POLE, PENDUBOT = "acrobot_swing_up", "cart_pole_swing_up", "pendubot_swing_up"

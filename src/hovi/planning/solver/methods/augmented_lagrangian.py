@@ -8,9 +8,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Iteration, Options, Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.method import Method, MethodResult, Report
-from hovi.planning.solver.methods.trust_region import negative_eigenvalues
-from hovi.planning.solver.multiplier_iteration import (
+from hovi.planning.solver.augmented_lagrangian_rounds import (
     NODE_TOLERANCE,
     TORQUE_TOLERANCE,
     ConstrainedResult,
@@ -18,6 +16,8 @@ from hovi.planning.solver.multiplier_iteration import (
     unmet_sentence,
     within,
 )
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.trust_region import negative_eigenvalues
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.status import Status, status_of
 from hovi.system.deadline import Deadline

@@ -16,15 +16,15 @@ from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
-from hovi.planning.clearance.violation import approach_along, approach_sentence
+from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
 from hovi.planning.problem.contradictions import static_sentence
 from hovi.planning.problem.limit_violation import excess_along, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.augmented_lagrangian_rounds import minimize_constrained
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.methods.method import Report
-from hovi.planning.solver.multiplier_iteration import minimize_constrained
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline

@@ -10,8 +10,9 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.optimize.trust_region import Stop, minimize
-from hovi.planning.clearance.violation import approach_along
+from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.methods.bounded_search import (
@@ -20,7 +21,6 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
-from hovi.planning.solver.multiplier_iteration import first_multipliers
 from hovi.planning.solver.penalized_action import PenalizedAction
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6

@@ -9,8 +9,8 @@ from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
+from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
-from hovi.planning.solver.methods.tightening import tightened, usable
 from hovi.planning.solver.status import Status, unfinished
 from hovi.system.interruption import record_interrupt
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hovi.errors import InputError
-from hovi.planning.problem.values import as_duration, number_and_unit, seconds
+from hovi.planning.problem.units import as_duration, number_and_unit, seconds
 
 
 @pytest.mark.parametrize(

@@ -29,9 +29,9 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.robot.urdf.planar_chain import chain
 from hovi.scene.scene import Scene
-from hovi.viewing import playback
+from hovi.viewing import replay_session
 from hovi.viewing.highlights import _without_short_gaps
-from hovi.viewing.playback import Replay, replay
+from hovi.viewing.replay_session import Replay, replay
 from hovi.viewing.skeleton import skeleton
 from oracles.headless_browser import CHROMIUM, Tab, headless_browser
 from samples.cubic_motion import cubic_motion
@@ -307,7 +307,7 @@ def test_playback_runs_in_real_time_and_ends_at_the_goal(
         def display(self, q: Array) -> None:
             shown.append((clock.now - 100.0, q))
 
-    monkeypatch.setattr(playback, "time", clock)
+    monkeypatch.setattr(replay_session, "time", clock)
     player = Replay(motion, Display(), "", None)  # type: ignore[arg-type]
     player.play(speed=speed)
     assert len(shown) == pytest.approx(60 * motion.duration / speed, abs=3)
@@ -347,7 +347,7 @@ def test_loop_plays_until_interrupted(motion: Trajectory, monkeypatch: pytest.Mo
             if len(starts) == 3:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(playback, "time", Clock())
+    monkeypatch.setattr(replay_session, "time", Clock())
     Replay(motion, Display(), "", None).play(loop=True)  # type: ignore[arg-type]
     assert len(starts) == 3
 
@@ -395,7 +395,7 @@ def test_a_missing_browser_raises_and_stops_the_server(
     with pytest.raises(DisplayError, match="no browser could be started; open http"):
         replay(motion, open_browser=True, announce=quiet)
     monkeypatch.setattr(webbrowser, "open", lambda url, new: True)
-    monkeypatch.setattr(playback, "_BROWSER_TIMEOUT", 0.1)
+    monkeypatch.setattr(replay_session, "_BROWSER_TIMEOUT", 0.1)
     with pytest.raises(DisplayError, match="no browser showed the page"):
         replay(motion, open_browser=True, announce=quiet)
     assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]

@@ -40,7 +40,7 @@ _Each = TypeVar("_Each")
 
 
 @dataclass(frozen=True, eq=False)
-class Refinement:
+class FinalStages:
     """The refinement of the minima of a search.
 
     fine: the requested job. deadline: of the whole search.

@@ -1,0 +1,1 @@
+"""What commands make of their arguments: durations, scenes and files."""
