@@ -1,4 +1,4 @@
-"""The JSON schema of scene files says what the code accepts."""
+"""The JSON schema of scene files agrees with the code."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ TYPES: dict[str, tuple[type, ...]] = {
 
 
 def valid(value: Any, schema: dict[str, Any] | bool) -> bool:
-    """JSON Schema's rules, as far as this schema uses them; others are an error."""
-    if isinstance(schema, bool):  # anything goes, or nothing does
+    """Validate by the rules of JSON Schema that this schema uses; other keywords are an error."""
+    if isinstance(schema, bool):  # true accepts everything, false nothing
         return schema
     return all(rule(key, each, value, schema) for key, each in schema.items() if key not in WORDS)
 
@@ -90,7 +90,7 @@ RULES: dict[str, tuple[Any, Callable[[Any, Any, dict[str, Any]], bool]]] = {
         ),
     ),
 }
-"""What each keyword is about, and whether it holds for (value, what is given, the schema)."""
+"""Per keyword: the type to which it applies, and its check of (value, argument, schema)."""
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
@@ -135,7 +135,7 @@ def test_a_written_effect_is_valid_and_each_of_its_keys_is_known(
     ],
     ids=str,
 )
-def test_what_the_code_refuses_the_schema_refuses(wrong: dict[str, Any]) -> None:
+def test_the_schema_refuses_what_the_code_refuses(wrong: dict[str, Any]) -> None:
     data = tomllib.loads((MODELS / "panda_reach.toml").read_text())
     assert not valid(data | wrong, SCHEMA)
 

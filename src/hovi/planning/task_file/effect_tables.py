@@ -1,4 +1,4 @@
-"""The tables [effects.NAME]: each key is a field of the effect's dataclass."""
+"""The tables [effects.NAME], whose keys are the fields of the effect's dataclass."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.schema import Table
 from hovi.robot.robot import Robot
 
-_LARGEST = 1e12
-"""In SI units; the squares of larger numbers overflow."""
+_MAX_NUMBER = 1e12
+"""Largest absolute value of a number, in SI units; the squares of larger ones may overflow."""
 _NUMBERS = {
     float: "finite number",
     int: "whole number",
@@ -40,12 +40,12 @@ _NUMBERS = {
 def read_effects(
     tables: Mapping[str, Mapping[str, Any]], robot: Robot, toml: TomlText
 ) -> list[Effect]:
-    """The effects that a file names, in its order, checked against the robot."""
+    """The effects of a file, in its order, checked against the robot."""
     return [_read_effect(name, table, robot, toml) for name, table in tables.items()]
 
 
 def effect_table(effect: Effect) -> dict[str, Any]:
-    """The table that `read_effects` reads back as this effect."""
+    """The table from which `read_effects` reads this effect."""
     values = {field.name: plain(getattr(effect, field.name)) for field in fields(effect)}
     return {key: value for key, value in values.items() if value is not None}
 
@@ -70,7 +70,7 @@ def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlTe
 
 @functools.cache
 def effect_schema(effect: type[Effect]) -> type[BaseModel]:
-    """The table of an effect: its fields, each with what it must be."""
+    """The schema of an effect's table: its fields, with their types and descriptions."""
     hints = get_type_hints(effect)
     keys: dict[str, Any] = {}
     for field in fields(effect):
@@ -84,14 +84,16 @@ def effect_schema(effect: type[Effect]) -> type[BaseModel]:
 
 
 def _default(field: dataclasses.Field[Any]) -> Any:
-    """What an effect takes where a file says nothing."""
+    """The default value of a field."""
     return field.default if field.default_factory is MISSING else field.default_factory()
 
 
 def _strict(hint: Any) -> Any:
     """The hint with strict, finite scalars; a TOML list may still become a tuple."""
     if hint is float:
-        return Annotated[float, Strict(), AllowInfNan(False), Field(ge=-_LARGEST, le=_LARGEST)]
+        return Annotated[
+            float, Strict(), AllowInfNan(False), Field(ge=-_MAX_NUMBER, le=_MAX_NUMBER)
+        ]
     if hint in (int, str, bool):
         return Annotated[hint, Strict()]
     origin = get_origin(hint)
@@ -104,7 +106,7 @@ def _strict(hint: Any) -> Any:
 
 
 def _strict_union(hint: Any) -> Any:
-    """A union whose member is chosen by what the value is, so that one complaint comes of it."""
+    """A union whose member is chosen by the type of the value, so that there is one error."""
     members = [each for each in get_args(hint) if each is not type(None)]
     if len(members) == 1:
         return _strict(members[0])
@@ -125,7 +127,7 @@ def _tag_of(hint: Any) -> str:
 
 
 def _tag(value: Any) -> str:
-    """The tag of a value that TOML holds."""
+    """The tag of a TOML value."""
     for kind, tag in ((bool, "<bool>"), (dict, "<table>"), ((list, tuple), "<list>")):
         if isinstance(value, kind):
             return tag
@@ -151,7 +153,7 @@ def _in_words(hint: Any) -> str:
 
 
 def plain(value: Any) -> Any:
-    """The value as TOML can hold it."""
+    """The value in types that TOML has."""
     if isinstance(value, Mapping):
         return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):

@@ -1,4 +1,4 @@
-"""[start], [goal] and [[via]]: states and goals of frames, checked against the robot."""
+"""[start], [goal] and [[via]]: states and task-space goals, checked against the robot."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ _OF_FRAMES = ("position", "rpy", "axis")
 
 
 def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
-    """A state, or a goal of a frame."""
+    """A state, or a task-space goal."""
     if goal.frame is None:
         for key in _OF_FRAMES:
             if getattr(goal, key) is not None:
-                raise toml.error((*keys, key), f"`{key}` needs the `frame` that it is about")
+                raise toml.error((*keys, key), f"`{key}` needs a `frame`")
         return read_state(goal, keys, robot, toml)
     for key in ("q", "v", "free", "turns"):
         if getattr(goal, key):
-            raise toml.error((*keys, key), f"a goal of a frame takes no `{key}`: leave it out")
+            raise toml.error((*keys, key), f"a goal of a `frame` takes no `{key}`: leave it out")
     rotation = None if goal.rpy is None else pin.rpy.rpyToMatrix(np.array(goal.rpy))
     axis = None if goal.axis is None else (goal.axis.frame, goal.axis.world)
     free = tuple(goal.free_velocity)
@@ -47,7 +47,7 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
     """The state of [start], [goal] or [[via]]."""
     name = spelled(keys)
     if end.q is None:
-        raise toml.error(keys, f"`{name}` needs q, or a frame and where it is to be")
+        raise toml.error(keys, f"`{name}` needs q, or a frame and its target")
     q = read_configuration(end.q, keys, robot, toml)
     v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, keys, robot, toml)
     free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
@@ -69,12 +69,12 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
 def read_via(
     tables: list[ViaTable], duration: float | tuple[float, float], robot: Robot, toml: TomlText
 ) -> tuple[Via, ...]:
-    """What the motion passes through. duration: in [s], or its bounds."""
+    """The via points. duration: of the motion, in [s], or its bounds."""
     points = []
     for i, table in enumerate(tables):
         longest, time = float(np.max(duration)), _time(table.time, ("via", i, "time"), toml)
         if time >= longest:
-            sentence = f"a via point at {time:g} s is not inside the motion of {longest:g} s"
+            sentence = f"the via point at {time:g} s is not inside the motion of {longest:g} s"
             raise toml.error(("via", i, "time"), sentence)
         goal = read_goal(table, ("via", i), robot, toml)
         try:
@@ -92,7 +92,7 @@ def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
 
 
 def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:
-    """The table that `read_goal` reads back as this goal."""
+    """The table from which `read_goal` reads this goal."""
     if isinstance(goal, State):
         return state_table(goal, robot, "goal")
     table: dict[str, Any] = {"frame": goal.frame}

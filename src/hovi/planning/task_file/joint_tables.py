@@ -1,4 +1,4 @@
-"""Numbers by joint name, as a configuration or a velocity."""
+"""Configurations and velocities from tables of joint names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hovi.robot.robot import Robot
 def read_configuration(
     given: list[float] | dict[str, Any] | str, end: Keys, robot: Robot, toml: TomlText
 ) -> list[float]:
-    """A configuration (nq,): a list, the name of a pose, or a table with every joint.
+    """A configuration (nq,) from a list, the name of a pose, or a table of all joints.
 
     In a table the angle of a continuous joint is one number, in [rad].
     """
@@ -29,7 +29,10 @@ def _by_joint(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText)
     left_out = [joint for joint in robot.joint_names if joint not in by_joint]
     _check_joints(by_joint, (*end, "q"), robot, toml)
     if left_out:
-        raise toml.error((*end, "q"), f"`{spelled(end)}.q` leaves out joint {left_out[0]!r}")
+        raise toml.error(
+            (*end, "q"),
+            f"`{spelled(end)}.q` leaves out joint {left_out[0]!r}; it needs every joint",
+        )
     q: list[float] = []
     for joint in robot.joint_names:
         place = robot.model.joints[robot.model.getJointId(joint)]
@@ -42,7 +45,7 @@ def _by_joint(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText)
 
 
 def read_velocity(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText) -> list[float]:
-    """Joints that are left out stand still."""
+    """A velocity (nv,) from a table of joints; joints that are left out have velocity zero."""
     _check_joints(by_joint, (*end, "v"), robot, toml)
     v: list[float] = []
     for joint in robot.joint_names:
@@ -54,7 +57,7 @@ def read_velocity(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlT
 def _check_joints(by_joint: dict[str, Any], keys: Keys, robot: Robot, toml: TomlText) -> None:
     for joint in by_joint:
         if joint not in robot.joint_names:
-            sentence = f"`{spelled(keys)}` names a joint {joint!r} that the robot does not have; "
+            sentence = f"`{spelled(keys)}` names joint {joint!r}, which the robot does not have; "
             raise toml.error((*keys, joint), sentence + robot.hint(joint))
 
 

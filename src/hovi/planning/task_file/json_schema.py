@@ -1,7 +1,7 @@
-"""The JSON schema of scene files, generated from the tables that check them.
+"""The JSON schema of scene files, generated from the classes that validate them.
 
-Editors complete and check a scene file with it: `hovi schema --out scene.schema.json`, then
-`#:schema scene.schema.json` in the file's first line.
+With it editors complete and check scene files: run `hovi schema --out scene.schema.json` and put
+`#:schema scene.schema.json` into the first line of the file.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema() -> dict[str, Any]:
-    """What a scene file may hold, as a JSON schema of the data that TOML gives."""
+    """The JSON schema of scene files, for the data parsed from TOML."""
     effects: dict[str, Any] = {
         key: (effect_schema(effect) | None, Field(default=None, description=_purpose(effect)))
         for key, effect in REGISTRY.items()
@@ -41,7 +41,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _without_null(part: Any) -> Any:
-    """TOML has no null: what may be left out is no value, and has no default to write."""
+    """The schema without null, which TOML does not have, and without null defaults."""
     if isinstance(part, list):
         return [_without_null(each) for each in part if each != {"type": "null"}]
     if not isinstance(part, dict):

@@ -1,4 +1,4 @@
-"""`limits`: a word, or the table [limits], checked against the robot."""
+"""`limits`: "urdf", "none" or the table [limits], checked against the robot."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_
 from hovi.planning.task_file.schema import LimitsTable
 from hovi.robot.robot import Robot
 
-WORDS = ("urdf", "none")
+NAMES = ("urdf", "none")
 
 
 def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any]:
-    """What `hovi.plan` takes as limits, from what a file says."""
-    if isinstance(given, str) and given in WORDS:
+    """The value of `limits` in a file, as `hovi.plan` accepts it."""
+    if isinstance(given, str) and given in NAMES:
         return given
     if not isinstance(given, dict):
         expected = '"urdf", "none" or a table [limits]'
@@ -37,7 +37,7 @@ def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any
 
 
 def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str | dict[str, Any]:
-    """The word or the table that `read_limits` reads back as these limits."""
+    """The inverse of `read_limits`: a name or a table."""
     if isinstance(limits, str):
         return limits
     if not isinstance(limits, Limits):
@@ -54,7 +54,7 @@ def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str 
 
 
 def _by_joint(value: Any, robot: Robot) -> Any:
-    """A list that holds pairs as a table of joint names, numbers among the pairs and all."""
+    """A list with pairs, and perhaps numbers, as a table of joint names; others unchanged."""
     fits = isinstance(value, list) and len(value) == robot.nv
     if fits and any(isinstance(each, list) for each in value):
         return dict(zip(robot.coordinate_names, value, strict=True))
@@ -62,7 +62,7 @@ def _by_joint(value: Any, robot: Robot) -> Any:
 
 
 def _check_kind(kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
-    """Each joint by itself where joints are named, for the sake of its line."""
+    """Check a kind, joint by joint if joints are named, so that errors have their line."""
     if isinstance(given, dict):
         for joint, bound in given.items():
             _check(("limits", kind, joint), {"base": "none", kind: {joint: bound}}, robot, toml)

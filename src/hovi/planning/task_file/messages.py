@@ -1,4 +1,4 @@
-"""From a position in a TOML file and a pydantic error to one sentence for a person."""
+"""Error messages for TOML files: one sentence with file, line and key, from pydantic's errors."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ _ENTRY = re.compile(r"([A-Za-z0-9_.\"'\- ]+)=")
 
 @dataclass(frozen=True)
 class TomlText:
-    """The text of a TOML file and where it came from."""
+    """The text of a TOML file, and its path."""
 
     path: Path
     text: str
 
     def line(self, keys: Keys) -> int | None:
-        """The line, from 1, of the longest leading part of `keys` that the text spells out."""
+        """The line, from 1, of the longest leading part of `keys` that occurs in the text."""
         wanted = tuple(keys)
         best, where = 0, None
         table: Keys = ()
@@ -62,7 +62,7 @@ class TomlText:
         return where
 
     def error(self, keys: Keys, sentence: str) -> SceneError:
-        """The sentence with file and line in front, ready to be raised."""
+        """A SceneError with file, line and the sentence."""
         line = self.line(keys)
         place = f"{self.path}, line {line}" if line else str(self.path)
         end = "" if sentence.endswith((".", "?")) else "."
@@ -72,10 +72,10 @@ class TomlText:
 def first_sentence(
     invalid: ValidationError, model: type[BaseModel], toml: TomlText, above: Keys = ()
 ) -> SceneError:
-    """The most telling of pydantic's complaints, as one sentence.
+    """The most informative of pydantic's errors, as one sentence.
 
-    Unknown keys come first: a misspelt key is also a missing one.
-    above: the keys of the table that was validated.
+    Unknown keys come first, since a misspelt key is also reported as missing.
+    above: the keys of the validated table.
     """
     details = sorted(invalid.errors(), key=lambda error: error["type"] != "extra_forbidden")[0]
     keys = tuple(key for key in details["loc"] if not str(key).startswith(("<", "dict[", "list[")))
@@ -92,7 +92,7 @@ def first_sentence(
 
 
 def spelled(keys: Iterable[str | int]) -> str:
-    """Keys as a person writes them: start.q[1]."""
+    """Keys in dotted notation: start.q[1]."""
     text = ""
     for key in keys:
         text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else key
@@ -100,12 +100,12 @@ def spelled(keys: Iterable[str | int]) -> str:
 
 
 def in_toml(value: Any) -> str:
-    """A value as TOML spells it, cut to a readable length."""
+    """A value in TOML syntax, truncated to 60 characters."""
     if isinstance(value, bool):
         return str(value).lower()
     try:
         text = f'"{value}"' if isinstance(value, str) else f"{value}"
-    except ValueError:  # Python spells out no more than 4,300 digits
+    except ValueError:  # Python converts at most 4,300 digits
         return "a number of too many digits"
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -113,7 +113,7 @@ def in_toml(value: Any) -> str:
 def _expected(model: type[BaseModel], keys: Keys, details: ErrorDetails) -> str:
     context = details.get("ctx", {})
     bound = context.get("le", context.get("ge"))
-    if isinstance(bound, float) and bound != 0:  # of whatever number an effect holds
+    if isinstance(bound, float) and bound != 0:  # on any number of an effect
         return f"at most {abs(bound):g} in size"
     owner = _model_at(model, keys[:-1])
     field = owner.model_fields.get(str(keys[-1])) if owner else None

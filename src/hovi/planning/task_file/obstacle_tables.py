@@ -15,15 +15,15 @@ from hovi.robot.robot import Robot
 
 
 def read_obstacles(
-    tables: list[dict[str, Any]], kept: Clearance, robot: Robot, toml: TomlText
+    tables: list[dict[str, Any]], clearance_options: Clearance, robot: Robot, toml: TomlText
 ) -> Sequence[Obstacle]:
-    """What stands in the world, checked against the robot's shapes.
+    """The obstacles of a file, checked against the robot's shapes.
 
-    kept: the margin that is kept from it, and whether links keep it from each other.
+    clearance_options: margin and self-collision of the file.
     """
     obstacles = [_obstacle(each, i, toml) for i, each in enumerate(tables)]
     try:
-        clearance = dataclasses.replace(kept, obstacles=obstacles)
+        clearance = dataclasses.replace(clearance_options, obstacles=obstacles)
         if clearance.wanted:
             distances_between(robot, clearance)
     except HoviError as wrong:

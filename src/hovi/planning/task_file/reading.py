@@ -1,4 +1,4 @@
-"""Reading a task file: TOML -> checked tables -> robot, scene and task."""
+"""Reading a scene file: TOML -> validated tables -> robot, scene and task."""
 
 from __future__ import annotations
 
@@ -28,20 +28,21 @@ from hovi.schemes import by_name
 from hovi.system.files import reason, require_file
 
 MAXIMUM_BYTES = 2_000_000
+"""Maximum size of a scene file."""
 MAXIMUM_DOTS = 1_000
-"""Of one line: the time for a dotted key grows with the square of its parts."""
+"""Maximum number of dots in a line; parsing time is quadratic in the parts of a dotted key."""
 
 
 def load_task(path: str | Path) -> Task:
-    """The task that a TOML file describes.
+    """The task of a scene file.
 
-    path: the file; the paths in it are relative to its folder.
-    Raises SceneError with the file, the line, the key, what was expected and what came, and
-    ModelError when the robot cannot be loaded.
+    path: the file; paths in it are relative to its folder.
+    Raises SceneError with file, line, key, expected and given value, and ModelError if the robot
+    cannot be loaded.
     """
     toml = _read_text(Path(path))
     table = _validated(toml)
-    _check_names(table, toml)
+    _check_scheme(table, toml)
     robot, duration = _load_robot(table, toml), _duration(table.duration, toml)
     return Task(
         scene=_scene(table, robot, toml),
@@ -56,7 +57,7 @@ def load_task(path: str | Path) -> Task:
 def _options(
     table: ShapedTable, duration: float | tuple[float, float], robot: Robot, toml: TomlText
 ) -> PlanOptions:
-    """The options that the file names: those of one value as they are, the others from tables."""
+    """The options of a file: single values unchanged, the others from their tables."""
     options = PlanOptions(**{name: getattr(table, name) for name in PLAIN})
     return options.with_changes(
         via=read_via(table.via, duration, robot, toml),
@@ -77,7 +78,7 @@ def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:
 
 
 def _duration(given: Any, toml: TomlText) -> float | tuple[float, float]:
-    """A length of time, or the bounds of one."""
+    """A duration in [s], or the bounds of a free one."""
     try:
         T = as_duration(given)
     except InputError as wrong:
@@ -96,7 +97,7 @@ def _read_text(path: Path) -> TomlText:
     except FileNotFoundError:
         raise SceneError(f"there is no scene file {path}.") from None
     except UnicodeDecodeError:
-        raise SceneError(f"{path}: a scene file is UTF-8 text, and this is not.") from None
+        raise SceneError(f"{path} is not UTF-8 text, as a scene file must be.") from None
     except OSError as refused:
         raise SceneError(f"{path} cannot be read: {reason(refused)}.") from None
 
@@ -104,7 +105,9 @@ def _read_text(path: Path) -> TomlText:
 def _validated(toml: TomlText) -> ShapedTable:
     for number, line in enumerate(toml.text.splitlines(), start=1):
         if line.count(".") > MAXIMUM_DOTS:
-            raise SceneError(f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots.")
+            raise SceneError(
+                f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots in one line."
+            )
     try:
         data = tomllib.loads(toml.text)
     except RecursionError:
@@ -127,8 +130,8 @@ def _syntax_sentence(toml: TomlText, reason: str) -> str:
     return f"{toml.path}, line {line}, column {column}: not valid TOML: {reason[: place.start()]}."
 
 
-def _check_names(table: ShapedTable, toml: TomlText) -> None:
-    """What can be refused before a robot is loaded."""
+def _check_scheme(table: ShapedTable, toml: TomlText) -> None:
+    """Check the name of the scheme, before the robot is loaded."""
     try:
         by_name(table.scheme.name)
     except SchemeError as unknown:

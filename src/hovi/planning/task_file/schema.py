@@ -1,7 +1,7 @@
-"""The keys of a task file and what each of them must be.
+"""The keys of a scene file, with their types and descriptions.
 
-The description of a field ends the sentence "`key` must be ...". Options of a plan that are one
-number, truth value or text are keys by themselves; those of a shape of their own stand here.
+The description of a field completes the message "`key` must be ...". Options of a plan that are a
+single number, boolean or text become keys automatically; options of another form are defined here.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class AxisTable(Table):
 
 
 class GoalTable(Table):
-    """[goal], or what a table [[via]] asks: a state, or a goal of a frame."""
+    """[goal], or the goal of a table [[via]]: a state or a task-space goal."""
 
     q: Configuration | None = Field(
         default=None,
@@ -169,7 +169,7 @@ class LimitsTable(Table):
 
 
 class ShapedTable(Table):
-    """The whole file but the options that are one value each."""
+    """The keys of a file except for the options that are single values."""
 
     robot: str = Field(
         description="the path of a .urdf relative to this file, or a name of example-robot-data"
@@ -190,7 +190,7 @@ class ShapedTable(Table):
     obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
     start: StartTable = Field(description="a table [start] with q and, if moving, v")
     goal: GoalTable = Field(
-        description="a table [goal] with q and, if moving, v, or with a frame and where it is to be"
+        description="a table [goal] with q and, if moving, v, or with a frame and its target"
     )
     via: list[ViaTable] = Field(default=[], description="tables [[via]] with time and a goal")
     scheme: SchemeTable = Field(
@@ -205,11 +205,11 @@ class ShapedTable(Table):
 PLAIN: dict[str, SceneKey] = {
     name: known.key for name, known in option_infos(PlanOptions).items() if known.key is not None
 }
-"""The options that a file holds as one value each."""
+"""The options that are single values in a file."""
 
 
 def _plain_field(name: str) -> tuple[Any, Any]:
-    """The field of an option: of its default's type, with its bounds."""
+    """The field of an option, with the type of its default and its bounds."""
     default, known = getattr(PlanOptions, name), option_infos(PlanOptions)[name]
     kind = FiniteFloat if isinstance(default, float) else type(default)
     must_be, least, most = PLAIN[name].must_be, known.least, known.most

@@ -1,4 +1,4 @@
-"""Task: all that a person says before a motion can be planned."""
+"""Task: a scene, the ends of a motion, its duration and the options of the plan."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ class Task:
     """A planning task, valid once built.
 
     scene: the robot and the effects that act on it.
-    start, goal: the two ends of the motion, q in [rad] or [m], v per second; the goal may be one
-        of a frame.
-    duration: length of the motion, in [s], or the bounds of a free one; a text such as "1.5 s"
-        becomes the number.
-    options: how it is planned; `with_options` changes some of them.
-    name: what the task is called in reports.
-    Raises InputError for numbers that make no task and for options that do not fit the robot.
+    start, goal: the ends of the motion, q in [rad] or [m], v in [rad/s] or [m/s]; the goal may be
+        a FrameGoal.
+    duration: in [s], or the bounds of a free duration; a text such as "1.5 s" is converted.
+    options: of the plan; `with_options` changes some of them.
+    name: of the task in reports.
+    Raises InputError for an invalid duration and for options that do not fit the robot.
     """
 
     scene: Scene
@@ -40,12 +39,14 @@ class Task:
         object.__setattr__(self, "duration", as_duration(self.duration))
         ends = self.duration if isinstance(self.duration, tuple) else (self.duration,)
         if not all(math.isfinite(each) and each > 0 for each in ends):
-            raise InputError(f"duration must be a positive number of seconds, not {self.duration}.")
+            raise InputError(
+                f"the duration must be a positive number of seconds, got {self.duration}."
+            )
         self.options.on(self.scene.robot)
 
     def with_options(self, **changes: Any) -> Self:
         """The task with some of its options changed.
 
-        changes: what PlanOptions takes. Raises InputError for an unknown option.
+        changes: as for PlanOptions. Raises InputError for an unknown option.
         """
         return dataclasses.replace(self, options=self.options.with_changes(**changes))

@@ -1,4 +1,4 @@
-"""plan_task: a task, from a scene file for instance, planned as it says."""
+"""plan_task: plan a task, such as one from a scene file."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from hovi.planning.task_file.task import Task
 
 
 def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> Solution:
-    """The motion that a task asks for: `plan` with all that it says.
+    """Plan a task with its options.
 
-    task: what is planned.
-    progress: called with a line of text and the fraction done.
-    changes: options of `plan` in place of what the task says.
-    Raises what `plan` raises.
+    task: the scene, the ends, the duration and the options.
+    progress: called with a line of text and the completed fraction, in [0, 1].
+    changes: options that override those of the task.
+    Raises as `plan` does.
     """
     ends = task.start, task.goal, task.duration
     return plan(task.scene, *ends, progress=progress, options=task.options, **changes)

@@ -24,18 +24,17 @@ from hovi.schemes import by_name
 from hovi.system.files import reason, whole_file
 
 _TABLES = ("limits", "start", "goal", "via", "obstacles", "scheme")
-"""Keys that may hold tables, in the order in which those are written."""
-_NOTHING: tuple[Any, ...] = (None, [])
+"""Keys that may hold tables, in the order in which the tables are written."""
+_EMPTY: tuple[Any, ...] = (None, [])
 
 
 def save_task(task: Task, path: str | Path) -> Path:
     """Write a task as TOML; returns the path.
 
-    task: what to write.
-    path: the file, replaced whole or not at all; its folder is made. The URDF of a robot that
-        came from a file is written beside it when it is not there yet, its SRDF too.
-    Raises SceneError when the robot has no file, when another file of the same name is there, and
-    for an option that scene files have no key for.
+    path: the file, which is replaced atomically; its folder is created. The URDF and the SRDF of
+        a robot that was loaded from files are written beside it unless they exist.
+    Raises SceneError if the robot has no file, if a different file of that name exists, or for an
+    option that scene files have no key for.
     """
     path = Path(path)
     content = tomlkit.dumps(_document(task, path.parent)).encode("utf-8")
@@ -49,7 +48,7 @@ def save_task(task: Task, path: str | Path) -> Path:
 
 
 def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
-    """The task as TOML, which wants tables behind what is none."""
+    """The task as TOML, in which tables come after plain keys."""
     robot = task.scene.robot
     keys = {
         **_robot_keys(task, folder),
@@ -62,7 +61,7 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     tables = {key: keys[key] for key in _TABLES if _is_table(keys.get(key))}
     document = tomlkit.document()
     for key, value in (plain | tables).items():
-        if value not in _NOTHING:
+        if value not in _EMPTY:
             document[key] = _item(value)
     if task.scene.effects:
         effects = tomlkit.table(is_super_table=True)
@@ -87,7 +86,7 @@ def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
 
 
 def _option_keys(task: Task) -> dict[str, Any]:
-    """The options by key: plain ones by the rule of each, the others by code of their own."""
+    """The options by key: single values by their own rule, and those with a special form."""
     options, robot = task.options, task.scene.robot
     plain = {name: _plain(name, options) for name in PLAIN}
     shaped = {
@@ -102,14 +101,14 @@ def _option_keys(task: Task) -> dict[str, Any]:
     for name in option_infos(PlanOptions):
         if name not in keys and not _is_default(name, options):
             raise SceneError(
-                f"a scene file cannot say {name!r}: give it to hovi.plan_task, and save the task "
-                "without it."
+                f"scene files have no key for option {name!r}: pass it to hovi.plan_task, and save "
+                "the task without it."
             )
     return {name: keys[name] for name in option_infos(PlanOptions) if name in keys}
 
 
 def _plain(name: str, options: PlanOptions) -> Any:
-    """The value that a file names; None where it leaves it out."""
+    """The value to be written; None to leave the key out."""
     key, default = PLAIN[name], getattr(PlanOptions, name)
     named = not _is_default(name, options) if key.written is None else key.written(options)
     return type(default)(getattr(options, name)) if named else None
@@ -121,14 +120,17 @@ def _is_default(name: str, options: PlanOptions) -> bool:
 
 
 def _scheme_name(options: PlanOptions) -> str:
-    """Raises SceneError for a scheme that no name stands for."""
+    """The name of the scheme. Raises SceneError for a custom scheme."""
     name = options.scheme_name
     try:
         known = by_name(name).key == options.table.key
     except SchemeError:
         known = False
     if not known:
-        raise SceneError(f"a scene file cannot hold the numbers of a scheme of your own, {name!r}.")
+        raise SceneError(
+            f"scene files cannot store the custom scheme {name!r}: pass it to hovi.plan_task, and "
+            "save the task without it."
+        )
     return name
 
 
@@ -137,12 +139,12 @@ def _duration(duration: float | tuple[float, float]) -> float | list[float]:
 
 
 def _is_table(value: Any) -> bool:
-    """Whether TOML calls it a table, or a list of tables."""
+    """Whether TOML stores a value as a table or an array of tables."""
     return isinstance(value[0] if isinstance(value, list) and value else value, dict)
 
 
 def _item(value: Any) -> Any:
-    """A value as TOML holds it."""
+    """A value as a TOML item."""
     if not _is_table(value):
         return value
     if isinstance(value, list):
@@ -157,15 +159,15 @@ def _item(value: Any) -> Any:
 
 
 def _relative(source: RobotSource, folder: Path) -> list[str]:
-    """Package folders as a file in `folder` names them."""
+    """Package folders relative to `folder`."""
     return [os.path.relpath(each, folder.resolve()) for each in source.package_dirs]
 
 
 def _keep_robot_beside(source: RobotSource, path: Path) -> None:
     if source.kind == "model":
         raise SceneError(
-            "a robot given as a pinocchio.Model has no file that a task file can name; "
-            "load it from a URDF to save the task."
+            "a robot from a pinocchio.Model has no file to which a scene file can refer; load it "
+            "from a URDF to save the task."
         )
     if source.kind == "urdf" and source.urdf is not None:
         _keep_beside(path.parent / Path(source.reference).name, source.urdf, "URDF")
@@ -179,14 +181,16 @@ def _keep_beside(file: Path, text: str, what: str) -> None:
     if not file.exists():
         _write(file, content)
     elif file.read_bytes() != content:
-        raise SceneError(f"{file} is another {what} than the task's; choose another folder.")
+        raise SceneError(
+            f"{file} exists and differs from the task's {what}; choose another folder."
+        )
 
 
 def _own_srdf(source: RobotSource) -> str | None:
-    """The text of the SRDF, unless it is the one that comes with an example robot."""
+    """The text of the SRDF, unless it is that of an example robot."""
     if source.kind == "example" and source.srdf is not None:
-        theirs = example_robot(source.reference).srdf
-        return None if theirs and read_srdf_file(theirs) == source.srdf else source.srdf
+        shipped = example_robot(source.reference).srdf
+        return None if shipped and read_srdf_file(shipped) == source.srdf else source.srdf
     return source.srdf
 
 
