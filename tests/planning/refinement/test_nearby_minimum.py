@@ -112,9 +112,9 @@ def test_far_from_a_minimum_nothing_is_found(arm_scene: Scene) -> None:
 def test_efforts_interpolated_to_the_same_points_are_the_torques_there(ur5: Solution) -> None:
     assert ur5.problem is not None
     ld = ur5.problem.ld
-    (carried,) = interpolated_slopes(ld, ur5.trajectory.path, ld)
+    (interpolated,) = interpolated_slopes(ld, ur5.trajectory.path, ld)
     (tau,) = ActionObjective(ur5.problem).outputs(ur5.trajectory.path)
-    np.testing.assert_allclose(carried, tau, atol=1e-10 * np.abs(tau).max())
+    np.testing.assert_allclose(interpolated, tau, atol=1e-10 * np.abs(tau).max())
 
 
 def test_interpolated_slopes_are_nearer_to_the_right_ones(ur5: Solution) -> None:
@@ -124,8 +124,8 @@ def test_interpolated_slopes_are_nearer_to_the_right_ones(ur5: Solution) -> None
     objective = ActionObjective(problem)
     (right,) = objective.outputs(solve(problem, path).trajectory.path)
     (own,) = objective.outputs(path)
-    (carried,) = interpolated_slopes(ur5.problem.ld, ur5.trajectory.path, problem.ld)
-    assert np.abs(carried - right).max() < 0.2 * np.abs(own - right).max()
+    (interpolated,) = interpolated_slopes(ur5.problem.ld, ur5.trajectory.path, problem.ld)
+    assert np.abs(interpolated - right).max() < 0.2 * np.abs(own - right).max()
 
 
 def test_a_grid_of_other_intervals_and_degrees_sees_the_same_torques(arm_scene: Scene) -> None:
@@ -135,10 +135,10 @@ def test_a_grid_of_other_intervals_and_degrees_sees_the_same_torques(arm_scene: 
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
     motion = solve(problem).trajectory
     other = DiscreteLagrangian(lagrangian, Grid(np.full(5, 0.2), (galerkin(2),) * 5))
-    (carried,) = interpolated_slopes(ld, motion.path, other)
+    (interpolated,) = interpolated_slopes(ld, motion.path, other)
     tau = motion.sample(other.point_times[0]).tau
     scale = np.abs(tau).max()
-    np.testing.assert_allclose(carried, np.array([1.0, 3.0]) * tau, atol=0.01 * scale)
+    np.testing.assert_allclose(interpolated, np.array([1.0, 3.0]) * tau, atol=0.01 * scale)
 
 
 def test_a_hessian_weighted_so_stays_definite_beside_a_minimum() -> None:

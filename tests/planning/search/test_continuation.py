@@ -111,7 +111,7 @@ def test_a_deadline_ends_the_continuation_with_the_best_so_far(job: Job, failed:
     assert "Continuation in inertia was ended by time_limit" in late.message
 
 
-@pytest.mark.parametrize("where", ["within a rung", "between two"])
+@pytest.mark.parametrize("where", ["within a stage", "between two"])
 def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     job: Job, failed: Solution, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:

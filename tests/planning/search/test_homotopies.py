@@ -64,7 +64,7 @@ def test_rotors_fall_from_more_than_every_link_to_less_than_any(job: Job, limite
     q = np.array(job.start.q)
     M = pin.crba(job.scene.model, job.scene.model.createData(), q)
     M = np.triu(M) + np.triu(M, 1).T
-    rotors = [rung.job.scene.model.armature for rung in lighter_rotors(job)]
+    rotors = [stage.job.scene.model.armature for stage in lighter_rotors(job)]
     assert np.ptp(rotors, axis=1).max() == 0
     sizes = np.array(rotors)[:, 0]
     assert sizes[0] == pytest.approx(10 * M.diagonal().max())
@@ -76,14 +76,14 @@ def test_rotors_fall_from_more_than_every_link_to_less_than_any(job: Job, limite
 
 
 def test_gravity_increases_from_zero_if_there_is_any(job: Job) -> None:
-    pulls = [-rung.job.scene.model.gravity.linear[2] for rung in growing_gravity(job)]
+    pulls = [-stage.job.scene.model.gravity.linear[2] for stage in growing_gravity(job)]
     np.testing.assert_allclose(pulls, 9.8 * np.array([0, 0.25, 0.5, 0.75]))
     floating = dataclasses.replace(job, scene=Scene(job.scene.robot))
     assert growing_gravity(floating) == []
 
 
 def test_intervals_are_doubled_up_to_those_of_the_job(job: Job) -> None:
-    grids = [rung.job.grid for rung in finer_grids(job)]
+    grids = [stage.job.grid for stage in finer_grids(job)]
     assert [grid.intervals for grid in grids] == [7, 13, 25]
     assert {scheme.name for grid in grids for scheme in grid.schemes} == {"galerkin-2"}
     assert all(grid.duration == pytest.approx(1.0) for grid in grids)
@@ -96,22 +96,22 @@ def test_another_duration_without_gravity_is_the_same_motion(job: Job) -> None:
     grid = Grid.uniform(1.0, 8, galerkin(2))
     floating = dataclasses.replace(job, scene=Scene(job.scene.robot), grid=grid)
     whole = solve(floating.problem())
-    for rung, share in zip(other_durations(floating), (0.125, 0.25, 0.5), strict=True):
-        other = solve(rung.job.problem(), whole.trajectory)
+    for stage, share in zip(other_durations(floating), (0.125, 0.25, 0.5), strict=True):
+        other = solve(stage.job.problem(), whole.trajectory)
         assert other.cost == pytest.approx(whole.cost / share**3, rel=1e-9)
         np.testing.assert_allclose(other.trajectory.q, whole.trajectory.q, atol=1e-7)
 
 
 def test_durations_are_shorter_without_limits_and_longer_with_them(job: Job, limited: Job) -> None:
-    assert [rung.job.grid.duration for rung in other_durations(job)] == [0.125, 0.25, 0.5]
-    longer = [rung.job.grid.duration for rung in other_durations(limited)]
+    assert [stage.job.grid.duration for stage in other_durations(job)] == [0.125, 0.25, 0.5]
+    longer = [stage.job.grid.duration for stage in other_durations(limited)]
     np.testing.assert_allclose(longer, [2, 1.5, 1.25, 1.1])
 
 
 def test_limits_narrow_about_their_centers(job: Job, limited: Job) -> None:
     assert narrowing_limits(job) == []
-    rungs = narrowing_limits(limited)
+    stages = narrowing_limits(limited)
     shares = np.array([8, 4, 2, 1.5, 1.25, 1.1])
-    np.testing.assert_allclose([rung.job.limits.upper[1, 0] for rung in rungs], 5 * shares)
-    np.testing.assert_allclose([rung.job.limits.lower[3, 1] for rung in rungs], -20 * shares)
-    assert all(np.array_equal(r.job.limits.bounded, limited.limits.bounded) for r in rungs)
+    np.testing.assert_allclose([stage.job.limits.upper[1, 0] for stage in stages], 5 * shares)
+    np.testing.assert_allclose([stage.job.limits.lower[3, 1] for stage in stages], -20 * shares)
+    assert all(np.array_equal(r.job.limits.bounded, limited.limits.bounded) for r in stages)

@@ -102,9 +102,9 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
     excess = excess_along(trajectory, limits)
     above = excess.upper.max() >= excess.lower.max()
     side = excess.upper if above else excess.lower
-    place = excess.at_upper if above else excess.at_lower
+    position = excess.at_upper if above else excess.at_lower
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
-    s = float(place[k, kind, joint])
+    s = float(position[k, kind, joint])
     value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
     bound = (limits.upper if above else limits.lower)[kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]

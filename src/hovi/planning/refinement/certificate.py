@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 MORE_POINTS = 6
-"""Gauss points that the integral along the interpolant takes besides those of the scheme."""
+"""Gauss points of the integral along the interpolant in addition to those of the scheme."""
 PEAK_SAMPLES = 33
 """Samples per interval for peak torques and velocities, both ends included."""
 

@@ -35,12 +35,12 @@ def _by_joint(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText)
         )
     q: list[float] = []
     for joint in robot.joint_names:
-        place = robot.model.joints[robot.model.getJointId(joint)]
+        joint_model = robot.model.joints[robot.model.getJointId(joint)]
         given = by_joint[joint]
-        if (place.nq, place.nv) == (2, 1) and not isinstance(given, list):
+        if (joint_model.nq, joint_model.nv) == (2, 1) and not isinstance(given, list):
             q += [math.cos(given), math.sin(given)]
         else:
-            q += _numbers(given, place.nq, (*end, "q", joint), toml)
+            q += _numbers(given, joint_model.nq, (*end, "q", joint), toml)
     return q
 
 
