@@ -210,8 +210,8 @@ def test_the_command_reports_the_deviation(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--feedback", "pd"], "--feedback holds a motion to a plan"),
-        (["--plan", "PLAN", "--duration", "1"], "--duration does not go with --plan"),
+        (["--feedback", "pd"], "--feedback needs a plan to track"),
+        (["--plan", "PLAN", "--duration", "1"], "--duration cannot be combined with --plan"),
         (["--plan", "PLAN", "--feedback", "pdd"], "no feedback 'pdd': did you mean 'pd'"),
         (["--plan", "nowhere.npz"], "no trajectory file 'nowhere.npz'"),
     ],
