@@ -73,7 +73,7 @@ class Grid:
         return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
 
     def enriched(self, modes: int) -> Grid:
-        """The same intervals with `modes` additional inner modes each.
+        """The same intervals with `modes` additional inner modes and points each.
 
         Raises InputError if an interval would have too many.
         """
@@ -82,7 +82,7 @@ class Grid:
                 f"errors are estimated for schemes of up to {MAX_INNER_MODES - modes} inner "
                 f"modes, not {self.inner_modes}; use more intervals instead."
             )
-        tables = {id(s): galerkin(s.inner_modes + modes) for s in set(self.schemes)}
+        tables = {id(s): _enriched(s, modes) for s in set(self.schemes)}
         return Grid(self.steps, tuple(tables[id(s)] for s in self.schemes))
 
     @property
@@ -143,6 +143,12 @@ class Grid:
     def inner_modes(self) -> int:
         """The largest number of inner modes of an interval."""
         return max(scheme.inner_modes for scheme, _ in self.groups)
+
+
+def _enriched(scheme: Scheme, modes: int) -> Scheme:
+    """The Galerkin table with more modes, and as many points besides as the scheme has."""
+    r = scheme.inner_modes + modes
+    return galerkin(r, points=max(r + 2, len(scheme.points) + modes))
 
 
 def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.intp]], ...]:

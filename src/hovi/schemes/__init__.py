@@ -29,21 +29,25 @@ CLASSIC: dict[str, Callable[[], Scheme]] = {
     "trapezoid-difference": trapezoid_difference,
     "hermite-simpson": hermite_simpson,
 }
-FAMILIES: dict[str, Callable[[int], Scheme]] = {"galerkin": galerkin}
-"""By the number of inner modes."""
+FAMILIES: dict[str, Callable[[int, int, int | None], Scheme]] = {"galerkin": galerkin}
+"""By the number of inner modes, the order of the Lagrangian and the number of points."""
+
+_MEMBER = re.compile(r"(.+?)-(\d{1,4})(?:x(\d{1,4}))?(?:-k([1-9]))?")
 
 
 def by_name(name: str) -> Scheme:
     """The scheme with a name, as in files and on the command line.
 
-    name: one of CLASSIC, or `FAMILY-R` with R inner modes, as `galerkin-2`. Raises SchemeError
-        for an unknown name.
+    name: one of CLASSIC; `FAMILY-R` with R inner modes, as `galerkin-2`; `FAMILY-RxQ` with Q
+        points as well, as `galerkin-2x8`. Both with `-kK` for Lagrangians of an order other than 2.
+    Raises SchemeError for an unknown name.
     """
     if name in CLASSIC:
         return CLASSIC[name]()
-    match = re.fullmatch(r"(.+)-(\d{1,4})", name)
-    if match and match.group(1) in FAMILIES:
-        return FAMILIES[match.group(1)](int(match.group(2)))
+    match = _MEMBER.fullmatch(name)
+    if match and match[1] in FAMILIES:
+        points = None if match[3] is None else int(match[3])
+        return FAMILIES[match[1]](int(match[2]), int(match[4] or 2), points)
     known = [*CLASSIC, *(f"{family}-{modes}" for family in FAMILIES for modes in range(4))]
     raise SchemeError(f"there is no scheme {name!r}: {nearest(name, known)}")
 

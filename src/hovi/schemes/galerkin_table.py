@@ -1,4 +1,4 @@
-"""The Galerkin family: a table for every number of inner modes and order of the Lagrangian."""
+"""The Galerkin family: a table for every number of inner modes and points, and every order k."""
 
 from __future__ import annotations
 
@@ -14,15 +14,22 @@ from hovi.schemes.scheme import Scheme
 
 MAX_INNER_MODES = 40
 MAX_DERIVATIVES = 4
+MAX_POINTS = 100
+"""Gauss points of an interval."""
 
 
-def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
-    """A polynomial k-th derivative with r inner modes, and r + k Gauss points.
+def galerkin(inner_modes: int = 2, derivatives: int = 2, points: int | None = None) -> Scheme:
+    """A polynomial k-th derivative with r inner modes, integrated with Q Gauss points.
 
-    The order at the nodes is 2 (r + k): 4, 6, 8, 10, ... for k = 2.
+    The degree of the curve and the number of quadrature points are chosen apart
+    [OberBloebaumSaake2015]. The order of the nodes is 2 (r + k) for every Q >= r + k: 4, 6, 8, 10,
+    ... for k = 2. With Q = r + k an interval has as many points as its k-th derivative has
+    coefficients, and on coarse grids the integrand may vanish at the points and swing between them;
+    with more of them the action is nearly the integral along the curve.
 
-    inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian, from 1 to 4: 1 for
-        mechanics, 2 for torques and accelerations, 3 for jerk. Raises SchemeError otherwise.
+    inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian: 1 for mechanics, 2
+        for torques and accelerations, 3 for jerk. points: Q, from r + k to 100; r + k when None.
+    Raises SchemeError otherwise.
     """
     if not (isinstance(inner_modes, Integral) and 0 <= inner_modes <= MAX_INNER_MODES):
         raise SchemeError(
@@ -34,17 +41,24 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2) -> Scheme:
             f"a Galerkin scheme is for Lagrangians of order 1 to {MAX_DERIVATIVES}, "
             f"got {derivatives!r}."
         )
-    return _table(int(inner_modes), int(derivatives))
+    fewest = int(inner_modes) + int(derivatives)
+    points = fewest if points is None else points
+    if not (isinstance(points, Integral) and fewest <= points <= MAX_POINTS):
+        raise SchemeError(
+            f"a Galerkin scheme with {inner_modes} inner modes has {fewest} to {MAX_POINTS} "
+            f"quadrature points, got {points!r}."
+        )
+    return _table(int(inner_modes), int(derivatives), int(points))
 
 
 @cache
-def _table(inner_modes: int, derivatives: int) -> Scheme:
+def _table(inner_modes: int, derivatives: int, count: int) -> Scheme:
     """The scheme, cached since schemes are immutable."""
-    x, w = np.polynomial.legendre.leggauss(inner_modes + derivatives)
+    x, w = np.polynomial.legendre.leggauss(count)
     points, weights = (x + 1) / 2, w / 2
-    order = 2 * (inner_modes + derivatives)
+    fewest = inner_modes + derivatives
+    name = f"galerkin-{inner_modes}" + (f"x{count}" if count > fewest else "")
     if derivatives == 2:
-        table = interval_rows(points, inner_modes)
-        return Scheme(f"galerkin-{inner_modes}", order, points, weights, table)
+        return Scheme(name, 2 * fewest, points, weights, interval_rows(points, inner_modes))
     table = jet_rows(points, derivatives, inner_modes)
-    return Scheme(f"galerkin-{inner_modes}-k{derivatives}", order, points, weights, table)
+    return Scheme(f"{name}-k{derivatives}", 2 * fewest, points, weights, table)
