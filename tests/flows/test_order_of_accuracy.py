@@ -125,11 +125,13 @@ def nonlinear(k: int) -> CasadiLagrangian:
         (3, 0, [0.14, 0.1, 0.07]),
     ],
 )
-def test_galerkin_has_order_2_r_plus_k_for_lagrangians_of_any_order(
-    k: int, r: int, steps: list[float]
+@pytest.mark.parametrize("more", [0, 1, 4])
+def test_galerkin_has_order_2_r_plus_k_with_any_number_of_points(
+    k: int, r: int, steps: list[float], more: int
 ) -> None:
     starts = 0.7 * np.random.default_rng(k).normal(size=(2 * k, SEGMENTS, 2))
-    measured = variational_order(nonlinear(k), galerkin(r, k), steps, *starts)
+    scheme = galerkin(r, k, points=r + k + more)
+    measured = variational_order(nonlinear(k), scheme, steps, *starts)
     assert measured.order == pytest.approx(2 * (r + k), abs=0.3)
 
 

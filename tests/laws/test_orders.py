@@ -90,6 +90,9 @@ def slope(intervals: Sequence[int], errors: Sequence[float]) -> float:
         ("galerkin-0", (32, 48, 64, 96, 128), 4),
         ("galerkin-1", (24, 32, 40, 48, 64), 6),
         ("galerkin-2", (32, 40, 48, 56), 8),
+        ("galerkin-0x4", (48, 64, 96, 128, 192), 4),
+        ("galerkin-1x5", (32, 40, 48, 64, 96), 6),
+        ("galerkin-2x6", (32, 40, 48, 56), 8),
     ],
 )
 def test_nodes_momenta_and_cost_have_the_order_of_the_scheme(

@@ -31,7 +31,10 @@ Array = npt.NDArray[np.float64]
 Effort = Callable[[Array, Array, Array], float]
 Polynomial = list[Fraction]  # coefficients of 1, s, s^2, ...
 
-ALL = [*CLASSIC, "galerkin-0", "galerkin-1", "galerkin-2", "galerkin-5", "galerkin-20"]
+ALL = [
+    *CLASSIC,
+    *(f"galerkin-{each}" for each in ("0", "0x3", "1", "2", "2x8", "5", "20")),
+]
 POINTS = np.linspace(0.0, 1.0, 33)  # exact in binary
 
 
@@ -113,6 +116,41 @@ def test_a_galerkin_table_holds_the_rows_at_its_points(r: int) -> None:
     scheme = galerkin(r)
     np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
     assert (len(scheme.points), scheme.inner_modes, scheme.order) == (r + 2, r, 2 * (r + 2))
+
+
+@pytest.mark.parametrize(("r", "k", "Q"), [(0, 2, 3), (2, 2, 8), (1, 1, 2), (1, 1, 6), (2, 3, 7)])
+def test_points_are_chosen_apart_from_modes(r: int, k: int, Q: int) -> None:
+    scheme = galerkin(r, k, points=Q)
+    assert (len(scheme.points), scheme.inner_modes, scheme.order) == (Q, r, 2 * (r + k))
+    np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
+    degrees = np.arange(2 * Q)
+    quadrature = scheme.weights @ scheme.points[:, None] ** degrees
+    np.testing.assert_allclose(quadrature, 1 / (degrees + 1), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("name", "r", "k", "Q"),
+    [
+        ("galerkin-2", 2, 2, 4),
+        ("galerkin-2x8", 2, 2, 8),
+        ("galerkin-1-k3", 1, 3, 4),
+        ("galerkin-1x6-k1", 1, 1, 6),
+    ],
+)
+def test_names_say_modes_points_and_order(name: str, r: int, k: int, Q: int) -> None:
+    scheme = by_name(name)
+    assert scheme.name == name
+    assert scheme.key == galerkin(r, k, points=Q).key
+
+
+def test_as_many_points_as_modes_and_ends_are_the_table_of_always() -> None:
+    assert galerkin(2, points=4) is galerkin(2)
+
+
+@pytest.mark.parametrize("Q", [3, 101, 4.0])
+def test_too_few_or_too_many_points_are_refused(Q: int) -> None:
+    with pytest.raises(SchemeError, match=f"4 to 100 quadrature points, got {Q}"):
+        galerkin(2, points=Q)
 
 
 # Lagrangians of other orders
