@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+import hovi
+from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
 from hovi.flows.dynamics_replay import replay_dynamics
-from hovi.planning.refinement.certificate import certify, cost_integral, momentum_jump
+from hovi.planning.refinement.certificate import certify, momentum_jump
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
@@ -139,9 +141,26 @@ def test_the_integral_is_that_of_the_torques_along_the_curve(arm_scene: Scene) -
         quad(density, a, b, epsabs=1e-12)[0] for a, b in zip(motion.t, motion.t[1:], strict=False)
     ]
     assert solution.problem is not None
-    found = cost_integral(solution.problem, motion)
-    assert found == pytest.approx(sum(pieces), rel=1e-9)
-    assert abs(found - solution.cost) > 1e-4 * solution.cost
+    found = integral_along(solution.problem.ld.lagrangian, motion)
+    assert found.value == pytest.approx(sum(pieces), rel=1e-9)
+    assert abs(found.value - sum(pieces)) <= found.error
+    assert abs(found.value - solution.cost) > 1e-4 * solution.cost
+
+
+def test_the_bound_is_above_the_minimum_on_every_grid(arm_scene: Scene) -> None:
+    costs = [reach(arm_scene, scheme="galerkin-4", intervals=64).cost]
+    for scheme in ("galerkin-0", "galerkin-2", "galerkin-2x6"):
+        for intervals in (4, 8, 16):
+            found = certify(reach(arm_scene, scheme=scheme, intervals=intervals), estimate=False)
+            assert found.bound is not None
+            assert found.bound >= costs[0] * (1 - 1e-12)
+
+
+def test_there_is_no_bound_where_the_curve_is_not_admissible() -> None:
+    task = hovi.load_task(hovi.example("cart_pole_swing_up"))
+    found = certify(hovi.plan_task(task), estimate=False)
+    assert found.bound is None
+    assert "met at points only" in found.missing["bound"]
 
 
 def test_the_equations_hold_at_a_solution_and_not_elsewhere(

@@ -27,6 +27,8 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     return {
         "action": certificate.action,
         "integral": certificate.integral,
+        "integral_error": certificate.integral_error,
+        "bound": certificate.bound,
         "errors": None if errors is None else errors_json(errors),
         "hamiltonian": None if energy is None else energy.mean,
         "hamiltonian_spread": None if energy is None else energy.spread,
@@ -49,6 +51,8 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
             f"{certificate.integral:.10g}",
         ),
     ]
+    if certificate.bound is not None:
+        lines.append(("bound", f"this minimum costs at most {certificate.bound:.10g}"))
     if COARSE_GAP < _gap(certificate) <= INVALID_COST_GAP:
         lines.append(
             (

@@ -9,10 +9,12 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.curve_integral import CurveIntegral, integral_along
 from hovi.discrete.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.dynamics_replay import DynamicsReplay, replay_dynamics
+from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
@@ -23,8 +25,6 @@ from hovi.system.interruption import interruptible
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 
-MORE_POINTS = 6
-"""Gauss points of the integral along the interpolant in addition to those of the scheme."""
 PEAK_SAMPLES = 33
 """Samples per interval for peak torques and velocities, both ends included."""
 
@@ -48,7 +48,10 @@ class Certificate:
 
     status: of the solve. n_neg: negative eigenvalues of the action's Hessian.
     action: the discrete action of L~, which is the plan's cost. integral: of L~ along the
-        interpolant, by a finer quadrature.
+        interpolant, by a quadrature that the scheme does not use. integral_error: of the
+        quadrature.
+    bound: upper bound of the cost of this local minimum, the integral plus its error: for a curve
+        that meets all constraints, since no such curve nearby costs less than the minimum.
     errors: estimates of the distance from the motion that the plan approximates.
     hamiltonian: Pontryagin's, at the nodes.
     residual: largest jump of the momenta at an inner node, relative to the largest momentum.
@@ -61,6 +64,8 @@ class Certificate:
     n_neg: int
     action: float
     integral: float
+    integral_error: float
+    bound: float | None
     errors: MotionError | None
     hamiltonian: NodalHamiltonian | None
     residual: float | None
@@ -99,11 +104,14 @@ def certify(solution: Solution, frame: str | None = None, *, estimate: bool = Tr
             return None
 
     torque, velocity = _peaks(trajectory)
+    integral = integral_along(problem.ld.lagrangian, trajectory)
     return Certificate(
         status=solution.status,
         n_neg=solution.n_neg,
         action=problem.ld.action(trajectory.path),
-        integral=cost_integral(problem, trajectory),
+        integral=integral.value,
+        integral_error=integral.error,
+        bound=checked("bound", lambda: _upper_bound(solution, problem, integral)),
         errors=checked("errors", lambda: _errors(solution, frame, estimate)),
         hamiltonian=checked("hamiltonian", lambda: nodal_hamiltonian(problem, trajectory)),
         residual=checked("residual", lambda: momentum_jump(problem, trajectory)),
@@ -114,15 +122,19 @@ def certify(solution: Solution, frame: str | None = None, *, estimate: bool = Tr
     )
 
 
-def cost_integral(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
-    """The integral of L~ along the interpolant, by Gauss quadrature on every interval."""
-    grid = trajectory.grid
-    x, w = np.polynomial.legendre.leggauss(grid.inner_modes + 2 + MORE_POINTS)
-    k = np.repeat(np.arange(grid.intervals), len(x))
-    s = np.tile((x + 1) / 2, grid.intervals)
-    q, v, a = trajectory.jet_intervals(k, s)
-    values = problem.ld.lagrangian.value(q, v, a, t=trajectory.t[k] + s * grid.steps[k])
-    return float(grid.steps @ (values.reshape(grid.intervals, -1) @ (w / 2)))
+def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: CurveIntegral) -> float:
+    """integral + error. Raises InputError where the curve does not meet what was asked."""
+    if not solution.success:
+        raise InputError(f"the motion is no minimum but ended in {solution.status}")
+    if problem.constrained:
+        raise InputError("passive joints and conditions are met at points only")
+    if problem.distances is not None:
+        raise InputError("the distances along the curve are known to a tolerance only")
+    if problem.limits is not None and problem.limited:
+        excess = excess_along(solution.trajectory, problem.limits).worst
+        if excess > problem.limits.tolerance:
+            raise InputError(f"the curve exceeds a limit by {excess:.1e} of its range")
+    return integral.upper_bound
 
 
 def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
