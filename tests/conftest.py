@@ -39,6 +39,14 @@ def ur5() -> Robot:
 
 
 @pytest.fixture(scope="session")
+def two_arms() -> Robot:
+    """Baxter with two joints of each arm, all others locked; its file ends at a fixed sensor."""
+    moving = {f"{side}_{joint}" for side in ("left", "right") for joint in ("s1", "e1")}
+    locked = [joint for joint in load_robot("baxter").joint_names if joint not in moving]
+    return load_robot("baxter", locked=locked)
+
+
+@pytest.fixture(scope="session")
 def pendulum() -> Robot:
     """One joint under a bob of one kilogram."""
     return load_robot(MODELS / "pendulum.urdf")

@@ -84,6 +84,24 @@ def test_errors_are_in_radians_and_metres(pendulum: Robot) -> None:
     assert error.frame == pendulum.tip_frame
 
 
+def test_of_several_tips_the_largest_error_counts(two_arms: Robot) -> None:
+    def still(t: Array) -> Array:
+        return np.zeros((len(t), 4))
+
+    def turned(t: Array) -> Array:
+        return np.where(t[:, None] > 0.5, [1e-3, 0.0, 0.0, 2e-3], 0.0)
+
+    error = ReferenceMotion(two_arms, 1.0, still, 1.0).error(1.0, turned)
+    ends = still(np.ones(1)), turned(np.ones(1))
+    left, right = (
+        np.linalg.norm(np.subtract(*(two_arms.frame_position(frame, q) for q in ends)))
+        for frame in ("left_gripper", "right_gripper")
+    )
+    worst = "left_gripper" if left > right else "right_gripper"
+    assert (error.frame, error.largest_tip) == (worst, pytest.approx(max(left, right), rel=1e-12))
+    assert error.tip_at_nodes == pytest.approx([0.0, max(left, right)], rel=1e-12)
+
+
 @pytest.mark.parametrize("cost", [math.inf, math.nan])
 def test_a_non_finite_cost_has_infinite_errors(pendulum: Robot, cost: float) -> None:
     reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
@@ -111,7 +129,7 @@ def test_files_and_figures_show_tip_errors_in_millimetres(reach: Diagram) -> Non
     for choice, each in zip(data["choices"], reach.choices, strict=True):
         assert choice["error"]["tip"] == 1e3 * each.error.largest_tip
     panel = work_precision_figure(reach).axes[2]
-    assert panel.get_ylabel() == "largest error of the tip [mm]"
+    assert panel.get_ylabel() == "largest error at tip [mm]"
     shown = panel.lines[0].get_ydata()
     counted = [1e3 * each.error.largest_tip for each in reach.of(SCHEMES[0]) if each.counts]
     np.testing.assert_array_equal(shown, np.maximum(counted, 1e-16))

@@ -158,7 +158,7 @@ def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
     assert fields["grids"][-1]["intervals"] == fields["intervals"]
     assert fields["grids"][-1]["error"] < 1e-2 * fields["grids"][0]["error"]
     _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm")
-    assert re.search(r"estimated error \S+ mm at the tip, tolerance 0.1 mm at the tip", out)
+    assert re.search(r"estimated error \S+ mm at tool0, tolerance 0.1 mm at tool0", out)
     assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.integrate import solve_ivp
 from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
-from hovi.effects import Gravity, Payload, ViscousFriction
+from hovi.effects import Gravity, Payload, ViscousFriction, Wrench
 from hovi.errors import InputError
 from hovi.flows.controllers import FEEDBACKS, Controller, OpenLoop, controller
 from hovi.flows.simulator import simulate
@@ -197,6 +198,7 @@ def test_the_command_reports_the_deviation(
     held = json.loads(capsys.readouterr().out)
     assert (loose["feedback"], held["feedback"], held["bandwidth"]) == ("none", "pd", 30.0)
     assert loose["tip_deviation_end"] > 5 * held["tip_deviation_end"] > 0
+    assert (loose["tip_frame_end"], loose["tip_frame_max"]) == ("tip", "tip")
     assert loose["work_of_effects"] < 0
     assert loose["energy_error"] < 1e-4
     assert main(arguments) == 0
@@ -204,7 +206,7 @@ def test_the_command_reports_the_deviation(
     assert main([*arguments, "--feedback", "computed-torque"]) == 0
     text = capsys.readouterr().out
     assert "feedback: computed-torque of 10 rad/s" in text
-    assert "mm at the end" in text
+    assert re.search(r"^tip is off by \S+ mm at the end, tip by \S+ mm at most$", text, re.M)
 
 
 @pytest.mark.parametrize(
@@ -226,6 +228,18 @@ def test_the_command_refuses_in_one_sentence(
     given = [motion if each == "PLAN" else each for each in arguments]
     assert main(["simulate", scene, *given]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_of_several_tips_the_one_that_strays_most_is_told(two_arms: Robot) -> None:
+    scene = Scene(two_arms, [Gravity()])
+    ends = State(two_arms.neutral()), State(two_arms.neutral() + 0.2)
+    motion = plan(scene, *ends, 0.5, limits="none").trajectory
+    pushed = Scene(two_arms, [Gravity(), Wrench("right_gripper", (0.0, 0.0, 5.0))])
+    distance = play(pushed, motion).tip_distance
+    assert distance.frames == ("left_gripper", "right_gripper")
+    assert distance.each[:, 0].max() < 1e-4 < distance.each[-1, 1]
+    assert distance.frame == distance.frame_at(-1) == "right_gripper"
+    np.testing.assert_array_equal(play(pushed, motion).tip_deviation, distance.each.max(axis=1))
 
 
 def test_open_loop_is_a_controller(planned: Trajectory) -> None:

@@ -101,6 +101,7 @@ class Diagram:
             "resolved": {
                 "scheme": self.resolved.scheme,
                 "intervals": self.resolved.intervals,
+                "tip_frames": list(self.resolved.tip_frames),
                 "cost": self.resolved.cost,
                 "uncertainty": shown_sizes(self.resolved.uncertainty),
             },

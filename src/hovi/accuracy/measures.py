@@ -13,7 +13,7 @@ _SIZES: dict[str, Callable[[MotionError], float]] = {
     "tip": lambda error: error.largest_tip,
 }
 MEASURES = tuple(_SIZES)
-"""cost: relative; joints: largest of all joints, in [rad] or [m]; tip: in [m]."""
+"""cost: relative; joints: of all joints, in [rad] or [m]; tip: of all tip_frames, in [m]."""
 _DISPLAY_SCALE = {"cost": 1.0, "joints": 1.0, "tip": 1e3}
 
 
@@ -36,7 +36,7 @@ def shown_sizes(error: MotionError) -> dict[str, float]:
 class Thresholds:
     """Upper bounds of errors.
 
-    cost: relative. joints: of every joint, in [rad] or [m]. tip: of the tip frame, in [m].
+    cost: relative. joints: of every joint, in [rad] or [m]. tip: of all tip_frames, in [m].
     """
 
     cost: float

@@ -12,13 +12,14 @@ from matplotlib.figure import Figure
 
 from hovi.accuracy import MEASURES, Diagram, Run
 from hovi.accuracy.measures import shown_size
+from hovi.robot.tip_frame import names_in_words
 from hovi.viewing.figures import write_figure
 
 OWN_FAMILY = "hovi"
 _LABELS = {
     "cost": "error of the cost, relative",
     "joints": "largest error of a joint [rad]",
-    "tip": "largest error of the tip [mm]",
+    "tip": "largest error at {tips} [mm]",
 }
 _PEER_COLORS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a")
 _MILLISECONDS = 1e3
@@ -88,7 +89,8 @@ def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     _own_schemes(ax, diagram, measure, time)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.set_ylabel(_LABELS[measure])
+    tips = names_in_words(diagram.resolved.tip_frames)
+    ax.set_ylabel(_LABELS[measure].format(tips=tips))
     ax.grid(color="0.9", linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.motion_error import MotionError, relative_difference
+from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +27,7 @@ _SHIFT = 0.382
 class ReferenceMotion:
     """A motion whose samples are the reference for errors.
 
-    robot: the robot; its `tip_frame` is the tip.
+    robot: the robot; the error of the tip is the largest of its `tip_frames`.
     duration: T, in [s].
     configurations: times -> configurations of the motion.
     cost: its cost J*, positive.
@@ -50,16 +51,18 @@ class ReferenceMotion:
         the errors are infinite.
         """
         if not math.isfinite(cost):
-            return self._record(math.inf, np.full((3, self.robot.nv), np.inf), np.full(3, np.inf))
+            infinite = np.full((3, self.robot.nv), np.inf)
+            return self._record(math.inf, infinite, np.full(3, np.inf), self.robot.tip_frame)
         q, tip = self._distances(self._sampled, configurations(self.times))
         q_at_ends, tip_at_ends = self._distances(self._sampled_ends, configurations(self._ends))
         return self._record(
             relative_difference(cost, self.cost),
             np.vstack([q.max(axis=0), q_at_ends]),
-            np.append(tip.max(), tip_at_ends),
+            np.append(tip.largest.max(), tip_at_ends.largest),
+            tip.frame,
         )
 
-    def _record(self, cost: float, q: Array, tip: Array) -> MotionError:
+    def _record(self, cost: float, q: Array, tip: Array, frame: str) -> MotionError:
         """The record of q (3, nv) and tip (3,): largest along the motion, then at its two ends."""
         unknown = np.full((1, self.robot.nv), np.nan)
         return MotionError(
@@ -70,13 +73,13 @@ class ReferenceMotion:
             tip=tip[:1],
             q_at_nodes=q[1:],
             tip_at_nodes=tip[1:],
-            frame=self.robot.tip_frame,
+            frame=frame,
             sliding=self.robot.sliding,
         )
 
-    def _distances(self, reference: tuple[Array, Array], q: Array) -> tuple[Array, Array]:
-        """|q - q*| per joint coordinate and the distance between the tips, (M, nv) and (M,)."""
-        tip = np.linalg.norm(self._tip_of(q) - reference[1], axis=1)
+    def _distances(self, reference: tuple[Array, Array], q: Array) -> tuple[Array, FrameDistance]:
+        """|q - q*| per joint coordinate (M, nv), and the distance of the tips."""
+        tip = FrameDistance.of(self.robot.tip_frames, self._tips_of(q), reference[1])
         return np.abs(self.robot.difference(reference[0], q)), tip
 
     @property
@@ -93,7 +96,7 @@ class ReferenceMotion:
 
     def _at(self, t: Array) -> tuple[Array, Array]:
         q = self.configurations(t)
-        return q, self._tip_of(q)
+        return q, self._tips_of(q)
 
-    def _tip_of(self, q: Array) -> Array:
-        return self.robot.frame_position(self.robot.tip_frame, q)
+    def _tips_of(self, q: Array) -> Array:
+        return self.robot.frame_positions(self.robot.tip_frames, q)

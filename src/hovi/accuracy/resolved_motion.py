@@ -51,6 +51,11 @@ class ResolvedMotion:
         """Number of intervals."""
         return self.trajectory.grid.intervals
 
+    @property
+    def tip_frames(self) -> tuple[str, ...]:
+        """At which errors of the tip are measured; the largest of them counts."""
+        return self.reference.robot.tip_frames
+
     @cached_property
     def reference(self) -> ReferenceMotion:
         """The motion as the reference for errors."""

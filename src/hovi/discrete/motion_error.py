@@ -10,6 +10,7 @@ import numpy.typing as npt
 from hovi.discrete.stored_torque import chebyshev_points
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import InputError
+from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +27,8 @@ class MotionError:
     cost: |J - J'| / |J'|, of the two costs; 0 if both are 0.
     q, v, tau: of every joint coordinate, shape (N, nv), in [rad], [rad/s] and [N m]; metres and
         newtons for prismatic joints.
-    tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
+    tip: of the origin of a frame, or the largest of several, shape (N,), in [m]. frame: its name,
+        or that of the frame with the largest error.
     q_at_nodes, tip_at_nodes: the same at the nodes, shape (N + 1, nv) and (N + 1,).
     sliding: which joint coordinates are lengths, shape (nv,).
     """
@@ -58,7 +60,7 @@ class MotionError:
 
     @property
     def largest_tip(self) -> float:
-        """The largest of the frame, in [m]."""
+        """The largest anywhere, at `frame`, in [m]."""
         return float(np.max(self.tip))
 
     @property
@@ -82,25 +84,25 @@ def deviation(
 
     Both interpolants are evaluated at the same sample points of the motion's intervals, ends
     included. The grid of the reference may be different.
-    costs: of the motion and of the reference. frame: by default the robot's tip_frame.
-    Raises InputError for another duration, a motion without a scene, or an unknown frame.
+    costs: of the motion and of the reference. frame: by default the robot's tip_frames, of which
+        the largest error counts.
+    Raises InputError for another duration, a motion without a scene, or a frame that is unknown or
+    does not move.
     """
     robot = _robot_of(trajectory, reference)
-    name = robot.tip_frame if frame is None else frame
     k, s = sample_points(trajectory)
     one, other = trajectory.sample_intervals(k, s), _at_samples(reference, trajectory, k, s)
-    tips = [robot.frame_position(name, q) for q in (one.q, other.q)]
-    tip = np.linalg.norm(tips[0] - tips[1], axis=1)
+    tip = FrameDistance.between(robot, one.q, other.q, frame)
     q = np.abs(robot.difference(other.q, one.q))
     return MotionError(
         relative_difference(*costs),
         _by_interval(trajectory, q),
         _by_interval(trajectory, np.abs(one.v - other.v)),
         _by_interval(trajectory, np.abs(one.tau - other.tau)),
-        _by_interval(trajectory, tip),
+        _by_interval(trajectory, tip.largest),
         _at_nodes(trajectory, q),
-        _at_nodes(trajectory, tip),
-        name,
+        _at_nodes(trajectory, tip.largest),
+        tip.frame,
         robot.sliding,
     )
 

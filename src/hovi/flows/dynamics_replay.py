@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -35,7 +36,8 @@ class DynamicsReplay:
 
     q, v: of every joint coordinate, shape (N, nv), in [rad] and [rad/s]; metres for prismatic
         joints.
-    tip: of the origin of the frame, shape (N,), in [m]. frame: its name.
+    tip: of the origin of a frame, or the largest of several, shape (N,), in [m]. frame: its name,
+        or that of the frame with the largest deviation.
     sliding: which joint coordinates are lengths, shape (nv,).
     """
 
@@ -57,7 +59,7 @@ class DynamicsReplay:
 
     @property
     def largest_tip(self) -> float:
-        """The largest deviation of the frame, in [m]."""
+        """The largest deviation, that of `frame`, in [m]."""
         return float(np.max(self.tip))
 
 
@@ -66,13 +68,13 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
 
     a = ABA(q, v, tau - torques of effects), with tau of the interpolant at the same times and zero
     at passive joints; each interval starts at its node, in the chart of that node.
-    frame: whose deviation is reported, by default the robot's tip_frame.
+    frame: whose deviation is reported, by default the largest of the robot's tip_frames.
     Raises InputError with the reason if this is not possible.
     """
     from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
     scene, robot = _scene_of(trajectory)
-    name = robot.tip_frame if frame is None else frame
+    robot.measured_frames(frame)  # a frame that cannot be measured speaks first
     N, n = trajectory.v[:-1].shape
     h, start = trajectory.grid.steps[:, None], trajectory.q[:-1]
     forward = _ForwardDynamics(scene, trajectory)
@@ -99,12 +101,12 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         raise InputError(f"SciPy's DOP853 did not reach the end of an interval: {done.message}")
     x, hv = done.y[:, -1].reshape(2, N, n)
     arrived = robot.integrate(start, x)
-    tips = [robot.frame_position(name, q) for q in (arrived, trajectory.q[1:])]
+    tip = FrameDistance.between(robot, arrived, trajectory.q[1:], frame)
     return DynamicsReplay(
         np.abs(robot.difference(trajectory.q[1:], arrived)),
         np.abs(hv / h - trajectory.v[1:]),
-        np.linalg.norm(tips[0] - tips[1], axis=1),
-        name,
+        tip.largest,
+        tip.frame,
         robot.sliding,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.controllers import Controller, controller
 from hovi.flows.simulator import Simulation, simulate
+from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -44,11 +46,15 @@ class Tracking:
 
     @property
     def tip_deviation(self) -> Array:
-        """Distance of executed and planned position of the tip frame, shape (N + 1,), in [m]."""
-        robot = self.simulation.scene.robot
+        """The largest distance of the tip_frames from the plan, shape (N + 1,), in [m]."""
+        return self.tip_distance.largest
+
+    @cached_property
+    def tip_distance(self) -> FrameDistance:
+        """Distance of executed and planned position of each of the robot's tip_frames."""
+        robot, q = self.simulation.scene.robot, self.simulation.q
         planned = self.plan.configurations(np.clip(self.t, 0.0, self.plan.duration))
-        positions = (robot.frame_position(robot.tip_frame, q) for q in (planned, self.simulation.q))
-        return np.asarray(np.linalg.norm(np.subtract(*positions), axis=1))
+        return FrameDistance.between(robot, planned, q)
 
     @property
     def torque(self) -> Array:

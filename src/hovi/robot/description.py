@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -21,12 +21,12 @@ Array = npt.NDArray[np.float64]
 _ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
 
 
-def describe(name: str, model: pin.Model, source: RobotSource, tip_frame: str) -> str:
+def describe(name: str, model: pin.Model, source: RobotSource, tips: Sequence[str]) -> str:
     """The text of `hovi info`: joints, limits, mass, and notes on the URDF."""
     sections = [
         _headline(name, model, source),
         "\n".join(_joint_table(model, _held_followers(source))),
-        _place(model, source, tip_frame),
+        _place(model, source, tips),
     ]
     parts = [f"  {line}" for line in _opt_in_parts(model)]
     if parts:
@@ -79,13 +79,14 @@ def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
         yield f"  {name:<{width}}  {'mimic':<11}  = {value:g}"
 
 
-def _place(model: pin.Model, source: RobotSource, tip_frame: str) -> str:
+def _place(model: pin.Model, source: RobotSource, tips: Sequence[str]) -> str:
     base = "floating" if source.free_flyer else "fixed"
     if source.kind == "model":
         floats = model.njoints > 1 and kind_of(model.joints[1]) is FLOATING
         base = FLOATING.word if floats else "fixed"
     locked = f"; locked: {', '.join(source.locked)}" if source.locked else ""
-    return f"Base: {base}{locked}. Tip frame: {tip_frame} ({_count(model.nframes, 'frame')})."
+    ends = f"Tip frame{'' if len(tips) == 1 else 's'}: {', '.join(tips)}"
+    return f"Base: {base}{locked}. {ends} ({_count(model.nframes, 'frame')})."
 
 
 def _opt_in_parts(model: pin.Model) -> Iterator[str]:

@@ -8,7 +8,7 @@ effort limit of 0 in the file stays 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,7 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
 from hovi.robot.space.joint_kinds import LENGTH, Units, coordinate_units
 from hovi.robot.srdf import Srdf, parse_srdf
+from hovi.robot.tip_frame import is_moved, tip_frames
 
 Array = npt.NDArray[np.float64]
 
@@ -151,10 +152,40 @@ class Robot:
 
     @cached_property
     def tip_frame(self) -> str:
-        """The last link (or operational frame) of the model, where a tool is mounted."""
-        kinds = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
-        links = [frame.name for frame in self.model.frames if frame.type in kinds]
-        return links[-1] if links else self.frame_names[-1]
+        """The first of the `tip_frames`: where a tool is mounted."""
+        return self.tip_frames[0]
+
+    @cached_property
+    def tip_frames(self) -> tuple[str, ...]:
+        """Where the robot ends: its tool, or its hands or feet if it has several."""
+        return tip_frames(self.model)
+
+    def measured_frames(self, frame: str | None = None) -> tuple[str, ...]:
+        """The frames at which a length is measured: the one that is named, or the tip_frames.
+
+        Raises InputError for a named frame that is unknown or that no joint moves.
+        """
+        if frame is None:
+            return self.tip_frames
+        self.check_frame_moves(frame)
+        return (frame,)
+
+    def check_frame_moves(self, frame: str) -> None:
+        """Raise InputError for a frame that the robot does not have, or that no joint moves."""
+        self._check_frame(frame)
+        if not is_moved(self.model, frame):
+            other = self.tip_frame
+            hint = f"; one that moves is {other!r}" if is_moved(self.model, other) else ""
+            raise InputError(
+                f"frame {frame!r} of robot {self.name!r} is fixed to the world, as no joint moves "
+                f"it{hint}."
+            )
+
+    def _check_frame(self, frame: str) -> None:
+        if frame not in self.frame_names:
+            raise InputError(
+                f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
+            )
 
     # Properties from the URDF
 
@@ -274,12 +305,14 @@ class Robot:
 
     def frame_position(self, frame: str, q: Array) -> Array:
         """Position of a frame's origin in the world frame, in [m]: q (M, nq) -> (M, 3)."""
-        if frame not in self.frame_names:
-            raise InputError(
-                f"robot {self.name!r} has no frame {frame!r}: {nearest(frame, self.frame_names)}"
-            )
-        index = robot_model.frame_id(self.model, frame)
-        return configuration.frame_position(self.model, index, q)
+        return self.frame_positions((frame,), q)[:, 0]
+
+    def frame_positions(self, frames: Sequence[str], q: Array) -> Array:
+        """Positions of the origins of F frames in the world, in [m]: q (M, nq) -> (M, F, 3)."""
+        for frame in frames:
+            self._check_frame(frame)
+        indices = [robot_model.frame_id(self.model, frame) for frame in frames]
+        return configuration.frame_positions(self.model, indices, q)
 
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.
@@ -312,7 +345,7 @@ class Robot:
 
     def describe(self) -> str:
         """A summary for a terminal: joints, limits, mass, and properties that need an effect."""
-        text = describe(self.name, self.model, self.source, self.tip_frame)
+        text = describe(self.name, self.model, self.source, self.tip_frames)
         names = ", ".join(repr(name) for name in self.poses)
         text += f"\n\nPoses of its SRDF: {names}." if names else ""
         try:

@@ -137,7 +137,7 @@ def replay(
 
     trajectory: the motion. A robot without visual models is drawn as a skeleton.
     speed: motion seconds per second. loop: play again and again until interrupted.
-    trace: draw the path of the robot's tip.
+    trace: draw the paths of the robot's tip_frames.
     open_browser: open the page in the default browser and wait for it before playing.
     html: path of one self-contained page to write instead of serving; it is written completely or
         not at all.
@@ -219,7 +219,7 @@ def _note(robot: Robot, highlights: Highlights | None) -> str:
 def _draw(
     trajectory: Trajectory, robot: Robot, page: Page, trace: bool, highlights: Highlights | None
 ) -> MeshcatVisualizer:
-    """Draw the robot at the start of the motion and the path of its tip; place the camera."""
+    """Draw the robot at the start of the motion and the paths of its tips; place the camera."""
     visual = robot.visual
     if visual is None or visual.ngeoms == 0:
         visual = skeleton(robot.model)
@@ -235,8 +235,9 @@ def _draw(
         highlights.show(visualizer, 0.0)
     lower, upper = _swept_box(visualizer, _configurations(trajectory, _VIEW_SAMPLES))
     if trace:
-        tip = robot.frame_position(robot.tip_frame, _configurations(trajectory, _TRACE_SAMPLES))
-        _draw_trace(visualizer, tip, _TRACE_WIDTH * float(np.linalg.norm(upper - lower)))
+        tips = robot.frame_positions(robot.tip_frames, _configurations(trajectory, _TRACE_SAMPLES))
+        width = _TRACE_WIDTH * float(np.linalg.norm(upper - lower))
+        _draw_trace(visualizer, tips.reshape(-1, 3), width)
     _place_camera(visualizer, lower, upper)
     return visualizer
 
@@ -268,7 +269,7 @@ def _corners(item: pin.GeometryObject) -> Array:
 
 
 def _draw_trace(visualizer: MeshcatVisualizer, points: Array, width: float) -> None:
-    """Draw a path as dense points, since browsers draw lines of any width one pixel wide."""
+    """Draw paths as dense points, since browsers draw lines of any width one pixel wide."""
     colors = np.tile(_TRACE_COLOR, (len(points), 1))
     geometry = meshcat.geometry.PointsGeometry(*(x.T.astype(np.float32) for x in (points, colors)))
     material = meshcat.geometry.PointsMaterial(size=width)

@@ -12,11 +12,17 @@ import pytest
 
 from hovi.accuracy.effect_study.candidates import effect_candidates
 from hovi.accuracy.effect_study.study import EffectStudy, study_effects
-from hovi.accuracy.effect_study.tables import COLUMNS, study_figure, study_json, study_rows
+from hovi.accuracy.effect_study.tables import (
+    COLUMNS,
+    study_figure,
+    study_json,
+    study_note,
+    study_rows,
+)
 from hovi.cli.application import main
 from hovi.discrete.state import State
-from hovi.effects import Armature, Gravity, Payload, VelocityCost, ViscousFriction
-from hovi.errors import SceneError
+from hovi.effects import Armature, Drag, Gravity, Payload, VelocityCost, ViscousFriction, Wrench
+from hovi.errors import InputError, SceneError
 from hovi.flows.tracking import play
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
@@ -149,6 +155,22 @@ def test_an_infeasible_task_raises(task: Task, two_link: Robot) -> None:
     stuck = Task(scene, task.start, task.goal, 0.4, PlanOptions(limits=limits), "stuck")
     with pytest.raises(SceneError, match="the effects of 'stuck' cannot be compared"):
         study_effects(stuck, CANDIDATES)
+
+
+def test_candidates_act_where_something_moves(two_arms: Robot, task: Task) -> None:
+    at_frames = Payload | Wrench | Drag
+    frames = {e.frame for e in effect_candidates(two_arms) if isinstance(e, at_frames)}
+    assert frames == {"left_gripper"}
+    for fixed in (Wrench("base", (1.0, 0.0, 0.0)), Drag("base", 0.1)):
+        with pytest.raises(InputError, match=r"'base' .* is fixed to the world.*'tip'"):
+            study_effects(task, [fixed])
+
+
+def test_a_study_names_the_frames_of_its_lengths(study: EffectStudy) -> None:
+    assert "the tip is tip;" in study_note(study)
+    assert json.loads(study_json(study))["tip_frames"] == ["tip"]
+    labels = [panel.get_xlabel() for panel in study_figure(study).axes]
+    assert "deviation of tip at the end, held [mm]" in labels
 
 
 @pytest.mark.parametrize("name", ["two_link", "ur5", "panda", "pendulum"])

@@ -136,3 +136,14 @@ def test_bad_goals_are_refused_in_one_sentence(ur5: Robot) -> None:
             FrameGoal("tool0", **arguments)
     with pytest.raises(InputError, match="did you mean 'tool0'"):
         hovi.FrameGoal("tool", position=[0, 0, 0]).check(ur5)
+
+
+def test_a_goal_of_a_frame_that_does_not_move_is_refused(ur5: Robot) -> None:
+    scene, start = hovi.Scene(ur5, [hovi.effects.Gravity()]), hovi.State(ur5.neutral())
+    fixed = FrameGoal("base", position=[0.0, 0.0, 0.1])
+    sentence = r"frame 'base' of robot 'ur5' is fixed to the world.*one that moves is 'tool0'\.$"
+    with pytest.raises(InputError, match=sentence):
+        hovi.plan(scene, start, fixed, 1.0)
+    above = hovi.Via(0.5, fixed)
+    with pytest.raises(InputError, match=sentence):
+        hovi.plan(scene, start, hovi.State(ur5.neutral() + 0.3), 1.0, via=[above])

@@ -8,6 +8,7 @@ import pytest
 from hovi.discrete.motion_error import MotionError
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Tolerance
+from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 
 VALID = [
@@ -32,6 +33,8 @@ REFUSED = [
     ("1 deg at tool0", "only a length"),
     ("1e-6 at tool0", "only a length"),
     ("1 mm at tol0", "no such frame; did you mean 'tool0'"),
+    ("1 mm at base", r"frame 'base' .* is fixed to the world, .*; one that moves is 'tool0'\."),
+    (Tolerance(1e-3, Quantity.FRAME, "base"), "frame 'base' .* is fixed to the world"),
     (0.0, "positive and finite"),
     (-1e-6, "positive and finite"),
     (float("nan"), "positive and finite"),
@@ -96,7 +99,7 @@ def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
         ("0.1 %", "0.1 % of the cost"),
         ("0.01 deg", "0.01 deg in the joints"),
         ("3 mrad", "3 mrad in the joints"),
-        ("0.1 m", "0.1 m at the tip"),
+        ("0.1 m", "0.1 m at tool0"),
         ("2 um at tool0", "2 um at tool0"),
     ],
 )
@@ -105,3 +108,20 @@ def test_errors_are_stated_in_the_unit_of_the_tolerance(
 ) -> None:
     tolerance = Tolerance.of(Tolerance.of(given, ur5), ur5)
     assert tolerance.in_words(tolerance.size) == words
+
+
+def test_a_length_at_several_tips_names_them(two_arms: Robot) -> None:
+    wanted = Tolerance.of("0.1 mm", two_arms)
+    assert wanted.frame is None
+    assert wanted.in_words(1e-4) == "0.1 mm at left_gripper and right_gripper"
+    at_one = Tolerance.of("0.1 mm at right_gripper", two_arms)
+    assert at_one.in_words(1e-4) == "0.1 mm at right_gripper"
+    legs = Tolerance.of("0.1 mm", load_robot("anymal"))
+    assert legs.in_words(1e-4) == "0.1 mm at LF_FOOT and 3 more"
+
+
+def test_a_robot_in_which_nothing_moves_has_no_length_to_bound() -> None:
+    panda = load_robot("panda")
+    still = load_robot("panda", locked=panda.joint_names)
+    with pytest.raises(InputError, match="is fixed to the world, as no joint moves it"):
+        Tolerance.of("0.1 mm", still)

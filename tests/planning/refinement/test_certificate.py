@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from scipy.integrate import quad
 
 import hovi
 from hovi.discrete.curve_integral import integral_along
+from hovi.cli.reports.certificate import certificate_lines
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
@@ -208,6 +210,8 @@ def test_checks_that_are_unknown_under_limits_are_missing(arm_scene: Scene) -> N
 def test_a_solution_without_problem_and_an_unknown_frame_are_refused(fine: Solution) -> None:
     with pytest.raises(InputError, match="has no frame 'tipp'"):
         certify(fine, frame="tipp")
+    with pytest.raises(InputError, match=r"frame 'base' .* is fixed to the world.*'tip'\.$"):
+        certify(fine, frame="base")
     with pytest.raises(InputError, match="has no problem"):
         certify(dataclasses.replace(fine, problem=None))
 
@@ -244,3 +248,51 @@ def test_joints_on_groups_are_certified_like_others(base: str) -> None:
     assert certificate.replay is not None
     assert certificate.replay.angle < 1e-9
     assert certificate.replay.slide < 1e-9
+
+
+# Several tips
+
+
+@pytest.fixture(scope="module")
+def exact(two_arms: Robot) -> Solution:
+    """One arm goes far, the other stays nearly where it is."""
+    start, step = two_arms.neutral(), np.array([0.01, 0.02, 0.6, 0.8])
+    scene = Scene(two_arms, [Gravity()])
+    return plan(scene, State(start), State(start + step), 1.0, limits="none", tolerance="0.1 mm")
+
+
+def test_a_length_is_measured_where_the_file_ends_at_what_does_not_move(exact: Solution) -> None:
+    assert exact.accuracy is not None
+    assert exact.accuracy.reached
+    assert 1e-9 < exact.accuracy.error < 1e-4
+    assert exact.accuracy.estimate is not None
+    assert exact.accuracy.estimate.frame == "right_gripper"
+    assert re.search(
+        r"estimated error \S+ mm at right_gripper, tolerance 0.1 mm at left_gripper and "
+        r"right_gripper\.$",
+        exact.message,
+    )
+
+
+def test_a_certificate_names_the_tip_with_the_largest_error(exact: Solution) -> None:
+    found = certify(exact)
+    assert found.errors is not None
+    assert found.replay is not None
+    assert found.errors is exact.accuracy.estimate  # type: ignore[union-attr]
+    motion = exact.trajectory
+    replays = {f: replay_dynamics(motion, f) for f in ("left_gripper", "right_gripper")}
+    worst = max(replays, key=lambda frame: replays[frame].largest_tip)
+    assert (found.replay.frame, found.replay.largest_tip) == (worst, replays[worst].largest_tip)
+    np.testing.assert_array_equal(
+        found.replay.tip, np.maximum(*(each.tip for each in replays.values()))
+    )
+    lines = dict(certificate_lines(found))
+    assert re.search(r", right_gripper \S+ mm$", lines["errors"])
+    assert re.search(rf", {worst} by \S+ mm", lines["replay"])
+
+
+def test_a_certificate_of_one_tip_is_not_that_of_all(exact: Solution) -> None:
+    left = certify(exact, "left_gripper").errors
+    assert left is not None
+    assert left.frame == "left_gripper"
+    assert 0 < left.largest_tip < 0.9 * exact.accuracy.error  # type: ignore[union-attr]

@@ -7,7 +7,7 @@ the external force a twentieth of the weight. Known values belong in a scene fil
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ from hovi.effects import (
 )
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
+from hovi.robot.tip_frame import is_moved
 
 Array = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect
         Armature(from_urdf=True) if in_model["armature"] else Armature(rotors),
         MovingBase((0.0, 0.0, "0.01*sin(4*pi*t)")),
     ]
-    if robot.model.frames[robot.model.getFrameId(tip)].parentJoint > 0:
+    if is_moved(robot.model, tip):
         (load,), (push,) = _rounded(LOAD_SHARE * mass), _rounded(LOAD_SHARE * mass * _EARTH)
         candidates += [
             Payload(tip, load),
@@ -71,6 +72,13 @@ def effect_candidates(robot: Robot, passive: Sequence[str] = ()) -> tuple[Effect
         unactuated_base = robot.joint_names[0] in passive
         excluded = [MovingBase, Gravity, Wrench] if unactuated_base else [MovingBase]
     return tuple(e for e in candidates if not isinstance(e, tuple(excluded)))
+
+
+def check_frames_move(robot: Robot, effects: Iterable[Effect]) -> None:
+    """Raise InputError for an effect at a frame that no joint moves, where it changes nothing."""
+    for effect in effects:
+        if isinstance(effect, Payload | Wrench | Drag):
+            robot.check_frame_moves(effect.frame)
 
 
 def _has_bearing(robot: Robot) -> Array:

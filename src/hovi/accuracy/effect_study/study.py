@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.accuracy.effect_study.candidates import effect_candidates
+from hovi.accuracy.effect_study.candidates import check_frames_move, effect_candidates
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
@@ -18,6 +18,7 @@ from hovi.flows.tracking import play
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
+from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline
@@ -42,10 +43,11 @@ class EffectTrial:
     cost: of the motion planned with the change, with the scene's own motion as the guess.
         success: whether that is a minimum; if not, the cost has no meaning.
         nit, plan_seconds: iterations and time of planning.
-    tip: largest distance of its tip from the scene's own motion, in [m]; None if the durations
-        differ or no minimum was found.
-    open_loop, held: tip deviation at the end when the planned torques are applied in the changed
-        scene, without and with a feedback of 10 rad/s, in [m]; None if the simulation diverged.
+    tip: largest distance of the robot's tip_frames from the scene's own motion, in [m]; None if the
+        durations differ or no minimum was found.
+    open_loop, held: tip deviation at the end, the largest of the tip_frames, when the planned
+        torques are applied in the changed scene, without and with a feedback of 10 rad/s, in [m];
+        None if the simulation diverged.
     instructions: added to the expression graph.
     seconds: of an evaluation with derivatives, per point.
     """
@@ -106,10 +108,16 @@ def study_effects(
     time_limit: of the whole study, in [s], shared evenly by the remaining candidates; none is
         started when time is up. By default a candidate is planned in at most ten times the time
         of the task, at least 10 s. A KeyboardInterrupt ends the study with the trials so far.
-    Raises SceneError when no motion of the task itself is found.
+    Raises SceneError when no motion of the task itself is found, and InputError for a candidate at
+    a frame that cannot move.
     """
     report = progress or (lambda text, share: None)
-    deadline, began = Deadline(time_limit), time.perf_counter()
+    deadline, scene = Deadline(time_limit), task.scene
+    tried = tuple(
+        effect_candidates(scene.robot, scene.passive) if candidates is None else candidates
+    )
+    check_frames_move(scene.robot, tried)
+    began = time.perf_counter()
     report("planning the unchanged scene", 0.0)
     solution = _plan(task, task.scene, "cubic", task.options.starts, deadline.seconds_left)
     if not solution.success:
@@ -121,10 +129,6 @@ def study_effects(
     began = time.perf_counter()
     _plan(task, task.scene, solution.trajectory, 1)
     replan_seconds = time.perf_counter() - began
-    scene = task.scene
-    tried = tuple(
-        effect_candidates(scene.robot, scene.passive) if candidates is None else candidates
-    )
     scenes = [_with_or_without(scene, effect) for effect in tried]
     own_seconds, *times = seconds_per_point([scene, *scenes])
     trials: list[EffectTrial] = []
@@ -199,8 +203,8 @@ def _tip_distance(own: Trajectory, other: Trajectory) -> float | None:
         return None
     t = np.linspace(0.0, own.duration, 1 + _SAMPLES * own.grid.intervals)
     t = np.minimum(t, other.duration)
-    positions = (robot.frame_position(robot.tip_frame, m.configurations(t)) for m in (own, other))
-    return float(np.linalg.norm(np.subtract(*positions), axis=1).max())
+    distance = FrameDistance.between(robot, own.configurations(t), other.configurations(t))
+    return float(distance.largest.max())
 
 
 def _tip_deviation(scene: Scene, own: Trajectory, feedback: str) -> float | None:

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hovi.accuracy.effect_study.study import EffectStudy, EffectTrial
+from hovi.robot.tip_frame import names_in_words
 from hovi.viewing.figures import write_figure
 
 COLUMNS = (
@@ -27,13 +28,19 @@ COLUMNS = (
     "ratio",
     "plan [s]",
 )
-NOTE = (
-    "torque: largest change along the scene's own motion; cost, change, tip: the motion planned "
-    "with the effect; open loop, held: tip deviation at the end when the planned torques are "
-    "applied with the effect, without and with a feedback of 10 rad/s; us/point: one evaluation "
-    "with derivatives; ratio: us/point relative to the unchanged scene."
-)
 _EFFECT, _TIME = "#0072B2", "#D55E00"
+
+
+def study_note(study: EffectStudy) -> str:
+    """What the columns are, and at which frames lengths are measured."""
+    tips = names_in_words(study.task.scene.robot.tip_frames)
+    return (
+        "torque: largest change along the scene's own motion; cost, change, tip: the motion "
+        "planned with the effect; open loop, held: tip deviation at the end when the planned "
+        "torques are applied with the effect, without and with a feedback of 10 rad/s; the tip is "
+        f"{tips}; us/point: one evaluation with derivatives; ratio: us/point relative to the "
+        "unchanged scene."
+    )
 
 
 def study_rows(study: EffectStudy) -> list[list[str]]:
@@ -88,6 +95,7 @@ def study_json(study: EffectStudy) -> str:
     ]
     fields: dict[str, Any] = {
         "scene": study.task.name,
+        "tip_frames": list(study.task.scene.robot.tip_frames),
         "cost": study.solution.cost,
         "seconds_per_point": study.seconds,
         "plan_seconds": study.plan_seconds,
@@ -120,7 +128,8 @@ def study_figure(study: EffectStudy) -> Figure:
     signs = ["-" if study.change(t) < 0 else "+" for t in trials]
     _bars(panels[1], names, changes, "change of the cost [%]", signs, without="no minimum")
     deviations = [1e3 * (np.nan if t.held is None else t.held) for t in trials]
-    _bars(panels[2], names, deviations, "tip deviation at the end, held [mm]")
+    tips = names_in_words(study.task.scene.robot.tip_frames)
+    _bars(panels[2], names, deviations, f"deviation of {tips} at the end, held [mm]")
     ratios = [t.seconds / study.seconds for t in trials]
     _bars(panels[3], names, ratios, "evaluation time, relative", color=_TIME)
     panels[3].axvline(1.0, color="0.4", linewidth=0.8)

@@ -123,6 +123,7 @@ def _print(diagram: Diagram) -> None:
 
     from hovi.accuracy.measures import shown_sizes
     from hovi.accuracy.tables import COLUMNS, cheapest_rows
+    from hovi.robot.tip_frame import names_in_words
 
     resolved = diagram.resolved
     errors = shown_sizes(resolved.uncertainty)
@@ -130,7 +131,7 @@ def _print(diagram: Diagram) -> None:
         f"{diagram.scene}: {len(diagram.runs)} runs in {diagram.seconds:.0f} s; reference: "
         f"{resolved.scheme} on {resolved.intervals} intervals, cost {resolved.cost:.12g}, "
         f"accurate to {errors['cost']:.0e} relative, {errors['joints']:.0e} rad, "
-        f"{errors['tip']:.0e} mm."
+        f"{errors['tip']:.0e} mm at the tip, {names_in_words(resolved.tip_frames)}."
     )
     table = Table(
         box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title="fastest run per tolerance"

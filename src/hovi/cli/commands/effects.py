@@ -69,7 +69,7 @@ def _print(study: EffectStudy) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from hovi.accuracy.effect_study.tables import COLUMNS, NOTE, study_rows
+    from hovi.accuracy.effect_study.tables import COLUMNS, study_note, study_rows
 
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title=study.task.name)
     for column in COLUMNS:
@@ -81,6 +81,6 @@ def _print(study: EffectStudy) -> None:
     Console(highlight=False, markup=False, width=width).print(table)
     for trial in study.trials:
         print(f"{'+' if trial.added else '-'} {trial.effect.describe()}")
-    print(NOTE)
+    print(study_note(study))
     if study.untried:
         print(f"not tried: {', '.join(effect.key for effect in study.untried)}")

@@ -131,13 +131,15 @@ def _report(task: Task, motion: Simulation, out: Path | None) -> dict[str, Any]:
 
 
 def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) -> dict[str, Any]:
-    joints, tip = abs(tracking.joint_deviation), tracking.tip_deviation
+    joints, tip = abs(tracking.joint_deviation), tracking.tip_distance
     return {
         "plan": str(plan),
         "feedback": feedback,
         "bandwidth": None if feedback == "none" else bandwidth,
-        "tip_deviation_end": float(tip[-1]),
-        "tip_deviation_max": float(tip.max()),
+        "tip_deviation_end": float(tip.largest[-1]),
+        "tip_deviation_max": float(tip.largest.max()),
+        "tip_frame_end": tip.frame_at(-1),
+        "tip_frame_max": tip.frame,
         "joint_deviation_end": joints[-1].tolist(),
         "joint_deviation_max": joints.max(axis=0).tolist(),
         "joint_units": [units.q for units in tracking.simulation.scene.robot.coordinate_units],
@@ -174,8 +176,8 @@ def _print_deviation(report: dict[str, Any], efforts: list[str]) -> None:
         peak = _with_units(report["feedback_torque_max"], efforts)
         print(f"feedback: {report['feedback']} of {report['bandwidth']:g} rad/s, at most {peak}")
     print(
-        f"the tip is off by {1e3 * report['tip_deviation_end']:.4g} mm at the end, "
-        f"by {1e3 * report['tip_deviation_max']:.4g} mm at most"
+        f"{report['tip_frame_end']} is off by {1e3 * report['tip_deviation_end']:.4g} mm at the "
+        f"end, {report['tip_frame_max']} by {1e3 * report['tip_deviation_max']:.4g} mm at most"
     )
     print(f"joints at the end: {_with_units(report['joint_deviation_end'], units)}")
     print(f"joints at most:    {_with_units(report['joint_deviation_max'], units)}")

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.dynamics.symbolic_dynamics import casadi_functions
-from hovi.errors import InputError, nearest
+from hovi.errors import InputError
 from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
@@ -81,10 +81,8 @@ class FrameGoal:
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
 
     def check(self, robot: Robot) -> None:
-        """Raise InputError for a frame that the robot does not have."""
-        if self.frame not in robot.frame_names:
-            hint = nearest(self.frame, robot.frame_names)
-            raise InputError(f"robot {robot.name!r} has no frame {self.frame!r}: {hint}")
+        """Raise InputError for a frame that the robot does not have, or that no joint moves."""
+        robot.check_frame_moves(self.frame)
 
     def condition(self, robot: Robot) -> FrameCondition:
         """The goal as a condition c(q) = 0."""

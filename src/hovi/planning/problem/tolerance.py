@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Self
@@ -15,6 +15,7 @@ from hovi.discrete.motion_error import MotionError
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
+from hovi.robot.tip_frame import names_in_words
 
 
 class Quantity(StrEnum):
@@ -31,23 +32,25 @@ class Tolerance:
 
     size: relative for the cost, in [rad] for the joints ([m] for sliding ones), in [m] for a
         frame.
-    quantity: which of the three. frame: name of the frame; the robot's tip_frame if None.
+    quantity: which of the three. frame: name of the frame; all of the robot's tip_frames if None.
     unit: used in messages: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
+    tips: used in messages: the robot's tip_frames.
     """
 
     size: float
     quantity: Quantity = Quantity.COST
     frame: str | None = None
     unit: str = field(default="", compare=False)
+    tips: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
     def of(cls, tolerance: float | str | Tolerance, robot: Robot) -> Self:
         """A tolerance from a number or a text.
 
         tolerance: a number or a percentage is relative to the cost; "0.1 mm" is an error of the
-            robot's tip_frame, "0.1 mm at tool0" of another frame; "0.01 deg" or "1e-4 rad" of the
+            robot's tip_frames, "0.1 mm at tool0" of another frame; "0.01 deg" or "1e-4 rad" of the
             joints.
-        Raises InputError for anything else.
+        Raises InputError for anything else, and for a frame that does not move.
         """
         if isinstance(tolerance, Tolerance):
             parts = tolerance.size, tolerance.quantity, tolerance.frame, tolerance.unit
@@ -87,7 +90,10 @@ class Tolerance:
                 f"tolerance at frame {self.frame!r}: robot {robot.name!r} has no such frame; "
                 f"{nearest(self.frame, robot.frame_names)}"
             )
-        return self
+        if self.quantity is not Quantity.FRAME:
+            return self
+        robot.check_frame_moves(self.frame or robot.tip_frame)
+        return replace(self, tips=robot.tip_frames)
 
     def measure(self, error: MotionError) -> float:
         """The error in the tolerance's quantity and SI unit, to compare with `size`."""
@@ -97,16 +103,16 @@ class Tolerance:
             return max(error.angle, error.slide)
         return error.largest_tip
 
-    def in_words(self, size: float) -> str:
-        """An error of this quantity, with its unit."""
+    def in_words(self, size: float, at: str = "") -> str:
+        """An error of this quantity, with its unit. at: its frame; "" names all frames measured."""
         if self.quantity is Quantity.COST:
             number = f"{size / SHARES[self.unit]:.2g}"
             return f"{number} {self.unit} of the cost".replace("  ", " ")
         if self.quantity is Quantity.JOINTS:
             unit = self.unit or "rad"
             return f"{size / ANGLES[unit]:.2g} {unit} in the joints"
-        unit, at = self.unit or "mm", "the tip" if self.frame is None else self.frame
-        return f"{size / LENGTHS[unit]:.2g} {unit} at {at}"
+        unit, frame = self.unit or "mm", at or self.frame or names_in_words(self.tips) or "the tip"
+        return f"{size / LENGTHS[unit]:.2g} {unit} at {frame}"
 
 
 def as_number_or_text(tolerance: float | str | Tolerance | None) -> float | str | None:
@@ -172,5 +178,12 @@ class Accuracy:
         wanted = self.tolerance.in_words(self.tolerance.size)
         if np.isnan(self.error):
             return f"{self.reason}; no error was estimated (tolerance {wanted})."
-        found = f"estimated error {self.tolerance.in_words(self.error)}, tolerance {wanted}"
+        error = self.tolerance.in_words(self.error, self._frame)
+        found = f"estimated error {error}, tolerance {wanted}"
         return f"{found}." if self.reached else f"stopped early: {self.reason}; {found}."
+
+    @property
+    def _frame(self) -> str:
+        """Which of several frames has the error; "" where there is but one, or none is known."""
+        several = self.tolerance.frame is None and len(self.tolerance.tips) > 1
+        return self.estimate.frame if several and self.estimate is not None else ""

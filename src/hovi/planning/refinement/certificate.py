@@ -84,16 +84,17 @@ class Certificate:
 def certify(solution: Solution, frame: str | None = None, *, estimate: bool = True) -> Certificate:
     """The certificate of a solution.
 
-    frame: whose errors are reported, by default the robot's tip_frame. estimate: whether errors
-        are estimated if the solution has no estimate, which takes another solve.
-    Raises InputError if the solution has no problem, or for an unknown frame.
+    frame: whose errors are reported, by default that of the tolerance, or else the one of the
+        robot's tip_frames with the largest error. estimate: whether errors are estimated if the
+        solution has no estimate, which takes another solve.
+    Raises InputError if the solution has no problem, or for a frame that is unknown or does not
+    move.
     """
     expect(solution, Solution, "what `plan` returned")
     problem, trajectory = solution.problem, solution.trajectory
     if problem is None:
         raise InputError("this solution has no problem; call plan again instead.")
-    name = problem.robot.tip_frame if frame is None else frame
-    problem.robot.frame_position(name, trajectory.q[:1])  # raises for an unknown frame
+    problem.robot.measured_frames(frame)  # raises for a frame that is unknown or fixed
     missing: dict[str, str] = {}
 
     def checked(name: str, statement: Callable[[], T]) -> T | None:
@@ -153,7 +154,7 @@ def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
 
 def _errors(solution: Solution, frame: str | None, estimate: bool) -> MotionError:
     known = None if solution.accuracy is None else solution.accuracy.estimate
-    if known is not None and (frame is None or frame == known.frame):
+    if known is not None and _is_measured_at(frame, solution):
         return known
     if not estimate:
         raise InputError("not estimated, as it takes another solve; plan with a tolerance")
@@ -161,6 +162,15 @@ def _errors(solution: Solution, frame: str | None, estimate: bool) -> MotionErro
     if found is None:
         raise InputError("no nearby solution was found on a finer grid")
     return found
+
+
+def _is_measured_at(frame: str | None, solution: Solution) -> bool:
+    """Whether a solution's own estimate is of a frame; None stands for whatever it is of."""
+    problem, accuracy = solution.problem, solution.accuracy
+    if frame is None or problem is None or accuracy is None:
+        return frame is None
+    of = problem.robot.measured_frames
+    return of(frame) == of(accuracy.tolerance.frame)
 
 
 def _peaks(trajectory: Trajectory) -> tuple[Peak, Peak]:

@@ -83,7 +83,7 @@ class PlanOptions:
     tolerance: float | str | Tolerance | None = option(
         None,
         "the largest error over the whole motion, instead of a scheme: a number is relative to "
-        'the cost, "0.1 mm" applies to the robot\'s tip_frame, "0.1 mm at tool0" to another '
+        'the cost, "0.1 mm" applies to the robot\'s tip_frames, "0.1 mm at tool0" to another '
         'frame, "0.01 deg" or "1e-4 rad" to the joints. The first grid has the `intervals`, up to '
         "60, or two thirds of them for smooth motions; the solution's `accuracy` reports the "
         "estimated error.",

@@ -29,8 +29,8 @@ def difference(model: pin.Model, q0: Array, q1: Array) -> Array:
     return _over_batch(lambda x, y: pin.difference(model, x, y), q0, q1, model.nv)
 
 
-def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
-    """Origin of a frame in the world, in [m]: q (M, nq) -> (M, 3).
+def frame_positions(model: pin.Model, frames: Sequence[int], q: Array) -> Array:
+    """Origins of F frames in the world, in [m]: q (M, nq) -> (M, F, 3).
 
     Raises InputError for another shape.
     """
@@ -41,10 +41,11 @@ def frame_position(model: pin.Model, frame: int, q: Array) -> Array:
         )
     q = np.asarray(q, dtype=float)
     data = model.createData()
-    positions = np.empty((len(q), 3))
-    for position, one in zip(positions, q, strict=True):
+    positions = np.empty((len(q), len(frames), 3))
+    for places, one in zip(positions, q, strict=True):
         pin.forwardKinematics(model, data, one)
-        position[:] = pin.updateFramePlacement(model, data, frame).translation
+        for place, frame in zip(places, frames, strict=True):
+            place[:] = pin.updateFramePlacement(model, data, frame).translation
     return positions
 
 
