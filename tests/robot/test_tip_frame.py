@@ -17,7 +17,7 @@ from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.loading import load_robot
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
-from hovi.robot.tip_frame import is_moved, named_as_end, names_in_words
+from hovi.robot.tip_frame import is_end_effector_name, is_moved, names_in_words
 
 Array = npt.NDArray[np.float64]
 Load = Callable[..., Robot]
@@ -88,10 +88,10 @@ def test_the_tips_of_every_example_move_and_end_its_longest_chains(name: str) ->
     tips = {frame: joints_above(model, frame) for frame in robot.tip_frames}
     for chain in longest:  # each has a tip, at its end or at a hand with a name of its own
         (tip,) = (frame for frame, above in tips.items() if above <= chain)
-        assert len(tips[tip]) == depth or named_as_end(tip)
+        assert len(tips[tip]) == depth or is_end_effector_name(tip)
         assert 2 * len(tips[tip]) >= depth
         beyond = [f for f in model.frames if f.parentJoint in chain - tips[tip]]
-        assert not any(named_as_end(f.name) for f in beyond if f.type in LINKS)
+        assert not any(is_end_effector_name(f.name) for f in beyond if f.type in LINKS)
     assert all(any(above <= chain for chain in longest) for above in tips.values())
 
 
@@ -203,12 +203,12 @@ def test_a_model_without_links_ends_at_a_joint() -> None:
 
 @pytest.mark.parametrize("name", TOOLS.split())
 def test_names_of_tools_hands_and_feet(name: str) -> None:
-    assert named_as_end(name)
+    assert is_end_effector_name(name)
 
 
 @pytest.mark.parametrize("name", ["", *NO_TOOLS.split()])
 def test_names_of_what_is_no_tool(name: str) -> None:
-    assert not named_as_end(name)
+    assert not is_end_effector_name(name)
 
 
 def test_frames_are_named_in_sentences() -> None:

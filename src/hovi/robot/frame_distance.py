@@ -1,4 +1,4 @@
-"""How far frames of a robot are from where they should be, along two motions."""
+"""The distance between the positions of frames in two motions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FrameDistance:
-    """The distance of each of some frames at M places of two motions.
+    """The distance of several frames between two motions, at M samples.
 
     frames: their names. each: of every frame's origin, shape (M, F), in [m].
     """
@@ -25,9 +25,9 @@ class FrameDistance:
 
     @classmethod
     def between(cls, robot: Robot, q: Array, other: Array, frame: str | None = None) -> Self:
-        """The distance between configurations (M, nq) of one motion and of another.
+        """The distance between configurations q and other, each of shape (M, nq).
 
-        frame: whose origin is followed; the robot's tip_frames when None.
+        frame: whose origin is compared; all of the robot's tip_frames if None.
         Raises InputError for a frame that is unknown or does not move.
         """
         frames = robot.measured_frames(frame)
@@ -36,20 +36,20 @@ class FrameDistance:
         )
 
     @classmethod
-    def of(cls, frames: tuple[str, ...], places: Array, others: Array) -> Self:
-        """The same from positions of the frames, each of shape (M, F, 3), in [m]."""
-        return cls(frames, np.asarray(np.linalg.norm(places - others, axis=-1)))
+    def of(cls, frames: tuple[str, ...], positions: Array, others: Array) -> Self:
+        """The same from the positions of the frames, each of shape (M, F, 3), in [m]."""
+        return cls(frames, np.asarray(np.linalg.norm(positions - others, axis=-1)))
 
     @property
     def largest(self) -> Array:
-        """The largest of all frames at every place, shape (M,), in [m]."""
+        """The largest of all frames at each sample, shape (M,), in [m]."""
         return np.asarray(self.each.max(axis=1))
 
     @property
     def frame(self) -> str:
-        """The frame with the largest distance anywhere."""
+        """The frame with the largest distance of all samples."""
         return self.frames[int(np.argmax(self.each.max(axis=0)))]
 
-    def frame_at(self, place: int) -> str:
-        """The frame with the largest distance at one place."""
-        return self.frames[int(np.argmax(self.each[place]))]
+    def frame_at(self, sample: int) -> str:
+        """The frame with the largest distance at one sample."""
+        return self.frames[int(np.argmax(self.each[sample]))]

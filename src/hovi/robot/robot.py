@@ -157,13 +157,13 @@ class Robot:
 
     @cached_property
     def tip_frames(self) -> tuple[str, ...]:
-        """Where the robot ends: its tool, or its hands or feet if it has several."""
+        """Its tool, hands or feet: the ends of its longest chains of joints."""
         return tip_frames(self.model)
 
     def measured_frames(self, frame: str | None = None) -> tuple[str, ...]:
-        """The frames at which a length is measured: the one that is named, or the tip_frames.
+        """The frames at which a length is measured: the given one, or the tip_frames if None.
 
-        Raises InputError for a named frame that is unknown or that no joint moves.
+        Raises InputError for a given frame that is unknown or that no joint moves.
         """
         if frame is None:
             return self.tip_frames

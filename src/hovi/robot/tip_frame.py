@@ -1,8 +1,8 @@
-"""The frames in which a robot ends: where a length is measured when no frame is named.
+"""The tips of a robot, at which lengths are measured if no frame is named.
 
-The last link of a file may be a sensor that is bolted to the world. What a person means is the tool
-of an arm, the hands of a humanoid, the feet of a quadruped: the ends of the longest chains of
-joints, up to the fingers of a hand that is named as one.
+The last link of a URDF may be a sensor that is fixed to the world. Users mean the tool of an arm,
+the hands of a humanoid, the feet of a quadruped: the ends of the longest chains of joints, without
+the fingers of a hand.
 """
 
 from __future__ import annotations
@@ -14,71 +14,82 @@ import pinocchio as pin
 
 from hovi.robot.model import frame_id
 
-END_WORDS = {"tool", "tcp", "ee", "eef", "effector", "hand", "gripper", "palm", "foot", "sole"}
-"""The word with which the name of a tool, a hand or a foot ends."""
-_PASSED_OVER = {"link", "frame", "body", "tip", "center", "point", "left", "right", "l", "r"}
-"""Words that may follow it: "gripper_frame_link", "hand_l"."""
+END_EFFECTORS = {
+    "tool",
+    "tcp",
+    "ee",
+    "eef",
+    "effector",
+    "hand",
+    "gripper",
+    "palm",
+    "foot",
+    "sole",
+}
+"""Last word in the name of a tool, hand or foot."""
+_IGNORED_WORDS = {"link", "frame", "body", "tip", "center", "point", "left", "right", "l", "r"}
+"""Words that may follow it, as in "gripper_frame_link" or "hand_l"."""
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 _LINKS = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
-_NAMED_IN_SENTENCES = 2
+_MAX_NAMES = 2
 
 
 def tip_frames(model: pin.Model) -> tuple[str, ...]:
-    """The frames at the ends of a model's longest chains of joints, the foremost one first.
+    """The frames at the ends of a model's longest chains of joints.
 
-    A chain is as long as the number of joints that move its end: a free-flyer and a joint that
-    mimics another count as one each; fixed and locked joints are none of a model. Chains of the
-    same length each have an end, and those named as tools come first; chains of fingers that part
-    at one hand share that hand. The last link of a model in which nothing moves.
+    The length of a chain is its number of joints: a free-flyer and a mimic joint count as one each;
+    the model has no fixed and locked joints. Each chain of the largest length has a tip, and
+    chains that branch at a hand share it. Tips with the name of a tool, hand or foot come first,
+    then the order is the model's. The last link if the model has no joint.
     """
     frames = _links_by_joint(model)
     chains = [list(support)[1:] for support in model.supports]
     longest = max(len(chain) for chain in chains)
-    found = (_end_of(chain, frames) for chain in chains if len(chain) == longest)
-    ends = dict.fromkeys(name for name in found if name)
-    if not ends:
+    found = (_tip_of(chain, frames) for chain in chains if len(chain) == longest)
+    tips = dict.fromkeys(name for name in found if name)
+    if not tips:
         return (_last_link(model),)
-    return tuple(sorted(ends, key=lambda name: not named_as_end(name)))
+    return tuple(sorted(tips, key=lambda name: not is_end_effector_name(name)))
 
 
-def named_as_end(frame: str) -> bool:
-    """Whether a frame's name says that it is a tool, a hand or a foot: "tool0", "leftHandLink".
+def is_end_effector_name(frame: str) -> bool:
+    """Whether a frame has the name of a tool, hand or foot, such as "tool0" or "leftHandLink".
 
-    A word in the middle says nothing of the kind: "hand_index_link", "left_hand_camera".
+    The last word decides: "hand_index_link" and "left_hand_camera" are not end effectors.
     """
     words = [word.lower() for word in _WORD.findall(frame)]
-    while words and words[-1] in _PASSED_OVER:
+    while words and words[-1] in _IGNORED_WORDS:
         words.pop()
-    return bool(words) and words[-1] in END_WORDS
+    return bool(words) and words[-1] in END_EFFECTORS
 
 
 def is_moved(model: pin.Model, frame: str) -> bool:
-    """Whether a joint stands between the world and a frame of the model."""
+    """Whether there is a joint between the world and a frame."""
     return bool(model.frames[frame_id(model, frame)].parentJoint > 0)
 
 
 def names_in_words(frames: Sequence[str]) -> str:
-    """Frames in a sentence: "left and right", "left and 3 more"."""
-    if len(frames) <= _NAMED_IN_SENTENCES:
+    """Frames for a message: "left and right", "left and 3 more"."""
+    if len(frames) <= _MAX_NAMES:
         return " and ".join(frames)
     return f"{frames[0]} and {len(frames) - 1} more"
 
 
-def _end_of(chain: Sequence[int], frames: Mapping[int, Sequence[str]]) -> str:
-    """The end of a chain of joints; "" where it carries no frame.
+def _tip_of(chain: Sequence[int], frames: Mapping[int, Sequence[str]]) -> str:
+    """The tip of a chain of joints; "" if it has no frame.
 
-    A hand counts if at least half of the chain moves it: beyond a wrist of two joints it is the
-    long fingers that matter.
+    A hand is a tip only if at least half of the chain's joints move it: for a dexterous hand on a
+    short wrist the fingers matter.
     """
     for joint in reversed(chain[(len(chain) - 1) // 2 :]):
-        named = [name for name in frames.get(joint, ()) if named_as_end(name)]
+        named = [name for name in frames.get(joint, ()) if is_end_effector_name(name)]
         if named:
             return named[-1]
     return next((frames[joint][-1] for joint in reversed(chain) if joint in frames), "")
 
 
 def _links_by_joint(model: pin.Model) -> dict[int, list[str]]:
-    """Names of what a joint carries: links and operational frames, or what else there is."""
+    """Names of the links and operational frames of each joint, or of its other frames if none."""
     links, others = (_by_joint(_frames(model, are_links)) for are_links in (True, False))
     return others | links
 
