@@ -74,7 +74,9 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
     from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
     scene, robot = _scene_of(trajectory)
-    robot.measured_frames(frame)  # a frame that cannot be measured speaks first
+    robot.measured_frames(
+        frame
+    )  # raises for a frame that is unknown or fixed, before the integration
     N, n = trajectory.v[:-1].shape
     h, start = trajectory.grid.steps[:, None], trajectory.q[:-1]
     forward = _ForwardDynamics(scene, trajectory)

@@ -37,8 +37,8 @@ def estimate_error(solution: Solution, frame: str | None = None) -> MotionError 
     Compared with the nearby solution on a finer grid, whose own error is smaller by orders of
     magnitude where the motion is resolved.
     frame: whose origin is compared, by default those of the robot's tip_frames.
-    None if no such solution was found. Raises InputError unless the solution is a
-    minimum, and for a frame that is unknown or does not move.
+    None if no such solution was found. Raises InputError unless the solution is a minimum, and for
+    a frame that is unknown or does not move.
     """
     finer = finer_than(solution)
     return None if finer is None else estimate_against(solution, finer, frame)
