@@ -130,17 +130,17 @@ class PlanOptions:
 
     def __post_init__(self) -> None:
         keep_whole_numbers(self)
-        via, most = self.via, self.most_seconds
+        via, limit = self.via, self.time_limit_seconds
         if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
-        if most is not None and not most > 0:
+        if limit is not None and not limit > 0:
             raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
         object.__setattr__(self, "via", tuple(via))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
         expect(self.table, Scheme, "a name such as 'galerkin-2' as the scheme")
 
     @property
-    def most_seconds(self) -> float | None:
+    def time_limit_seconds(self) -> float | None:
         """The time limit, in [s]."""
         return None if self.time_limit is None else seconds(self.time_limit, "time_limit")
 

@@ -100,7 +100,7 @@ def plan(
     grid = _grid(T, chosen, scene.robot)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
-    search = Search(job, Deadline(chosen.most_seconds), progress or _silent, free)
+    search = Search(job, Deadline(chosen.time_limit_seconds), progress or _silent, free)
     problem = job.problem()  # raises for invalid input before the search
     started = time.perf_counter()
     best, minima = search.run()

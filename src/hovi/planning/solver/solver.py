@@ -148,7 +148,7 @@ def solve(
     """
     began = time.perf_counter()
     method = method or method_for(problem)
-    if not method.suits(problem):
+    if not method.supports(problem):
         raise InputError(
             f"method {type(method).__name__} does not support this problem; leave `method` out."
         )

@@ -40,9 +40,9 @@ def test_the_first_method_that_suits_is_chosen(name: str, kind: type[Method]) ->
 
 def test_methods_that_suit_the_same_problem_find_the_same_minimum() -> None:
     problem = problem_of("two_link_reach", limits="none")
-    suited = [method for method in METHODS if method.suits(problem)]
-    assert [type(method) for method in suited] == [TrustRegion, AugmentedLagrangian]
-    found = [solve(problem, method=method) for method in suited]
+    supporting = [method for method in METHODS if method.supports(problem)]
+    assert [type(method) for method in supporting] == [TrustRegion, AugmentedLagrangian]
+    found = [solve(problem, method=method) for method in supporting]
     assert all(solution.success for solution in found)
     assert found[1].cost == pytest.approx(found[0].cost, rel=1e-11)
 

@@ -31,7 +31,7 @@ MAX_PENALTY_REDUCTION = 4
 class AugmentedLagrangian(Method):
     """Multipliers and penalties for the constraints; a trust-region method in every round."""
 
-    def suits(self, problem: TrajectoryProblem) -> bool:
+    def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems without limits."""
         return not problem.limited
 

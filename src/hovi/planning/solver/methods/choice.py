@@ -14,4 +14,4 @@ METHODS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian(), InteriorPoi
 
 def method_for(problem: TrajectoryProblem) -> Method:
     """The first method that supports a problem."""
-    return next(method for method in METHODS if method.suits(problem))
+    return next(method for method in METHODS if method.supports(problem))

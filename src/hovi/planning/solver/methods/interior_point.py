@@ -22,7 +22,7 @@ class InteriorPoint(Method):
     intervals halved until the limits hold everywhere to their tolerance.
     """
 
-    def suits(self, problem: TrajectoryProblem) -> bool:
+    def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with limits or obstacles, with or without equality constraints."""
         return problem.limited
 

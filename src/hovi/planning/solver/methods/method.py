@@ -45,7 +45,7 @@ class Method(ABC):
     """A method that minimises the action, for some kinds of problems."""
 
     @abstractmethod
-    def suits(self, problem: TrajectoryProblem) -> bool:
+    def supports(self, problem: TrajectoryProblem) -> bool:
         """Whether the method supports the problem's limits, obstacles and constraints."""
 
     @abstractmethod

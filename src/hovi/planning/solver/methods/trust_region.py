@@ -17,7 +17,7 @@ from hovi.planning.solver.status import chart_sentence, status_of
 class TrustRegion(Method):
     """Newton's method with exact Hessians in a trust region, down to rounding errors."""
 
-    def suits(self, problem: TrajectoryProblem) -> bool:
+    def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems without limits or equality constraints; ends may be free."""
         return not (problem.limited or problem.constrained)
 
