@@ -14,6 +14,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, path_on_grid
 from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, ModelError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
@@ -138,6 +139,11 @@ class TrajectoryProblem:
         """A curve sampled on the grid, with the problem's ends in fixed components."""
         q, v, _ = curve(np.array([0.0, self.grid.duration]))
         return path_on_grid(curve, self.grid, self.ends(q, v), self.robot)
+
+    def trajectory(self, path: DiscretePath) -> Trajectory:
+        """A path on the grid as a trajectory without momenta, for sampling."""
+        momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+        return Trajectory(self.grid, path, momenta, self.scene)
 
     def ends(self, q: Array, v: Array) -> Boundary:
         """The boundary data, with free components from the ends of q (M, nq) and v (M, nv)."""

@@ -88,14 +88,14 @@ class FinerSolution:
     @property
     def trajectory(self) -> Trajectory:
         """The motion without momenta, for sampling."""
-        return motion(self.problem, self.path)
+        return self.problem.trajectory(self.path)
 
 
 def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
     """The solution on a finer grid near a given one; None if none was found."""
     if problem.limited:
         halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
-        curve = stretched(motion(problem, path), problem.grid.duration)
+        curve = stretched(problem.trajectory(path), problem.grid.duration)
         return _solved(halves, halves.path(curve), problem, path)
     fine = problem.finer
     start = prolonged(path, fine.grid)
@@ -126,19 +126,13 @@ def _solved(
     solution = solve(fine, start)
     if not solution.success or solution.problem is None:
         return None
-    coarse, finer = motion(problem, path), solution.trajectory
+    coarse, finer = problem.trajectory(path), solution.trajectory
     k, s = sample_points(coarse)
     t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, finer.duration)
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
     known, cost = problem.ld.action(path), solution.cost
     return FinerSolution(solution.problem, finer.path, cost, known, gains, lambda: solution)
-
-
-def motion(problem: TrajectoryProblem, path: DiscretePath) -> Trajectory:
-    """A path as a trajectory without momenta, for sampling."""
-    momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
-    return Trajectory(problem.grid, path, momenta, problem.scene)
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:

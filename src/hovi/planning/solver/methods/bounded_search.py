@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
@@ -143,14 +142,9 @@ class BoundedSearch:
         model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
-    def trajectory(self, path: DiscretePath) -> Trajectory:
-        """A path as a trajectory without momenta, for sampling."""
-        momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
-        return Trajectory(self.problem.grid, path, momenta, self.problem.scene)
-
     def excess(self, path: DiscretePath) -> Array:
         """Excess over lower and upper bounds in every interval, shape (2, N, 4 nv + pairs)."""
-        trajectory = self.trajectory(path)
+        trajectory = self.problem.trajectory(path)
         excess = excess_along(trajectory, self.limits)
         sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
         if self.clearance is None:
@@ -162,7 +156,7 @@ class BoundedSearch:
 
     def worst(self, path: DiscretePath) -> str:
         """The limit or distance that is violated most: joint or pair, and time."""
-        trajectory = self.trajectory(path)
+        trajectory = self.problem.trajectory(path)
         if self.clearance is not None:
             sides, first = self.excess(path), self.limits.lower.size
             if sides[:, :, first:].max() >= sides[:, :, :first].max():

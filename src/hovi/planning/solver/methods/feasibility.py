@@ -59,7 +59,7 @@ def _moved_out_of_obstacles(
     """
     options, search.clearance = search.options, None
     path = _without_obstacles(search, path)
-    approach = approach_along(search.trajectory(path), wanted.distances, wanted.least)
+    approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
     depth = wanted.least - float(approach.distance.min())
     stages = int(np.clip(np.ceil(depth / STAGE_DEPTH), 1, MAX_STAGES))
     search.options = dataclasses.replace(options, max_iterations=STAGE_STEPS)
@@ -115,7 +115,7 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
     yield search.guess
     problem = search.problem
     T = problem.grid.duration
-    base = stretched(search.trajectory(search.guess), T)
+    base = stretched(search.problem.trajectory(search.guess), T)
     for seed in range(BUMPED_GUESSES):
         yield problem.path(with_bump(base, problem.robot, T, seed))
 

@@ -103,7 +103,7 @@ def _solved_on_halves(search: BoundedSearch, sides: Array) -> tuple[Bounded, str
     worst = chosen.copy()
     chosen[1:] |= worst[:-1]
     chosen[:-1] |= worst[1:]
-    curve = stretched(search.trajectory(search.guess), grid.duration)
+    curve = stretched(search.problem.trajectory(search.guess), grid.duration)
     search.problem = search.problem.on(grid.halved(chosen))
     search.guess = search.problem.path(curve)
     search.multipliers = None
