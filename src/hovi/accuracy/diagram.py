@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from hovi.accuracy.measures import MEASURES, shown_sizes, size
@@ -86,10 +86,6 @@ class Diagram:
                 front.append(run)
                 least = error
         return tuple(front)
-
-    def with_notes(self, *notes: str) -> Diagram:
-        """The diagram with these notes appended."""
-        return replace(self, notes=(*self.notes, *notes))
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON form, with tip errors in [mm]."""

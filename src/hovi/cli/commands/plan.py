@@ -132,7 +132,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
 
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
-    written, save_error = out if solution.trajectory is not None else None, None
+    written, save_error = out, None
     if written is not None:
         try:
             solution.trajectory.save(written)
