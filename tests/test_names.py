@@ -86,6 +86,6 @@ def test_names_in_texts_exist(page: Path) -> None:
 
 
 def test_the_ctrl_c_handler_finds_its_modules() -> None:
-    """A signal handler has to find these in sys.modules: what is not there it does without."""
+    """The handler looks these up in sys.modules by name, and skips those that are missing."""
     assert callable(import_module(EXTENSION_MODULE).ignore_leaks)
     assert callable(import_module(INTERRUPTION_MODULE).record_interrupt)

@@ -67,7 +67,7 @@ def main() -> None:
         }
     print("At the nodes:\n")
     print_slopes(slopes, ("q", "v", "p, p~", "cost"))
-    print("At five places inside every interval:\n")
+    print("At five points inside every interval:\n")
     print_slopes(slopes, ("q between", "v between", "a between", "tau between"))
     last = errors(motion("galerkin-3", 32, exact.trajectory), exact)
     print(

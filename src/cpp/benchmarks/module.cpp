@@ -1,4 +1,4 @@
-// The Python binding of what only a benchmark needs.
+// The Python binding of functions for a benchmark.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 

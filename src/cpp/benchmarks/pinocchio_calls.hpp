@@ -1,4 +1,4 @@
-// Pinocchio's own derivatives of RNEA, whose time is the yardstick of the kernel's.
+// Pinocchio's own derivatives of RNEA, with which the kernel's time is compared.
 #pragma once
 
 #include <pinocchio/multibody.hpp>

@@ -14,13 +14,13 @@ namespace {
 
 constexpr std::align_val_t alignment{64};
 
-// Roughly, with the larger vectors [ns].
+// Approximate time per point, with AVX2 [ns].
 double point_cost(double n, const Expansion& out) {
   if (out.hessian) return 15 * n * n;
   return out.jacobian ? 30 * n + 2 * n * n : 20 * n;
 }
 
-// To start and join a thread takes 20 to 90 us: not for little more work than that.
+// Starting and joining a thread takes 20 to 90 us, so each gets more work than that.
 std::size_t useful_threads(std::size_t asked, double work) {
   static const std::size_t cores = std::max(1u, std::thread::hardware_concurrency());  // 6 us
   const auto worthwhile = static_cast<std::size_t>(work / 150e3);

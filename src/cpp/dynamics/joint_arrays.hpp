@@ -1,4 +1,4 @@
-// A joint tree as Python hands it over: see src/hovi/dynamics/joint_tree.py.
+// A joint tree as arrays from Python: see src/hovi/dynamics/joint_tree.py.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct BaseArrays {
   bool planar;
 };
 
-// An index as the kernels hold it. What does not fit is out of bounds anyway.
+// An index as the kernels store it; one that does not fit is out of bounds anyway.
 inline int index(std::int64_t i) {
   if (i < -1 || i > std::numeric_limits<int>::max() / 2)
     throw std::invalid_argument("joint tree: an index is out of bounds: " + std::to_string(i));
@@ -92,7 +92,7 @@ inline TreeBase base_of(const BaseArrays& arrays) {
   return base;
 }
 
-// Throws std::invalid_argument where the arrays are no tree.
+// Throws std::invalid_argument if the arrays do not form a tree.
 inline JointTree joint_tree(const JointArrays& arrays, const BaseArrays& base,
                             const double* gravity, std::int64_t nq) {
   require_rows(arrays);

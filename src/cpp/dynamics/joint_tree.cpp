@@ -9,7 +9,7 @@ namespace hovi::dynamics {
 
 namespace {
 
-constexpr std::size_t most_joints = 10000;  // so that the number of entries of J fits an int
+constexpr std::size_t max_joints = 10000;  // so that the number of entries of J fits an int
 
 void require(bool holds, const std::string& expected) {
   if (!holds) throw std::invalid_argument("joint tree: " + expected);
@@ -42,7 +42,7 @@ JointTree::JointTree(std::vector<TreeJoint> joints, int nq, const TreeBase& base
 }
 
 void JointTree::check() const {
-  require(joints_.size() <= most_joints, "at most " + std::to_string(most_joints) + " joints");
+  require(joints_.size() <= max_joints, "at most " + std::to_string(max_joints) + " joints");
   const int n = static_cast<int>(joints_.size());
   require(0 <= nq_ && nq_ <= 2 * n, "a joint has one or two numbers in a configuration");
   for (int k = 0; k < n; ++k) {

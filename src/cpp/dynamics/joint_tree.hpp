@@ -10,8 +10,8 @@ namespace hovi::dynamics {
 
 class JointTree {
  public:
-  // nq, base, gravity: see TreeView. Throws std::invalid_argument for what is no tree, or would
-  // make a kernel read or write out of bounds.
+  // nq, base, gravity: see TreeView. Throws std::invalid_argument if the joints are not a
+  // tree, or would make a kernel read or write out of bounds.
   JointTree(std::vector<TreeJoint> joints, int nq, const TreeBase& base, const double* gravity);
 
   JointTree(JointTree&&) = default;

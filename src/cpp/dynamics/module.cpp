@@ -101,7 +101,7 @@ void expand(InverseDynamicsKernel& self, const Input<2>& q, const Input<2>& v, c
 }  // namespace
 
 NB_MODULE(dynamics, m) {
-  // What is alive as an interrupted program ends is no leak.
+  // Objects that are alive when an interrupted program ends are not leaks.
   m.def("ignore_leaks", [] { nb::set_leak_warnings(false); });
 
   const auto exact = [](const char* name) { return nb::arg(name).noconvert(); };

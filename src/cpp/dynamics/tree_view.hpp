@@ -7,7 +7,7 @@ namespace hovi::dynamics {
 struct TreeJoint {
   int parent;             // -1: the world
   int q;                  // index of its coordinate in a configuration
-  bool continuous;        // instead of the angle, (cos, sin) stand there
+  bool continuous;        // (cos, sin) is stored instead of the angle
   double rotation[9];     // of this frame in the parent's, at q = 0, by columns
   double translation[3];  // [m]
   double angular;         // angle about z per unit of q: 1, or 0 for a prismatic joint
@@ -36,7 +36,7 @@ struct TreeBase {
   int size;              // how many; 0: there is no such base
   int twist_indices[6];  // of each in a twist: linear x y z, angular x y z
   int q;                 // index of its quaternion (x, y, z, w) in a configuration
-  bool planar;           // instead of a quaternion, (cos, sin) of the angle about z stand there
+  bool planar;           // (cos, sin) of the angle about z is stored instead
 };
 
 struct TreeView {

@@ -1,4 +1,4 @@
-// Paths of intervals: what their quadrature points see, and where steps in their columns lead.
+// Paths of intervals: (q, v, a) at their quadrature points, and steps in their columns.
 #pragma once
 
 #include <algorithm>

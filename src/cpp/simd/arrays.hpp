@@ -1,4 +1,4 @@
-// NumPy's arrays as arguments of a module's functions, and memory for packs.
+// NumPy arrays as function arguments, and aligned memory for packs.
 #pragma once
 
 #include <memory>

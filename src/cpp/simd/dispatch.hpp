@@ -9,7 +9,7 @@
 
 namespace hovi {
 
-// portable: by what every processor has, instead of the fastest that this one has.
+// portable: the baseline instruction set, even where the processor has a faster one.
 template <typename Kernels>
 const Kernels& choose_kernels(bool portable = false) {
 #ifdef HOVI_WITH_AVX2

@@ -24,7 +24,6 @@ CONVERGED = Thresholds(cost=1e-13, joints=1e-9, tip=1e-9)
 """Changes by a doubling of the intervals below which the motion is resolved."""
 MAX_COST_CHANGE = 1e-6
 """Relative change of the cost at the last doubling above which the motion is no reference."""
-
 COST_FLOOR = 1e-12
 """Cost below which only rounding is left."""
 

@@ -133,7 +133,7 @@ def _gravity(model: pin.Model, base: Group | None) -> Array:
 
 def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
     """The joints of the tree in the order of the velocities."""
-    nowhere = pin.SE3.Identity()
+    identity = pin.SE3.Identity()
     rows = []
     last = [-1]  # the row of each of Pinocchio's joints that moves its body
     for index in range(1, model.njoints):
@@ -146,7 +146,7 @@ def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
             body = model.inertias[index] if k + 1 == len(axes) else None
             coordinate = 0 if is_base else joint.idx_q + k
             rows.append(_Row(parent, coordinate, continuous, axis, placement, body))
-            parent, placement = len(rows) - 1, nowhere
+            parent, placement = len(rows) - 1, identity
         last.append(parent)
     return rows
 

@@ -1,1 +1,1 @@
-"""The optimiser: an objective that evaluates, retracts and has a norm; no robot in sight."""
+"""The optimiser: for any objective that evaluates, retracts and has a norm."""

@@ -74,7 +74,7 @@ def _joint_table(model: pin.Model, held: Mapping[str, float]) -> Iterator[str]:
             )
         speed = _number(max(model.velocityLimit[joint.idx_v : joint.idx_v + joint.nv]))
         effort = _number(max(model.effortLimit[joint.idx_v : joint.idx_v + joint.nv]))
-        yield _ROW.format(name, kind_of(joint).word, *limits, speed, effort, width=width)
+        yield _ROW.format(name, kind_of(joint).label, *limits, speed, effort, width=width)
     for name, value in held.items():
         yield f"  {name:<{width}}  {'mimic':<11}  = {value:g}"
 
@@ -83,7 +83,7 @@ def _place(model: pin.Model, source: RobotSource, tips: Sequence[str]) -> str:
     base = "floating" if source.free_flyer else "fixed"
     if source.kind == "model":
         floats = model.njoints > 1 and kind_of(model.joints[1]) is FLOATING
-        base = FLOATING.word if floats else "fixed"
+        base = FLOATING.label if floats else "fixed"
     locked = f"; locked: {', '.join(source.locked)}" if source.locked else ""
     ends = f"Tip frame{'' if len(tips) == 1 else 's'}: {', '.join(tips)}"
     return f"Base: {base}{locked}. {ends} ({_count(model.nframes, 'frame')})."

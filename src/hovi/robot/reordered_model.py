@@ -75,8 +75,8 @@ def _copy_numbers(model: pin.Model, built: pin.Model, new_index: dict[int, int])
     for keys, start, size in ((PER_VELOCITY, "idx_v", "nv"), (PER_CONFIGURATION, "idx_q", "nq")):
         for key in keys:
             values = np.array(getattr(built, key))
-            for index, place in list(new_index.items())[1:]:
-                old, new = model.joints[index], built.joints[place]
+            for i_old, i_new in list(new_index.items())[1:]:
+                old, new = model.joints[i_old], built.joints[i_new]
                 count = getattr(new, size)
                 if count == getattr(old, size):
                     i, j = getattr(old, start), getattr(new, start)

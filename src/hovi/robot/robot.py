@@ -124,10 +124,10 @@ class Robot:
                 return f"it mimics {coupling.leader!r}; name that joint."
         return nearest(name, self.joint_names if valid is None else valid)
 
-    def joint_at(self, place: int) -> str:
-        """The joint that the entry of v at index `place` belongs to."""
+    def joint_at(self, index: int) -> str:
+        """The joint that the entry of v at an index belongs to."""
         pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
-        return next(n for n, joint in pairs if joint.idx_v <= place < joint.idx_v + joint.nv)
+        return next(n for n, joint in pairs if joint.idx_v <= index < joint.idx_v + joint.nv)
 
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:

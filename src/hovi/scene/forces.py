@@ -184,9 +184,9 @@ def _coadjoint(scene: Scene, momentum: ca.SX) -> ca.SX:
     """
     v, result = scene.terms.symbols.v, ca.SX.zeros(scene.robot.nv)
     for factor in scene.robot.space.curved:
-        i, places = factor.v, list(factor.group.se3_indices)
+        i, indices = factor.v, list(factor.group.se3_indices)
         p, twist = ca.SX.zeros(6), ca.SX.zeros(6)
-        p[places], twist[places] = momentum[i], v[i]
+        p[indices], twist[indices] = momentum[i], v[i]
         moment = ca.cross(p[:3], twist[:3]) + ca.cross(p[3:], twist[3:])
-        result[i] = ca.vertcat(ca.cross(p[:3], twist[3:]), moment)[places]
+        result[i] = ca.vertcat(ca.cross(p[:3], twist[3:]), moment)[indices]
     return result

@@ -103,15 +103,15 @@ def test_the_kernel_supports_axes_unchanged_by_their_own_motion(name: str) -> No
     assert kind_of(model.joints[1]).kernel == expected
 
 
-@pytest.mark.parametrize("word", ["revolute", "continuous", "prismatic", "floating", "planar"])
+@pytest.mark.parametrize("label", ["revolute", "continuous", "prismatic", "floating", "planar"])
 @pytest.mark.parametrize("axis", ["0 0 1", "0.6 0 0.8"])
-def test_reports_use_the_joint_types_of_urdf(word: str, axis: str) -> None:
+def test_reports_use_the_joint_types_of_urdf(label: str, axis: str) -> None:
     model = pin.buildModelFromXML(
-        f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{word}">'
+        f'<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{label}">'
         f'<parent link="a"/><child link="b"/><axis xyz="{axis}"/>'
         '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>'
     )
-    assert kind_of(model.joints[1]).word == word
+    assert kind_of(model.joints[1]).label == label
 
 
 # What is no joint on its own, or unknown
@@ -119,7 +119,7 @@ def test_reports_use_the_joint_types_of_urdf(word: str, axis: str) -> None:
 
 def test_followers_have_no_coordinates() -> None:
     model = mimicking()
-    assert kind_of(model.joints[2]).word == "mimic"
+    assert kind_of(model.joints[2]).label == "mimic"
     assert [each.q for each in coordinate_units(model)] == ["rad"]
 
 

@@ -1,4 +1,4 @@
-// What the units that build expression graphs share.
+// Declarations shared by the units that build expression graphs.
 #pragma once
 
 #include <pinocchio/autodiff/casadi.hpp>

@@ -1,1 +1,1 @@
-"""What commands make of their arguments: durations, scenes and files."""
+"""Parsing and checks of command-line arguments: durations, scenes and files."""

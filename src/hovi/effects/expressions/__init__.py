@@ -1,1 +1,1 @@
-"""CasADi expressions and joint values of which effects are built."""
+"""CasADi expressions and joint values from which effects are built."""

@@ -101,8 +101,8 @@ class Limits:
         """Limits tightened by a share of their ranges on both sides. Raises InputError."""
         if not (np.isfinite(margin) and 0 <= margin < 0.5):
             raise InputError(f"a margin must be a share of the range in [0, 0.5), got {margin}.")
-        room = margin * self.ranges
-        return Limits(self.lower + room, self.upper - room, self.tolerance)
+        shift = margin * self.ranges
+        return Limits(self.lower + shift, self.upper - shift, self.tolerance)
 
 
 def no_limits(robot: Robot) -> Limits:

@@ -30,7 +30,8 @@ from hovi.robot.robot import Robot
 from hovi.schemes import Scheme, by_name
 
 MAX_INTERVALS = 1_000_000
-_CLEARANCE = ("obstacles", "margin", "self_collision")
+"""Maximum number of intervals that may be requested."""
+_CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
 def _always(options: PlanOptions) -> bool:
@@ -166,7 +167,7 @@ class PlanOptions:
         """
         require_known(type(self), changes)
         options = dataclasses.replace(self, **changes)
-        if not changes.keys() & set(_CLEARANCE):  # keep its cached distances
+        if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
         return options
 

@@ -34,7 +34,7 @@ def _rate(name: str, joint: pin.JointModel, q: ca.SX, v: ca.SX) -> ca.SX:
     kind = kind_of(joint)
     if kind.group is None:
         raise SceneError(
-            f"joint {name!r} is of a kind ({kind.word}) that effects on frames do not support."
+            f"joint {name!r} is of a kind ({kind.label}) that effects on frames do not support."
         )
     return _RATES[kind.group.name](q, v)
 

@@ -229,10 +229,10 @@ def bracket(space: ConfigurationSpace, x: Array, y: Array) -> Array:
     """The Lie bracket [x, y] of left-invariant tangent vectors, (M, nv) each."""
     result = np.zeros_like(x)
     for factor in space.curved:
-        i, places = factor.v, list(factor.group.se3_indices)
+        i, indices = factor.v, list(factor.group.se3_indices)
         a, b, c = np.zeros((3, len(x), 6))
-        a[:, places], b[:, places] = x[:, i], y[:, i]
+        a[:, indices], b[:, indices] = x[:, i], y[:, i]
         c[:, :3] = np.cross(a[:, 3:], b[:, :3]) + np.cross(a[:, :3], b[:, 3:])
         c[:, 3:] = np.cross(a[:, 3:], b[:, 3:])
-        result[:, i] = c[:, places]
+        result[:, i] = c[:, indices]
     return result

@@ -56,7 +56,7 @@ class Group:
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries of a position and a rotation vector, (nv,), for reports."""
-        return tuple(_COORDINATES[place] for place in self.se3_indices)
+        return tuple(_COORDINATES[index] for index in self.se3_indices)
 
     @property
     def _layout(self) -> Layout:

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from hovi.robot.space.groups import SE2, SE3, SO2, SO3, Group
 
-Service = Literal["anywhere", "as base", "nowhere"]
+KernelSupport = Literal["anywhere", "as base", "nowhere"]
 
 
 class Units(NamedTuple):
@@ -32,7 +32,7 @@ LENGTH = Units("m", "m/s", "m/s^2", "N")
 class JointKind:
     """One kind of joint.
 
-    word: its name in reports, that of URDF if there is one.
+    label: its name in reports, that of URDF if there is one.
     names: Pinocchio's short names without "JointModel".
     units: of its coordinates, one each; None if they vary within the kind.
     group: its Lie group; None if its configurations form a vector space with q' = v.
@@ -41,11 +41,11 @@ class JointKind:
         the root of all others, where they enter through gravity alone.
     """
 
-    word: str
+    label: str
     names: tuple[str, ...]
     units: tuple[Units, ...] | None
     group: Group | None = None
-    kernel: Service = "nowhere"
+    kernel: KernelSupport = "nowhere"
 
 
 def _family(letter: str, *others: str) -> tuple[str, ...]:
@@ -53,10 +53,10 @@ def _family(letter: str, *others: str) -> tuple[str, ...]:
     return (*(letter + axis for axis in "XYZ"), *others)
 
 
-def _on(group: Group, word: str, names: tuple[str, ...], kernel: Service) -> JointKind:
+def _on(group: Group, label: str, names: tuple[str, ...], kernel: KernelSupport) -> JointKind:
     """A kind whose velocities are the tangent vectors of a group."""
-    units = (ANGLE if place in group.angular else LENGTH for place in range(group.nv))
-    return JointKind(word, names, tuple(units), group, kernel)
+    units = (ANGLE if index in group.angular else LENGTH for index in range(group.nv))
+    return JointKind(label, names, tuple(units), group, kernel)
 
 
 FLOATING = _on(SE3, "floating", ("FreeFlyer",), "as base")

@@ -1,1 +1,1 @@
-"""Ways to minimise the action of a problem: one method per file, all with one signature."""
+"""Methods that minimise the action of a problem, one per file, with a common interface."""
