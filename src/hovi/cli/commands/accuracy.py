@@ -117,12 +117,9 @@ def _write(diagram: Diagram, folder: Path) -> list[Path]:
 
 def _print(diagram: Diagram) -> None:
     """Print the reference, the fastest run per tolerance, and notes."""
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-
     from hovi.accuracy.measures import shown_sizes
     from hovi.accuracy.tables import COLUMNS, cheapest_rows
+    from hovi.cli.reports.terminal_table import print_table, terminal_table
     from hovi.robot.tip_frame import names_in_words
 
     resolved = diagram.resolved
@@ -133,14 +130,12 @@ def _print(diagram: Diagram) -> None:
         f"accurate to {errors['cost']:.0e} relative, {errors['joints']:.0e} rad, "
         f"{errors['tip']:.0e} mm at the tip, {names_in_words(resolved.tip_frames)}."
     )
-    table = Table(
-        box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title="fastest run per tolerance"
-    )
+    table = terminal_table("fastest run per tolerance")
     for column in COLUMNS:
         table.add_column(column, justify="left" if column == "method" else "right")
     for row in cheapest_rows(diagram):
         table.add_row(*row)
-    Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120).print(table)
+    print_table(table, width=120)
     for note in diagram.notes:
         print(f"note: {note}")
     if not diagram.complete:

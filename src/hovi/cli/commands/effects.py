@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,20 +64,16 @@ def effects(
 
 
 def _print(study: EffectStudy) -> None:
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-
     from hovi.accuracy.effect_study.tables import COLUMNS, study_note, study_rows
+    from hovi.cli.reports.terminal_table import print_table, terminal_table
 
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0), title=study.task.name)
+    table = terminal_table(study.task.name)
     for column in COLUMNS:
         first = column == "effect"
         table.add_column(column, justify="left" if first else "right", no_wrap=first)
     for row in study_rows(study):
         table.add_row(*row)
-    width = None if sys.stdout.isatty() else 140
-    Console(highlight=False, markup=False, width=width).print(table)
+    print_table(table, width=140)
     for trial in study.trials:
         print(f"{'+' if trial.added else '-'} {trial.effect.describe()}")
     print(study_note(study))

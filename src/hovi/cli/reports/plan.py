@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-import sys
 from pathlib import Path
 from typing import Any
 
-from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines, coarse_grid
 from hovi.cli.reports.limit_margins import LimitMargins, least_distance, limit_margins
 from hovi.cli.reports.peaks import Peaks, peaks
+from hovi.cli.reports.terminal_table import print_table, terminal_table
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
@@ -62,12 +60,11 @@ def print_report(
     for label, text in _summary(solution, task, coarse_grid(certificate)):
         print(f"{label:9s}{text}")
     extremes, margins = peaks(solution.trajectory), limit_margins(solution)
-    console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 120)
     if margins is not None:
-        console.print(_margins_table(extremes, margins))
+        print_table(_margins_table(extremes, margins), width=120)
         print(_margins_note(margins))
     else:
-        console.print(_peaks_table(extremes))
+        print_table(_peaks_table(extremes), width=120)
         if any(each.any() for each in extremes.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
     distance = least_distance(solution)
@@ -124,7 +121,7 @@ def _intervals(solution: Solution, task: Task) -> str:
 
 def _margins_table(extremes: Peaks, margins: LimitMargins) -> Table:
     """The extremes of each limited output, with the margin to its limit."""
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table = terminal_table()
     table.add_column("joint", overflow="fold")
     values = {
         "q": [_range(*ends) for ends in zip(extremes.q_low, extremes.q_high, strict=True)],
@@ -148,7 +145,7 @@ def _margins_note(margins: LimitMargins) -> str:
 
 
 def _peaks_table(extremes: Peaks) -> Table:
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table = terminal_table()
     table.add_column("joint", overflow="fold")
     for column in ("q", "limits", "|v|", "limit", "|tau|", "limit"):
         table.add_column(column, justify="right")

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.box import SIMPLE
 from rich.table import Table
 
+from hovi.cli.reports.terminal_table import terminal_table
 from hovi.planning.problem.limits import urdf_limits
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
@@ -66,7 +66,7 @@ def end_state(motion: Simulation) -> list[dict[str, Any]]:
 
 def end_table(rows: list[dict[str, Any]]) -> Table:
     """The final state as a table, one joint per line."""
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
+    table = terminal_table()
     table.add_column("at the end", overflow="fold")
     for column in ("q", "", "v", ""):
         table.add_column(column, justify="left" if not column else "right")
