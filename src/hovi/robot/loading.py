@@ -15,7 +15,7 @@ from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
 from hovi.robot.source import RobotSource, text_hash
 from hovi.robot.srdf import read_srdf_file
-from hovi.robot.urdf.check import MAXIMUM_DOF, read_urdf
+from hovi.robot.urdf.check import MAX_DOF, read_urdf
 
 
 def is_path(text: str) -> bool:
@@ -132,9 +132,9 @@ def _from_model(
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
     srdf: Path | None = None,
 ) -> Robot:
-    if model.nv > MAXIMUM_DOF:
+    if model.nv > MAX_DOF:
         raise ModelError(
-            f"model {name!r} has {model.nv} degrees of freedom, at most {MAXIMUM_DOF} are "
+            f"model {name!r} has {model.nv} degrees of freedom, at most {MAX_DOF} are "
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]

@@ -24,7 +24,7 @@ from hovi.system.files import reason, require_file
 
 Array = npt.NDArray[np.float64]
 
-MAXIMUM_BYTES = 8_000_000
+MAX_BYTES = 8_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class Srdf:
 def read_srdf_file(path: Path) -> str:
     """The text of an SRDF file. Raises ModelError if it is missing, too large or not UTF-8."""
     try:
-        require_file(path, MAXIMUM_BYTES)
+        require_file(path, MAX_BYTES)
         return path.read_bytes().decode()
     except OSError as error:
         raise ModelError(f"cannot read the SRDF {str(path)!r}: {reason(error)}.") from error

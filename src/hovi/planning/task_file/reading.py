@@ -27,9 +27,9 @@ from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.files import reason, require_file
 
-MAXIMUM_BYTES = 2_000_000
+MAX_BYTES = 2_000_000
 """Maximum size of a scene file."""
-MAXIMUM_DOTS = 1_000
+MAX_DOTS = 1_000
 """Maximum number of dots in a line; parsing time is quadratic in the parts of a dotted key."""
 
 
@@ -92,7 +92,7 @@ def _duration(given: Any, toml: TomlText) -> float | tuple[float, float]:
 
 def _read_text(path: Path) -> TomlText:
     try:
-        require_file(path, MAXIMUM_BYTES)
+        require_file(path, MAX_BYTES)
         return TomlText(path, path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise SceneError(f"there is no scene file {path}.") from None
@@ -104,9 +104,9 @@ def _read_text(path: Path) -> TomlText:
 
 def _validated(toml: TomlText) -> ShapedTable:
     for number, line in enumerate(toml.text.splitlines(), start=1):
-        if line.count(".") > MAXIMUM_DOTS:
+        if line.count(".") > MAX_DOTS:
             raise SceneError(
-                f"{toml.path}, line {number}: more than {MAXIMUM_DOTS:,} dots in one line."
+                f"{toml.path}, line {number}: more than {MAX_DOTS:,} dots in one line."
             )
     try:
         data = tomllib.loads(toml.text)

@@ -18,13 +18,13 @@ from hovi.errors import ModelError
 from hovi.robot.urdf.rules import RULES
 from hovi.system.files import reason, require_file
 
-MAXIMUM_BYTES = 32_000_000
-MAXIMUM_LINKS = 1_000
-MAXIMUM_DEPTH = 64
-MAXIMUM_ELEMENTS = 100_000
-MAXIMUM_ATTRIBUTES = 64
+MAX_BYTES = 32_000_000
+MAX_LINKS = 1_000
+MAX_DEPTH = 64
+MAX_ELEMENTS = 100_000
+MAX_ATTRIBUTES = 64
 """Of one element: the time of Pinocchio's parser grows with their square."""
-MAXIMUM_DOF = 250
+MAX_DOF = 250
 """Pinocchio's workspace holds tensors of 48 nv^3 bytes: 0.8 GB at 250 degrees of freedom."""
 
 _FREEDOM = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floating": 6}
@@ -33,7 +33,7 @@ _FREEDOM = {"revolute": 1, "continuous": 1, "prismatic": 1, "planar": 3, "floati
 def read_urdf(path: Path) -> str:
     """The text of a URDF file. Raises ModelError if it is missing, too large or not UTF-8."""
     try:
-        require_file(path, MAXIMUM_BYTES)
+        require_file(path, MAX_BYTES)
         return path.read_bytes().decode()
     except FileNotFoundError as error:
         raise ModelError(f"cannot read the URDF {str(path)!r}: no such file.") from error
@@ -56,7 +56,7 @@ def check_urdf(text: str, name: str = "robot.urdf") -> None:
 
 def checked_urdf(text: str, name: str = "robot.urdf") -> ElementTree.Element:
     """The element <robot> of the text of a URDF, checked. Raises ModelError."""
-    if len(text) > MAXIMUM_BYTES:
+    if len(text) > MAX_BYTES:
         raise ModelError(_too_large(name, len(text)))
     robot = _Reader(name).read(text)
     for rule in RULES:
@@ -89,12 +89,12 @@ class _Reader:
         self.elements += 1
         if self.depth == 1 and tag != "robot":
             self.refuse(f"its root element must be <robot>, not <{tag[:40]}>.")
-        if self.depth > MAXIMUM_DEPTH:
-            self.refuse(f"elements are nested more than {MAXIMUM_DEPTH} deep.")
-        if self.elements > MAXIMUM_ELEMENTS:
-            self.refuse(f"it has more than {MAXIMUM_ELEMENTS:,} elements, the maximum.")
-        if len(attributes) > MAXIMUM_ATTRIBUTES:
-            self.refuse(f"<{tag[:40]}> has more than {MAXIMUM_ATTRIBUTES} attributes.")
+        if self.depth > MAX_DEPTH:
+            self.refuse(f"elements are nested more than {MAX_DEPTH} deep.")
+        if self.elements > MAX_ELEMENTS:
+            self.refuse(f"it has more than {MAX_ELEMENTS:,} elements, the maximum.")
+        if len(attributes) > MAX_ATTRIBUTES:
+            self.refuse(f"<{tag[:40]}> has more than {MAX_ATTRIBUTES} attributes.")
         if tag.startswith("xacro:"):
             self.refuse(f"<{tag[:40]}> is xacro, not URDF: run xacro on the file first.")
         if self.depth == 2:
@@ -107,15 +107,15 @@ class _Reader:
 
     def count(self, tag: str, joint_type: str) -> None:
         self.links += tag == "link"
-        if self.links > MAXIMUM_LINKS:
+        if self.links > MAX_LINKS:
             self.refuse(
-                f"it has more than {MAXIMUM_LINKS} links, the maximum: "
+                f"it has more than {MAX_LINKS} links, the maximum: "
                 "merge links that do not move relative to each other."
             )
         self.freedom += _FREEDOM.get(joint_type, 0) if tag == "joint" else 0
-        if self.freedom > MAXIMUM_DOF:
+        if self.freedom > MAX_DOF:
             self.refuse(
-                f"it has more than {MAXIMUM_DOF} degrees of freedom, the maximum "
+                f"it has more than {MAX_DOF} degrees of freedom, the maximum "
                 "(memory grows with their cube): make some joints fixed."
             )
 
@@ -128,6 +128,6 @@ class _Reader:
 
 def _too_large(name: str, size: int) -> str:
     return (
-        f"URDF {name!r} has {size / 1e6:.0f} MB, at most {MAXIMUM_BYTES / 1e6:.0f} MB are "
+        f"URDF {name!r} has {size / 1e6:.0f} MB, at most {MAX_BYTES / 1e6:.0f} MB are "
         "accepted: store meshes in separate files."
     )

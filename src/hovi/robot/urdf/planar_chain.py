@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from hovi.errors import InputError
-from hovi.robot.urdf.check import MAXIMUM_DOF
+from hovi.robot.urdf.check import MAX_DOF
 from hovi.system.files import whole_file
 
 _COLORS = ("0.16 0.44 0.74 1", "0.95 0.55 0.15 1")
@@ -48,8 +48,8 @@ def chain(n: int, *, length: float = 1.0, mass: float = 1.0) -> str:
     mass: of each link, in [kg].
     Raises InputError for anything else.
     """
-    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAXIMUM_DOF:
-        raise InputError(f"a chain has 1 to {MAXIMUM_DOF} links, not {n!r}.")
+    if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAX_DOF:
+        raise InputError(f"a chain has 1 to {MAX_DOF} links, not {n!r}.")
     if not (0.0 < length < float("inf") and 0.0 < mass < float("inf")):
         raise InputError(f"a chain needs a positive length and mass, not {length!r}, {mass!r}.")
     links = "".join(_link(i, float(length), float(mass)) for i in range(1, n + 1))

@@ -19,11 +19,11 @@ from hovi.errors import nearest
 
 Rule = Callable[[Element], Iterator[str]]
 
-MAXIMUM_MAGNITUDE = 1e12
-MAXIMUM_LIMIT = 1e30
+MAX_MAGNITUDE = 1e12
+MAX_LIMIT = 1e30
 """For limits, which are only compared; some URDFs write 1e16 for "no limit"."""
 
-MAXIMUM_NAME = 256
+MAX_NAME = 256
 
 INERTIA_TOLERANCE = 1e-7
 """Largest negative principal inertia, in [kg m^2], accepted as a rounding error of CAD exports."""
@@ -351,7 +351,7 @@ def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
 
 def _number_problem(text: str, count: int, tag: str) -> str:
     words = text.split()
-    largest = MAXIMUM_LIMIT if tag in ("limit", "safety_controller") else MAXIMUM_MAGNITUDE
+    largest = MAX_LIMIT if tag in ("limit", "safety_controller") else MAX_MAGNITUDE
     if len(words) != count:
         return "one number" if count == 1 else f"{count} numbers separated by spaces"
     if not all(_NUMBER.fullmatch(word) for word in words):
@@ -362,8 +362,8 @@ def _number_problem(text: str, count: int, tag: str) -> str:
 
 
 def _name_problem(name: str) -> str:
-    if len(name) > MAXIMUM_NAME:
-        return f"have at most {MAXIMUM_NAME} characters"
+    if len(name) > MAX_NAME:
+        return f"have at most {MAX_NAME} characters"
     return "" if name.isprintable() else "contain printable characters only"
 
 
