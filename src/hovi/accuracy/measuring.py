@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
@@ -12,9 +12,7 @@ from hovi.accuracy.method import Method, Prepared, Stopwatch
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
-
-Progress = Callable[[str, float], None]
-"""Called with a line of text and the fraction of the budget spent."""
+from hovi.planning.search.job import Progress
 
 INTERVALS = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
 """Numbers of intervals: 4, 6, 8, 12, 16, ..."""

@@ -13,6 +13,7 @@ from hovi.accuracy.run import Run
 from hovi.system.files import finite
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+"""Errors of the cost for which the table has a row."""
 COLUMNS = (
     "cost error",
     "method",

@@ -9,7 +9,7 @@ from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import NEARER_RESOLVED_SHARE, guess_curve
 from hovi.accuracy.measures import Thresholds
-from hovi.accuracy.measuring import MAX_SOLVE_SHARE, REPEATS, SUFFICIENT_ERRORS, Progress, measure
+from hovi.accuracy.measuring import MAX_SOLVE_SHARE, REPEATS, SUFFICIENT_ERRORS, measure
 from hovi.accuracy.method import CLOCKS, Method
 from hovi.accuracy.resolved_motion import resolve
 from hovi.accuracy.tolerance_method import choices
@@ -18,6 +18,7 @@ from hovi.discrete.guess import Curve
 from hovi.errors import InputError, UnmeasurableError, nearest
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.job import Progress
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
 from hovi.system.interruption import interruptible, raise_if_interrupted

@@ -27,6 +27,7 @@ ROTATION_POINTS = 8
 MAX_ROTATION = 0.9 * np.pi
 """Largest rotation of an orientation within an interval of a guess, in [rad]."""
 BUMP_MODES = 8
+"""Number of terms of a random bump."""
 BUMP_AMPLITUDES = (0.2, 1.5)
 """Range of the amplitude of a random bump, in [rad] or [m]."""
 

@@ -20,6 +20,7 @@ from hovi.scene.scene import Scene
 Array = npt.NDArray[np.float64]
 
 STEPS_PER_SECOND = 400
+"""Default number of steps of the execution of a plan, per [s]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,12 +9,14 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 System = Callable[[Array], tuple[Array, Array]]
+"""u (B, m) -> F (B, m), dF/du (B, m, m)."""
 
 CONVERGED_STEP = 1e-9
 """Relative step after which the error, about its square, is below rounding."""
 STAGNATION_STEP = 1e-6
 """Relative step below which slow convergence is due to rounding; a double root would halve it."""
 MAX_STEPS = 60
+"""Maximum number of Newton steps."""
 
 
 def newton(system: System, u: Array) -> tuple[Array, npt.NDArray[np.bool_]]:

@@ -24,6 +24,7 @@ POINTS = 64
 SECONDS = 0.02
 """Time for the repeated evaluation of each scene, in [s]."""
 MIN_TURNS = 3
+"""Minimum number of repetitions, less one."""
 
 
 class AccountedScene(Protocol):

@@ -16,6 +16,7 @@ from hovi.system.files import reason, whole_file
 Array = npt.NDArray[np.float64]
 
 MAX_ROWS = 50_000_000
+"""Maximum number of rows of a table."""
 _ROWS_PER_BATCH = 10_000
 
 

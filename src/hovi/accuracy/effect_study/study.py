@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
 from hovi.flows.tracking import play
+from hovi.planning.search.job import Progress
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
@@ -25,7 +26,6 @@ from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 BANDWIDTH = 10.0
 """Bandwidth of the tracking feedback, in [rad/s]."""

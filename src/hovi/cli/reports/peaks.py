@@ -14,6 +14,7 @@ Array = npt.NDArray[np.float64]
 
 SAMPLES_PER_INTERVAL = 20
 MAX_SAMPLES = 20_000
+"""Number of samples in which extremes are sought, with an upper bound for the whole motion."""
 
 
 @dataclass(frozen=True, eq=False)

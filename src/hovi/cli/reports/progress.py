@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hovi.planning.search.job import Progress
 
 BAR_DELAY = 1.0  # [s] before the bar appears
 LINE_PERIOD = 10.0  # [s] between plain lines
 
-Report = Callable[[str, float], None]
-
 
 @contextmanager
-def progress(quiet: bool) -> Iterator[Report | None]:
+def progress(quiet: bool) -> Iterator[Progress | None]:
     """The `progress` argument of `hovi.plan`; None when quiet."""
     if quiet:
         yield None
@@ -26,12 +28,13 @@ def progress(quiet: bool) -> Iterator[Report | None]:
 
 
 @contextmanager
-def _progress_bar() -> Iterator[Report]:
+def _progress_bar() -> Iterator[Progress]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    bar = Bar(*columns, console=Console(stderr=True), transient=True)
     line = bar.add_task("", total=1.0)
     began = time.monotonic()
 
@@ -46,7 +49,7 @@ def _progress_bar() -> Iterator[Report]:
         bar.stop()
 
 
-def _plain_lines() -> Report:
+def _plain_lines() -> Progress:
     last = time.monotonic()
 
     def report(text: str, fraction: float) -> None:

@@ -16,6 +16,7 @@ DISTANCE_SCALE = 0.1
 DEFAULT_MARGIN = 0.01
 """Margin where none is given, in [m]."""
 MAX_OBSTACLES = 1_000
+"""Maximum number of obstacles."""
 
 
 @dataclass(frozen=True, eq=False)

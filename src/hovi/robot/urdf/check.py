@@ -22,6 +22,7 @@ MAX_BYTES = 32_000_000
 MAX_LINKS = 1_000
 MAX_DEPTH = 64
 MAX_ELEMENTS = 100_000
+"""Largest file in bytes, and largest numbers of links, nested elements and elements."""
 MAX_ATTRIBUTES = 64
 """Of one element: the time of Pinocchio's parser grows with their square."""
 MAX_DOF = 250
