@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import quad
 
 import hovi
-from hovi.discrete.curve_integral import integral_along
 from hovi.cli.reports.certificate import certificate_lines
+from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
