@@ -106,4 +106,5 @@ def test_an_interrupt_anywhere_ends_every_search(
     found = plan(arm_scene, HANG, **arguments)
     assert (found.success, found.status) == (False, Status.INTERRUPTED)
     assert "interrupted" in found.message
+    assert "a minimum of cost" not in found.message
     assert evaluations <= calls <= evaluations + MAX_EVALUATIONS_AFTER

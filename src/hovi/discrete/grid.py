@@ -63,6 +63,13 @@ class Grid:
             raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
         return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
 
+    def stretched(self, duration: float) -> Grid:
+        """The grid scaled to another duration.
+
+        duration: T > 0 in [s]. Raises InputError for steps that are too short or too long.
+        """
+        return Grid(self.steps * (duration / self.duration), self.schemes)
+
     def halved(self, chosen: npt.NDArray[np.bool_]) -> Grid:
         """The grid with the chosen intervals bisected.
 

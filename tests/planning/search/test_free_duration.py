@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -104,3 +106,144 @@ def test_bad_durations_are_refused() -> None:
         reach((1.0, 2.0, 3.0))
     with pytest.raises(InputError, match="weight of time must be"):
         reach((1.0, 2.0), time_weight=-1.0)
+
+
+TORQUES = {"base": "none", "tau": [8.0, 3.0]}
+Scan = dict[float, hovi.Solution]
+
+
+def raised(two_link: hovi.Robot, duration: object, **options: object) -> hovi.Solution:
+    """The two-link arm from hanging to a reach, at rest, with torques of 8 and 3 N m."""
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity(9.8)])
+    options = {"limits": TORQUES, "intervals": 20, **options}
+    return hovi.plan(scene, [-np.pi / 2, 0.0], [0.3, 0.7], duration, **options)
+
+
+def scan(plan: Callable[[float], hovi.Solution], lower: float, upper: float) -> Scan:
+    """Plans for given durations, each from its own guess."""
+    return {float(T): plan(float(T)) for T in np.geomspace(lower, upper, 12)}
+
+
+def least(found: Scan, weight: float) -> tuple[float, float]:
+    """The best duration of a scan, and its cost with time."""
+    totals = {T: s.cost + weight * T for T, s in found.items() if s.success}
+    best = min(totals, key=lambda T: totals[T])
+    return best, totals[best]
+
+
+def excess(solution: hovi.Solution, most: list[float]) -> float:
+    """By which share the torques of pin.rnea exceed their limits at 10,000 instants."""
+    motion, model = solution.trajectory, solution.problem.scene.model
+    data, samples = model.createData(), motion.sample(np.linspace(0, motion.duration, 10_000))
+    rows = zip(samples.q, samples.v, samples.a, strict=True)
+    tau = np.array([pin.rnea(model, data, q, v, a) for q, v, a in rows])
+    return float((np.abs(tau) / most).max() - 1)
+
+
+def test_a_first_duration_that_is_too_short_is_left(two_link: hovi.Robot) -> None:
+    found = raised(two_link, (0.3, 3.0), time_weight=30.0)
+    assert found.status is hovi.Status.MINIMUM, found.message
+    assert found.cost <= 51.357 * (1 + 1e-4)
+    assert found.trajectory.duration == pytest.approx(1.25, rel=0.05)
+    assert found.duration_derivative == pytest.approx(-30.0, rel=1e-6)
+    assert excess(found, [8.0, 3.0]) <= 1e-5
+    assert "The best duration is" in found.message
+
+
+def test_between_velocity_limits_the_best_duration_is_that_of_a_scan() -> None:
+    task, weight = hovi.load_task(hovi.example("ur5_reach_limited")), 1000.0
+    ends, options = (task.scene, task.start, task.goal), {"limits": {"v": 3.14}}
+    found = hovi.plan(*ends, (0.2, 1.0), time_weight=weight, **options)
+    fixed = scan(lambda T: hovi.plan(*ends, T, continuation=False, **options), 0.2, 1.0)
+    T, cost = least(fixed, weight)
+    assert fixed[0.2].status is hovi.Status.INFEASIBLE  # by the mean velocity
+    assert found.success, found.message
+    assert cost * (1 - 0.02) <= found.cost <= cost * (1 + 1e-5)
+    assert found.trajectory.duration == pytest.approx(T, rel=5 ** (1 / 11) - 1)
+
+
+def test_a_range_whose_upper_end_is_best_is_searched_up_to_it(two_link: hovi.Robot) -> None:
+    found = raised(two_link, (0.3, 1.15), time_weight=30.0)
+    fixed = scan(lambda T: raised(two_link, T, continuation=False), 0.9, 1.15)
+    assert least(fixed, 30.0) == pytest.approx((1.15, found.cost), rel=1e-6)
+    assert found.trajectory.duration == pytest.approx(1.15, rel=1e-14)
+    assert found.success
+    assert "kept at its bound, 1.15 s" in found.message
+
+
+def test_a_hurry_ends_at_the_edge_of_feasibility(two_link: hovi.Robot) -> None:
+    found = raised(two_link, (0.3, 3.0), time_weight=1e5, intervals=8)
+    T = found.trajectory.duration
+    assert found.status is hovi.Status.MINIMUM, found.message
+    assert (
+        f"what was found feasible, to 0.001 of it towards shorter ones: {T:.10g}" in found.message
+    )
+    assert excess(found, [8.0, 3.0]) <= 1e-5
+    shorter = raised(two_link, T * (1 - 2e-3), intervals=8, guess=found.trajectory)
+    assert shorter.status is hovi.Status.INFEASIBLE
+
+
+def test_a_range_without_a_motion_is_infeasible_for_a_reason(two_link: hovi.Robot) -> None:
+    found = raised(two_link, (0.3, 0.9), time_weight=30.0, continuation=False)
+    assert (found.success, found.status) == (False, hovi.Status.INFEASIBLE)
+    assert "the torque of joint 'elbow' reaches" in found.message
+    assert "Nor was one found for 6 other durations from 0.3 to 0.9 s." in found.message
+    assert found.minima == ()
+
+
+def test_where_long_motions_are_infeasible_shorter_ones_are_tried(two_link: hovi.Robot) -> None:
+    """A joint that may not be slower than 0.4 rad/s cannot take its time."""
+    scene, limits = hovi.Scene(two_link, []), {"base": "none", "v": {"shoulder": [0.4, 3.0]}}
+    ends = hovi.State([0.0, 0.0], [1.0, 0.0]), hovi.State([1.5, 0.0], [1.0, 0.0])
+    found = hovi.plan(scene, *ends, (2.0, 12.0), limits=limits, intervals=8)
+    assert found.success, found.message
+    assert found.trajectory.duration < 1.5 / 0.4
+    assert found.trajectory.sample(np.linspace(0, 2, 1000)).v[:, 0].min() >= 0.4 - 3e-5
+
+
+def test_passive_joints_and_limits_leave_room_for_the_best_duration(two_link: hovi.Robot) -> None:
+    scene = hovi.Scene(two_link, [hovi.effects.Gravity(9.8)], passive=["elbow"])
+    ends, limits = (
+        ([-np.pi / 2, 0.0], [np.pi / 2, 0.0]),
+        {"base": "none", "tau": {"shoulder": 12.0}},
+    )
+    found = hovi.plan(scene, *ends, (0.5, 6.0), time_weight=30.0, limits=limits, intervals=30)
+    assert found.success, found.message
+    assert found.duration_derivative == pytest.approx(-30.0, rel=1e-6)
+    assert "The best duration is" in found.message
+
+
+def test_all_starts_are_made_where_there_is_a_motion(two_link: hovi.Robot) -> None:
+    told: list[str] = []
+    options = {"starts": 3, "processes": 1, "intervals": 8, "time_weight": 30.0}
+    found = raised(two_link, (0.3, 3.0), progress=lambda text, _: told.append(text), **options)
+    assert found.success, found.message
+    assert [text[:11] for text in told].count("3 of 3 star") == 2  # at the first and at the next
+    assert "starts" not in found.message
+
+
+def test_around_an_obstacle_the_best_duration_is_cheaper_than_its_neighbours(
+    two_link: hovi.Robot,
+) -> None:
+    scene, ball = hovi.Scene(two_link, []), hovi.Sphere([0.85, 0.0, -1.7], 0.15)
+    ends, options = ([-np.pi / 2, 0.0], [0.3, 0.7]), {"obstacles": [ball], "limits": "none"}
+    found = hovi.plan(scene, *ends, (1.25, 1.55), time_weight=30.0, intervals=6, **options)
+    assert found.success, found.message
+    assert found.duration_derivative == pytest.approx(-30.0, rel=1e-6)
+    T = found.trajectory.duration
+    for each in (0.95 * T, 1.05 * T):
+        near = hovi.plan(scene, *ends, each, intervals=6, **options)
+        assert near.cost + 30.0 * each > found.cost
+    bare = hovi.plan(scene, *ends, T, intervals=6, limits="none")
+    assert bare.cost + 30.0 * T < found.cost * (1 - 0.01)
+
+
+@pytest.mark.parametrize("limit", [0.02, 0.3, 0.9])
+def test_a_time_limit_is_told_wherever_it_ends_the_search(
+    two_link: hovi.Robot, limit: float
+) -> None:
+    found = raised(two_link, (0.3, 3.0), time_weight=1e5, time_limit=limit, intervals=40)
+    assert (found.success, found.status) == (False, hovi.Status.TIME_LIMIT)
+    assert "time limit" in found.message
+    assert "a minimum of cost" not in found.message
+    assert f"{found.trajectory.duration:.10g} s" in found.message

@@ -16,7 +16,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance
-from hovi.planning.search.free_duration import FreeDuration, SolveFor, free_to_tolerance
+from hovi.planning.search.free_duration import FreeDuration, SolveFor
+from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve
 from hovi.planning.solver.status import Status
@@ -120,9 +121,13 @@ def in_vain(solution: Solution) -> Solution:
 @pytest.mark.parametrize(
     ("later_steps", "later_refine", "reason"),
     [
-        (0, None, "on a finer grid failed (iteration_limit); "),
-        (None, None, "on a finer grid failed (interrupted); "),
-        (500, in_vain, "on a finer grid failed (the tolerance was not reached again); "),
+        (0, None, "found on a coarser grid (iteration_limit on the finer one)"),
+        (None, None, "found on a coarser grid (interrupted on the finer one)"),
+        (
+            500,
+            in_vain,
+            "found on a coarser grid (the tolerance was not reached again on the finer one)",
+        ),
     ],
 )
 def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(

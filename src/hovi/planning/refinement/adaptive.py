@@ -220,6 +220,10 @@ class _Search:
             message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
         metadata = {**solution.trajectory.metadata, "error_estimate": known}
         if interrupted() and not reached:
+            if solution.success:
+                message = (
+                    f"interrupted; the motion is the best so far, of cost {solution.cost:.10g}"
+                )
             solution = dataclasses.replace(solution, success=False, status=Status.INTERRUPTED)
         return dataclasses.replace(
             solution,

@@ -20,15 +20,12 @@ from hovi.planning.refinement.inactive_limits import (
     with_limits_again,
     without_limits,
 )
-from hovi.planning.search.free_duration import (
-    FreeDuration,
-    SolveFor,
-    free_to_tolerance,
-    solve_duration,
-)
+from hovi.planning.search.free_duration import FreeDuration, SolveFor, solve_duration
+from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.solver import Solution, guess_path, solve
+from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
 
@@ -125,7 +122,9 @@ class FinalStages:
     def _with_best_duration(self, free: FreeDuration, solution: Solution, which: str) -> Solution:
         """A minimum with its best duration, to the tolerance if there is one."""
         solve_for = self._stretched(self.fine.grid)
-        first = solve_for(free.first, solution.trajectory)
+        first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
+        if not solution.success and solution.status is not Status.INFEASIBLE:
+            first = solve_for(self.fine.grid.duration, solution.trajectory)
         if self.fine.tolerance is None:
             return solve_duration(free, solve_for, first)
         refine = partial(self._refined, self.fine.tolerance, f"{which}: ")
@@ -135,8 +134,7 @@ class FinalStages:
         """A solver on a grid that is scaled to each duration."""
 
         def solve_for(T: float, guess: Trajectory) -> Solution:
-            stretched = Grid(grid.steps * (T / grid.duration), grid.schemes)
-            return self._solve(self.fine.on(stretched), guess)
+            return self._solve(self.fine.on(grid.stretched(T)), guess)
 
         return solve_for
 

@@ -5,8 +5,8 @@ where Pontryagin's Hamiltonian equals w. The derivative of the discrete action i
 DiscreteLagrangian.duration_derivative). Each motion is the guess for the next, and the root is
 bracketed; limits and constraints need no special treatment.
 
-With a tolerance two searches alternate: for the best duration on a grid, and for a grid that is
-fine enough at that duration. Each hardly changes the result of the other.
+J + w T may decrease up to a bound of the duration, or up to durations that are infeasible. If a
+duration fails, the search approaches it by bisection, which brackets the edge of feasibility.
 """
 
 from __future__ import annotations
@@ -17,29 +17,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.problem.tolerance import Round
+from hovi.planning.search.continuation import STOPPED
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.interruption import record_interrupt
 
 SolveFor = Callable[[float, Trajectory], Solution]
 """Solves for a duration in [s], from a guess."""
-OnGrid = Callable[[Grid], SolveFor]
-"""Returns a solver on a grid, scaled to each duration."""
-Refine = Callable[[Solution], Solution]
-"""Refines a motion of fixed duration to the tolerance; keeps its grid if that is fine enough."""
 
-MAX_GRIDS = 4
-"""Maximum number of grids on which the best duration is computed."""
-FINER_GRID_STRIDE = 1.001
-"""Ratio of the first two durations on a finer grid."""
+PROBES = 4, 2
+"""Numbers of other first durations, on the more and on the less promising side."""
 MAX_STRIDE = 1.3
 """Maximum ratio of successive durations while a bracket is sought."""
 DURATION_PRECISION = 1e-12
 """Relative tolerance of the duration."""
+SLOPE_PRECISION = 1e-10
+"""Tolerance of J' + w, relative to (J + w T) / T."""
+MIN_KINK = 1e-6
+"""Slope J' + w at a change of sign that indicates a kink or a jump, relative to (J + w T) / T."""
+JUMP_BRACKET = 1e-4
+"""Relative width of a bracket below which jumps of J + w T are detected."""
+MIN_JUMP, MAX_GRID_JUMP = 1e-7, 1e-2
+"""Relative jumps of J + w T: the least to be detected, the largest ascribed to split intervals."""
+EDGE_PRECISION = 1e-3
+"""Relative tolerance of the duration at the edge of feasibility."""
+MAX_DURATIONS = 100
+"""Maximum number of durations that are solved for."""
 
 
 @dataclass(frozen=True)
@@ -68,34 +73,60 @@ class FreeDuration:
         """The first duration of the search: the geometric mean of the bounds, in [s]."""
         return float(np.sqrt(self.lower * self.upper))
 
+    def probes(self, limited: bool) -> list[float]:
+        """Other first durations, in [s], from the geometric mean to each bound.
+
+        limited: longer ones come first, as limits bind at short durations; else shorter ones.
+        """
+        bounds = (self.upper, self.lower) if limited else (self.lower, self.upper)
+        return [
+            float(T)
+            for bound, count in zip(bounds, PROBES, strict=True)
+            for T in np.geomspace(self.first, bound, count + 1)[1:]
+        ]
+
 
 @dataclass(frozen=True, eq=False)
 class BestDuration:
     """The motion at the best duration, its cost without w T.
 
     steps: of the optimiser, in all solves. ending: words of the message before the duration.
+    reason: why the search ended early; "" if it did not, or if the motion is not a minimum.
     """
 
     free: FreeDuration
     solution: Solution
     steps: int
     ending: str
+    reason: str = ""
 
     def with_time(self) -> Solution:
         """The motion as a solution whose cost includes w T."""
         best, weight = self.solution, self.free.weight
         T = best.trajectory.duration
         cost = best.cost + weight * T
+        parts = f"{cost:.10g}, {weight * T:.6g} of it for time, after {self.steps} steps"
         message = f"{best.message} {self.ending} {T:.10g} s."
         if best.success:
-            message = (
-                f"a minimum of cost {cost:.10g}, {weight * T:.6g} of it for time, after "
-                f"{self.steps} steps. {self.ending} {T:.10g} s."
-            )
-        minima = (cost,) if best.success else ()
+            message = f"a minimum of cost {parts}. {self.ending} {T:.10g} s."
+        elif self.reason:
+            so_far = f"the motion is the best so far, of cost {parts}"
+            message = f"{self.reason}; {so_far}. {self.ending} {T:.10g} s."
+        elif weight > 0:
+            message = f"{message} Time adds {weight * T:.6g} to the cost."
         return dataclasses.replace(
-            best, cost=cost, message=message, nit=self.steps, minima=minima, history=()
+            best,
+            cost=cost,
+            message=message,
+            nit=self.steps,
+            minima=(cost,) if best.success else (),
+            history=(),
         )
+
+    def unfinished(self, status: Status, reason: str) -> BestDuration:
+        """The motion without success, since its duration is not known to be the best."""
+        solution = dataclasses.replace(self.solution, success=False, status=status)
+        return dataclasses.replace(self, solution=solution, ending="The duration is", reason=reason)
 
 
 def best_duration(
@@ -105,11 +136,11 @@ def best_duration(
 
     first: a solution for some duration between them, which is followed to other durations.
     stride: ratio of the first two durations; it is squared in each step, up to MAX_STRIDE.
-    A motion that is not a minimum is returned unchanged.
+    A success is a minimum for its duration, and J' + w vanishes there, or the duration is a bound,
+    or, to EDGE_PRECISION, durations beyond it are infeasible or cost more; the message says which.
+    A first solution that is not a minimum is returned unchanged.
     """
-    search = _Search(free, solve, first, stride)
-    best = search.run()
-    return BestDuration(free, best, search.steps, search.ending)
+    return _Search(free, solve, first, stride).run()
 
 
 def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
@@ -117,138 +148,239 @@ def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solu
     return best_duration(free, solve, first).with_time()
 
 
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A solution for a duration.
+
+    duration: as requested, in [s]. weight: of time. guess_duration: that of the guess, in [s].
+    """
+
+    duration: float
+    solution: Solution
+    weight: float
+    guess_duration: float
+
+    @property
+    def success(self) -> bool:
+        """Whether it is a minimum for its duration."""
+        return self.solution.success
+
+    @property
+    def total(self) -> float:
+        """J + w T."""
+        return self.solution.cost + self.weight * self.duration
+
+    @property
+    def slope(self) -> float:
+        """J' + w, in cost per [s]."""
+        return self.solution.duration_derivative + self.weight
+
+    def downhill_to(self, other: _Trial) -> bool:
+        """Whether J + w T decreases from here towards the duration of another trial."""
+        return self.slope * (other.duration - self.duration) < 0
+
+    def steeper_than(self, share: float) -> bool:
+        """Whether |J' + w| exceeds a share of (J + w T) / T."""
+        return abs(self.slope) > share * abs(self.total) / self.duration
+
+    def gap_to(self, other: _Trial) -> float:
+        """Relative difference of the durations."""
+        return abs(self.duration / other.duration - 1)
+
+
+class _StoppedError(Exception):
+    """The search was stopped, by the time limit, an interrupt or the number of durations."""
+
+    def __init__(self, status: Status, reason: str) -> None:
+        super().__init__(reason)
+        self.status = status
+        self.reason = reason
+
+
+class _FailedError(Exception):
+    """A duration within a bracket for which no minimum was found."""
+
+    def __init__(self, trial: _Trial) -> None:
+        super().__init__(trial.duration)
+        self.trial = trial
+
+
 class _Search:
-    """Brackets the root of J' + w by strides from the first duration, then uses Brent's method."""
+    """Strides in the direction of decreasing J + w T, then Brent's method or bisection.
+
+    here: the current minimum. beyond: the nearest trial in the direction of decrease that failed
+    or costs more, or None; the search continues between the two.
+    ending: words of the message before the duration; "" until the search has converged.
+    """
 
     def __init__(self, free: FreeDuration, solve: SolveFor, first: Solution, stride: float) -> None:
         self.free = free
         self.solve = solve
         self.stride = stride
-        self.best = first
         self.steps = first.nit
-        self.ending = "The best duration is" if first.success else "The duration is"
+        self.durations = 0
+        T = float(np.clip(first.trajectory.duration, free.lower, free.upper))
+        self.beyond: _Trial | None = None
+        self.ending = ""
+        self._move_to(_Trial(T, first, free.weight, T))
 
-    def run(self) -> Solution:
-        """The motion at the best duration, or the last minimum where a solve failed."""
-        T = self.best.trajectory.duration
-        slope = self.slope(self.best)
-        while self.best.success and slope != 0.0:
-            bound = self.free.lower if slope > 0 else self.free.upper
-            if bound == T:
-                self.ending = "The duration is kept at its bound,"
-                break
-            further = T / self.stride if slope > 0 else T * self.stride
-            self.stride = min(self.stride**2, MAX_STRIDE)
-            further = float(np.clip(further, self.free.lower, self.free.upper))
-            try:
-                next_slope = self.at(further)
-                if np.sign(next_slope) != np.sign(slope):
-                    self.between({T: slope, further: next_slope})
-                    break
-            except _FailedError as failed:
-                return self.unfinished(failed.solution)
-            except KeyboardInterrupt:  # between two solves, which handle their own
-                record_interrupt()
-                self.ending = "The search for the best one was interrupted; the last duration is"
-                return dataclasses.replace(self.best, success=False, status=Status.INTERRUPTED)
-            T, slope = further, next_slope
-        return self.best
+    def run(self) -> BestDuration:
+        """The motion at the best duration, or the best so far if the search ended early."""
+        try:
+            while not self.ending:
+                T = self._next_duration()
+                if T is None:
+                    return self._at_an_edge()
+                self._take(self._at(T, self.here))
+        except _StoppedError as stopped:
+            return self._best().unfinished(stopped.status, stopped.reason)
+        except KeyboardInterrupt:  # between two solves, which handle their own
+            record_interrupt()
+            return self._best().unfinished(Status.INTERRUPTED, _reason(Status.INTERRUPTED))
+        return self._best()
 
-    def between(self, known: dict[float, float]) -> None:
-        """Brent's method for the root of J' + w. known: slopes at both ends of a bracket."""
+    def _best(self) -> BestDuration:
+        return BestDuration(self.free, self.here.solution, self.steps, self.ending)
+
+    def _next_duration(self) -> float | None:
+        """The next duration in [s]; None at a bound or at the edge of feasibility."""
+        here, beyond = self.here, self.beyond
+        if beyond is None:
+            return self._stride()
+        if here.gap_to(beyond) > EDGE_PRECISION:
+            return float(np.sqrt(here.duration * beyond.duration))
+        # a solve that failed from a distant guess may succeed from a near one
+        return None if beyond.guess_duration == here.duration else beyond.duration
+
+    def _stride(self) -> float | None:
+        """A duration in the direction of decrease, in [s]; None at a bound."""
+        here, shorter = self.here.duration, self.here.slope > 0
+        bound = self.free.lower if shorter else self.free.upper
+        if abs(here / bound - 1) <= DURATION_PRECISION:
+            return None
+        further = here / self.stride if shorter else here * self.stride
+        self.stride = min(self.stride**2, MAX_STRIDE)
+        return max(further, bound) if shorter else min(further, bound)
+
+    def _take(self, trial: _Trial) -> None:
+        """Move to a trial, or bracket with it, or keep it as what lies beyond."""
+        here, beyond = self.here, self.beyond
+        if not trial.success:
+            self.beyond = trial
+        elif trial.downhill_to(here):
+            self._between(here, trial)
+        elif trial.total > here.total:
+            self.beyond = trial
+        else:
+            self._move_to(trial)
+            if beyond is not None and beyond.duration == trial.duration:
+                self.beyond, self.stride = None, 1 + EDGE_PRECISION
+
+    def _move_to(self, trial: _Trial) -> None:
+        """Continue from a trial; the search ends if it is not a minimum or is stationary."""
+        self.here = trial
+        if not trial.success:
+            self.ending = "The duration is"
+        elif not trial.steeper_than(SLOPE_PRECISION):
+            self.ending = "The best duration is"
+
+    def _between(self, a: _Trial, b: _Trial) -> None:
+        """Brent's method for the root of J' + w between two minima.
+
+        If a solve fails or J + w T jumps in between, the search continues from the cheaper side.
+        """
         from scipy.optimize import brentq  # takes a quarter of a second to import
+
+        known = {a.duration: a, b.duration: b}
 
         def slope_at(T: float) -> float:
             if T not in known:
-                known[T] = self.at(T)
-            return known[T]
+                trial = self._at(T, min(known.values(), key=lambda near: abs(near.duration - T)))
+                if not trial.success:
+                    raise _FailedError(trial)
+                known[T] = trial
+                self.here = min(self.here, trial, key=lambda each: each.total)
+            settled = not known[T].steeper_than(SLOPE_PRECISION) or _jumps(*_sides(known, T))
+            return 0.0 if settled else known[T].slope
 
-        a, b = known
-        xtol, rtol = DURATION_PRECISION * min(a, b), 4 * np.finfo(float).eps
-        root = float(brentq(slope_at, a, b, xtol=xtol, rtol=rtol, disp=False))
-        if self.best.trajectory.duration != root:
-            self.at(root)
+        self.here = min(a, b, key=lambda each: each.total)  # in case the search is stopped
+        ends = a.duration, b.duration
+        xtol, rtol = DURATION_PRECISION * min(ends), 4 * np.finfo(float).eps
+        try:
+            root = float(brentq(slope_at, *ends, xtol=xtol, rtol=rtol, disp=False))
+            slope_at(root)
+        except _FailedError as failed:
+            self.here, _ = _sides(known, failed.trial.duration)
+            self.beyond = failed.trial
+        else:
+            self._close(known, root)
 
-    def at(self, T: float) -> float:
-        """Solve for a duration from the best motion so far; returns J' + w.
+    def _close(self, known: dict[float, _Trial], root: float) -> None:
+        """Take the result of Brent's method: a root, or a kink or a jump of J + w T."""
+        if not known[root].steeper_than(MIN_KINK):
+            self.here, self.ending = known[root], "The best duration is"
+            return
+        self.here, costlier = _sides(known, root)
+        jump = (costlier.total - self.here.total) / abs(self.here.total)
+        if jump <= MAX_GRID_JUMP:
+            self.here = min(known.values(), key=lambda each: each.total)
+            self.ending = f"The best duration, next to a jump of the cost by {jump:.0e} of it, is"
+        else:
+            self.beyond = costlier
 
-        Raises _FailedError if no minimum is found.
+    def _at(self, T: float, guess: _Trial) -> _Trial:
+        """Solve for a duration from another motion.
+
+        Raises _StoppedError if no other solve may follow.
         """
-        solution = self.solve(T, self.best.trajectory)
+        if self.durations == MAX_DURATIONS:
+            raise _StoppedError(
+                Status.ITERATION_LIMIT,
+                f"the best duration was not found among {MAX_DURATIONS} durations",
+            )
+        self.durations += 1
+        solution = self.solve(T, guess.solution.trajectory)
         self.steps += solution.nit
-        if not solution.success:
-            raise _FailedError(T, solution)
-        self.best = solution
-        return self.slope(solution)
+        if solution.status in STOPPED:
+            raise _StoppedError(solution.status, _reason(solution.status))
+        return _Trial(T, solution, self.free.weight, guess.duration)
 
-    def slope(self, solution: Solution) -> float:
-        """J' + w, in cost per [s]."""
-        return solution.duration_derivative + self.free.weight
-
-    def unfinished(self, failed: Solution) -> Solution:
-        """The last minimum, with the reason why the search ended."""
-        T = failed.trajectory.duration
-        self.ending = f"For {T:.6g} s no minimum was found ({failed.status}); the last duration is"
-        return dataclasses.replace(self.best, success=False, status=failed.status)
-
-
-class _FailedError(Exception):
-    """A duration for which no minimum was found."""
-
-    def __init__(self, duration: float, solution: Solution) -> None:
-        super().__init__(duration)
-        self.solution = solution
+    def _at_an_edge(self) -> BestDuration:
+        """The motion at a bound, or next to durations that failed or cost more."""
+        best, beyond = self._best(), self.beyond
+        if beyond is None:
+            return dataclasses.replace(best, ending="The duration is kept at its bound,")
+        side = "shorter" if beyond.duration < self.here.duration else "longer"
+        of_it = f"to {EDGE_PRECISION:g} of it"
+        if beyond.success:
+            ending = f"Beyond the best duration, {of_it}, motions cost more: it is"
+            return dataclasses.replace(best, ending=ending)
+        status = beyond.solution.status
+        if status is Status.INFEASIBLE:
+            edge = f"at the edge of what was found feasible, {of_it} towards {side} ones:"
+            return dataclasses.replace(best, ending=f"The best duration is {edge}")
+        at = f"{beyond.duration:.6g} s, where less cost is expected"
+        return best.unfinished(status, f"for {at}, the solve ended in {status}")
 
 
-def free_to_tolerance(
-    free: FreeDuration, on_grid: OnGrid, refine: Refine, first: Solution
-) -> Solution:
-    """A motion within a tolerance, whose duration is the best one on its grid.
+def _sides(known: dict[float, _Trial], T: float) -> tuple[_Trial, _Trial]:
+    """The minima next to a duration on both sides, the cheaper first.
 
-    first: a solution for some duration between the bounds, on a coarse grid.
-    The accuracy is that of the motion for its fixed duration, relative to the cost without w T.
-    Since J' + w vanishes, an error of the duration changes the cost to second order only.
-    If a later round fails, the motion within the tolerance of the round before is returned; after
-    an interrupt it counts as no success.
+    On each side J + w T decreases towards the other, which decides for a minimum at T itself.
     """
-    found = best_duration(free, on_grid(first.trajectory.grid), first)
-    steps, rounds = found.steps, tuple[Round, ...]()
-    kept: BestDuration | None = None
-    for number in range(MAX_GRIDS):
-        if not found.solution.success:
-            break
-        refined = refine(found.solution)
-        assert refined.accuracy is not None
-        rounds += refined.accuracy.rounds
-        steps += sum(done.nit for done in refined.accuracy.rounds[1:])
-        settled = refined.trajectory.grid is found.solution.trajectory.grid
-        found = dataclasses.replace(found, solution=refined)
-        if not refined.accuracy.reached:
-            break
-        kept = found
-        if settled or number == MAX_GRIDS - 1:
-            break
-        found = best_duration(free, on_grid(refined.trajectory.grid), refined, FINER_GRID_STRIDE)
-        steps += found.steps - refined.nit
-    best = found if kept is None or kept is found else _with_failure(kept, found.solution)
-    return _with_rounds(dataclasses.replace(best, steps=steps), rounds)
+    shorter = [t for t in known.values() if t.slope < 0 and t.duration <= T]
+    longer = [t for t in known.values() if t.slope >= 0 and t.duration >= T]
+    ends = max(shorter, key=lambda t: t.duration), min(longer, key=lambda t: t.duration)
+    return (ends[0], ends[1]) if ends[0].total <= ends[1].total else (ends[1], ends[0])
 
 
-def _with_failure(kept: BestDuration, failed: Solution) -> BestDuration:
-    """The last motion within the tolerance, with the reason why the next round failed."""
-    reason = str(failed.status) if not failed.success else "the tolerance was not reached again"
-    ending = f"The search on a finer grid failed ({reason}); the best duration on a coarser one is"
-    solution = kept.solution
-    if failed.status is Status.INTERRUPTED:  # so that the search ends
-        solution = dataclasses.replace(solution, success=False, status=failed.status)
-    return dataclasses.replace(kept, solution=solution, ending=ending)
+def _jumps(a: _Trial, b: _Trial) -> bool:
+    """Whether two neighbours differ by more than their slopes explain."""
+    step = abs(a.duration - b.duration)
+    explained = max(2 * max(abs(a.slope), abs(b.slope)) * step, MIN_JUMP * abs(a.total))
+    return a.gap_to(b) <= JUMP_BRACKET and abs(a.total - b.total) > explained
 
 
-def _with_rounds(found: BestDuration, rounds: tuple[Round, ...]) -> Solution:
-    """The solution with all rounds, and with its accuracy in the message if it was estimated."""
-    solution = found.with_time()
-    if solution.accuracy is None:
-        return solution
-    accuracy = dataclasses.replace(solution.accuracy, rounds=rounds)
-    message = f"{solution.message.removesuffix('.')}; {accuracy}"
-    return dataclasses.replace(solution, message=message, accuracy=accuracy)
+def _reason(status: Status) -> str:
+    what = "was interrupted" if status is Status.INTERRUPTED else "reached the time limit"
+    return f"the search for the best duration {what}"

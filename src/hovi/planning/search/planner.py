@@ -100,6 +100,8 @@ def plan(
     grid = _grid(T, chosen, scene.robot)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
+    for bound in () if free is None else (free.lower, free.upper):
+        grid.stretched(bound)  # raises for steps that are too short or too long
     search = Search(job, Deadline(chosen.time_limit_seconds), progress or _silent, free)
     problem = job.problem()  # raises for invalid input before the search
     started = time.perf_counter()

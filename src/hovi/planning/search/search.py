@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from hovi.discrete.grid import Grid
 from hovi.errors import InputError
-from hovi.planning.search.continuation import may_help, solve_by_continuation
+from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, split_for_charts
@@ -42,6 +42,43 @@ class Search:
         """The best solution, and the costs of all minima on the requested grid."""
         job = self._coarse()
         explored = self._explored(job)
+        if self.free is None or explored.minima[0].success:
+            return self._finished(job, explored)
+        return self._from_another_duration(self.free, explored)
+
+    def _from_another_duration(
+        self, free: FreeDuration, explored: Exploration
+    ) -> tuple[Solution, tuple[float, ...]]:
+        """As run, if the exploration at the first duration found no minimum."""
+        tried = [(self.fine, explored.minima[0])]
+        probing = dataclasses.replace(self, deadline=self.deadline.part(EXPLORATION_SHARE))
+        for T in free.probes(self.fine.problem().limited):
+            fine, best = tried[-1]
+            if best.success or best.status in STOPPED or interrupted():
+                break
+            self.progress(f"no minimum for {fine.grid.duration:.4g} s, trying {T:.4g} s", 0.0)
+            tried.append(probing._probed(T))
+        fine, first = min(tried, key=_rank)
+        search = dataclasses.replace(self, fine=fine)
+        job = search._coarse()
+        if fine is not self.fine:
+            several = fine.options.starts > 1
+            explored = search._explored(job) if several else Exploration([first], 1, False)
+        best, minima = search._finished(job, explored)
+        if best.status is Status.INFEASIBLE and len(tried) > 1:
+            others = f"{len(tried) - 1} other durations from {free.lower:g} to {free.upper:g} s"
+            best = _with_note(best, f"Nor was one found for {others}.")
+        return best, minima
+
+    def _probed(self, T: float) -> tuple[Job, Solution]:
+        """The job for another duration, and its solution from one start."""
+        options = self.fine.options
+        fine = split_for_charts(self.fine.on(self.fine.grid.stretched(T)), options.guess)
+        search = dataclasses.replace(self, fine=fine.with_options(starts=1))
+        return fine, search._explored(search._coarse()).minima[0]
+
+    def _finished(self, job: Job, explored: Exploration) -> tuple[Solution, tuple[float, ...]]:
+        """The best solution after all stages, and the costs of all minima."""
         found = explored.minima
         try:
             for better in self._stages(job, found):
@@ -69,7 +106,7 @@ class Search:
     def _explored(self, job: Job) -> Exploration:
         """The minima from all starts; uses a share of the time if they are refined afterwards."""
         options = job.options
-        whole = job is self.fine and job.tolerance is None
+        whole = job is self.fine and job.tolerance is None and self.free is None
         deadline = self.deadline if whole else self.deadline.part(EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline)
         first = guess_path(job.problem(), options.guess)
@@ -109,14 +146,29 @@ class Search:
             ended = "The search was interrupted."
         else:
             return best
-        return dataclasses.replace(best, message=f"{best.message} {ended}")
+        return _with_note(best, ended)
+
+
+def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
+    """The least for the most promising duration: a minimum, a usable motion, or the longest."""
+    fine, found = tried
+    if found.success or found.status not in UNUSABLE:
+        return (0 if found.success else 1), 0.0
+    return 2, -fine.grid.duration
+
+
+def _with_note(best: Solution, sentence: str) -> Solution:
+    """The solution with one more sentence in its message."""
+    return dataclasses.replace(best, message=f"{best.message} {sentence}")
 
 
 def _interrupted(best: Solution) -> list[Solution]:
     """The best solution so far, after an interrupt before the last stage."""
+    grid = best.trajectory.grid
     message = (
         "interrupted before the requested grid or the best duration was reached; the motion is the "
-        f"best so far, on {best.trajectory.grid.intervals} intervals: {best.message}"
+        f"best so far, on {grid.intervals} intervals of {grid.duration:.6g} s, of cost "
+        f"{best.cost:.10g}."
     )
     status = Status.INTERRUPTED
     return [dataclasses.replace(best, success=False, status=status, message=message)]
