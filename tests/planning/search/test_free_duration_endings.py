@@ -144,7 +144,12 @@ ENDINGS = {
         WIDE, landscape(fate=from_afar(1.7)), MINIMUM, "The best duration is 1 s", 1.0
     ),
     "a large jump to another slope": Ending(
-        WIDE, landscape(rise=jump(1.1, 0.5, -2.0)), MINIMUM, "cost more: it is 1.1", 1.1, 1e-3
+        WIDE,
+        landscape(rise=jump(1.1, 0.5, -2.0)),
+        MINIMUM,
+        "motions cost more, to 0.001",
+        1.1,
+        1e-3,
     ),
     "infeasible within the bracket": Ending(
         WIDE,
@@ -163,7 +168,12 @@ ENDINGS = {
         1e-3,
     ),
     "a costlier valley": Ending(
-        WIDE, landscape(rise=jump(1.1, 0.5)), MINIMUM, "motions cost more: it is 1.1", 1.1, 1e-3
+        WIDE,
+        landscape(rise=jump(1.1, 0.5)),
+        MINIMUM,
+        "motions cost more, to 0.001 of it: it is 1.1",
+        1.1,
+        1e-3,
     ),
     "a valley that goes on": Ending(
         WIDE,

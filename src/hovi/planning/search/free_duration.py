@@ -353,7 +353,7 @@ class _Search:
         side = "shorter" if beyond.duration < self.here.duration else "longer"
         of_it = f"to {EDGE_PRECISION:g} of it"
         if beyond.success:
-            ending = f"Beyond the best duration, {of_it}, motions cost more: it is"
+            ending = f"Beyond the best duration motions cost more, {of_it}: it is"
             return dataclasses.replace(best, ending=ending)
         status = beyond.solution.status
         if status is Status.INFEASIBLE:
