@@ -13,9 +13,10 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.flows.legendre_transforms import legendre
-from hovi.flows.order_of_accuracy import variational_order
+from hovi.flows.order_of_accuracy import VariationalOrder, variational_order
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
+from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
@@ -58,6 +59,7 @@ def test_the_slope_of_the_variational_error_is_order_plus_one_on_the_arm(
 ) -> None:
     measured = variational_order(arm, by_name(name), steps, *jets(2, 0.5))
     assert measured.order == pytest.approx(order, abs=0.3)
+    assert measured.reliable, measured.reason
 
 
 @pytest.mark.parametrize(("name", "order", "steps"), ORDERS)
@@ -66,6 +68,7 @@ def test_the_slope_of_the_variational_error_is_order_plus_one_on_six_joints(
 ) -> None:
     measured = variational_order(six_joints, by_name(name), steps, *jets(6, 0.1))
     assert measured.order == pytest.approx(order, abs=0.3)
+    assert measured.reliable, measured.reason
 
 
 @pytest.mark.parametrize(("r", "segments"), [(2, 8), (3, 8)])
@@ -133,6 +136,7 @@ def test_galerkin_has_order_2_r_plus_k_with_any_number_of_points(
     scheme = galerkin(r, k, points=r + k + more)
     measured = variational_order(nonlinear(k), scheme, steps, *starts)
     assert measured.order == pytest.approx(2 * (r + k), abs=0.3)
+    assert measured.reliable, measured.reason
 
 
 # The flow from momenta has the order of its L_d
@@ -200,3 +204,57 @@ def test_the_cubic_spline_is_exact_on_four_coefficients() -> None:
 def test_a_step_beyond_the_exact_solution_is_refused(arm: EffortLagrangian) -> None:
     with pytest.raises(InputError, match="step"):
         variational_order(arm, galerkin(1), [30.0], *jets(2, 0.5))
+
+
+# Steps that do not tell the order
+
+
+@pytest.mark.parametrize(
+    ("robot", "size", "steps"),
+    [("xarm7", 0.02, [5e-3, 2.5e-3, 1.25e-3]), ("talos_arm", 0.1, [5e-3, 2.5e-3, 1.25e-3])],
+)
+def test_steps_too_large_to_tell_the_order_are_named(
+    robot: str, size: float, steps: list[float]
+) -> None:
+    # the largest errors of talos_arm fall with 2.82 and 2.72, which agree with each other
+    lagrangian = Scene(load_robot(robot), [Gravity()]).effort_lagrangian()
+    starts, scheme = jets(lagrangian.nv, size), by_name("taylor-midpoint")
+    large = variational_order(lagrangian, scheme, steps, *starts)
+    assert abs(large.order - 2) > 0.3
+    assert not large.reliable
+    assert "take smaller steps" in large.reason
+    assert str(large) == f"order {large.order:.2f}, not reliable: {large.reason}"
+    small = variational_order(lagrangian, scheme, [h / 16 for h in steps], *starts)
+    assert small.reliable, small.reason
+    assert small.order == pytest.approx(2, abs=0.1)
+    assert str(small) == f"order {small.order:.2f}"
+
+
+def test_errors_at_rounding_and_too_few_steps_tell_no_order() -> None:
+    starts = jets(2, 1.0)
+    exact = variational_order(spline(2), galerkin(0), [0.4, 0.2, 0.1], *starts)
+    assert "may be rounding; take larger steps" in exact.reason
+    none = VariationalOrder(exact.steps, *np.zeros((2, 3)), exact.actions)
+    assert str(none).startswith("no order, not reliable: the error is 0 at h = 0.4 s")
+    two = variational_order(spline(2), by_name("taylor-trapezoid"), [0.4, 0.2], *starts)
+    assert two.order == pytest.approx(2, abs=1e-9)
+    assert "three different steps" in two.reason
+    tiny = variational_order(spline(2), by_name("taylor-trapezoid"), [4e-7, 2e-7, 1e-7], *starts)
+    assert "may be rounding" in tiny.reason
+
+
+@pytest.mark.parametrize(
+    ("errors", "mean_errors", "reliable"),
+    [
+        ([8.0, 1.0, 0.125], [4.0, 0.5, 0.0625], True),
+        ([8.0, 1.0, 0.1], [4.0, 0.5, 0.0625], False),
+        ([8.0, 1.0, 0.125], [4.0, 0.5, 0.05], False),
+        ([2.0**7, 2.0**3.5, 1.0], [2.0**7, 2.0**3.5, 1.0], False),
+    ],
+)
+def test_an_order_is_reliable_where_all_slopes_agree_on_an_integer(
+    errors: list[float], mean_errors: list[float], reliable: bool
+) -> None:
+    steps = np.array([0.04, 0.02, 0.01])
+    found = VariationalOrder(steps, np.array(errors), np.array(mean_errors), np.ones(3))
+    assert found.reliable == reliable
