@@ -27,7 +27,8 @@ from hovi.flows.legendre_transforms import (
     legendre_minus,
     legendre_plus,
 )
-from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian
+from hovi.flows.scheme_lagrangian import SchemeLagrangian
+from hovi.flows.segment import SegmentLagrangian
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene

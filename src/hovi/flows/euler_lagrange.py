@@ -20,7 +20,7 @@ from hovi.flows.legendre_transforms import (
     legendre_minus,
     legendre_plus,
 )
-from hovi.flows.scheme_lagrangian import SegmentLagrangian
+from hovi.flows.segment import SegmentLagrangian
 
 Array = npt.NDArray[np.float64]
 Form = Literal["plus", "minus", "momentum"]

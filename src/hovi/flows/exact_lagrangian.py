@@ -15,8 +15,8 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from hovi.errors import InputError
-from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian, check_segment
-from hovi.flows.segment import Segment, flat
+from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_segment
+from hovi.flows.segment import Segment, SegmentLagrangian, flat
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme, galerkin
 

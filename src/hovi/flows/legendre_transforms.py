@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import InputError
-from hovi.flows.scheme_lagrangian import SegmentLagrangian
+from hovi.flows.segment import SegmentLagrangian
 from hovi.optimize.batched_newton import newton
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian

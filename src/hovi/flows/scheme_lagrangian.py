@@ -6,7 +6,6 @@ function of two end points in the theorems of the paper.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,63 +15,12 @@ import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
-from hovi.flows.regularized import Regularized, regularized
-from hovi.flows.segment import Segment, flat
+from hovi.flows.segment import Segment, SegmentLagrangian, flat
 from hovi.optimize.batched_newton import newton
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
-
-
-class SegmentLagrangian(ABC):
-    """L_d(x0, x1) for an interval of length h, x = (q, q', ..., q^(k-1)) in T^(k-1)Q.
-
-    lagrangian: L on T^(k)Q. h: length of the interval, in [s].
-    """
-
-    lagrangian: Lagrangian
-    h: float
-
-    @property
-    def k(self) -> int:
-        """Order of the Lagrangian."""
-        return self.lagrangian.order
-
-    @property
-    def n(self) -> int:
-        """Degrees of freedom."""
-        return self.lagrangian.nv
-
-    @property
-    def regularized(self) -> Regularized:
-        """The transformation between (x0, w) and (x0, x1)."""
-        return regularized(self.k, self.h)
-
-    @abstractmethod
-    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
-        """The segment with given ends, in regularized coordinates: x0, w of shape (B, k, n).
-
-        t0: time at its start, in [s]. Raises InputError if Newton's method fails.
-        """
-
-    @abstractmethod
-    def from_start(
-        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
-    ) -> Segment:
-        """(F^-)^-1: the segment that starts at x0 with momenta p0, both (B, k, n)."""
-
-    @abstractmethod
-    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
-        """(F^+)^-1: the segment that ends at x1 with momenta p1, both (B, k, n)."""
-
-    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> Segment:
-        """The segment between two points of T^(k-1)Q, both (B, k, n)."""
-        return self.between(x0, self.regularized.w(x0, x1), t0)
-
-    def value(self, x0: Array, x1: Array) -> Array:
-        """L_d(x0, x1), shape (B,)."""
-        return self.joining(x0, x1).values
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ give the momenta, D1 .. D2k and D11 .. of L_d, and the tangent map of the discre
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.flows.regularized import Regularized, regularized
+from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -149,3 +151,53 @@ def flat(blocks: Array) -> Array:
     """(B, m, l, n, n) -> (B, m n, l n)."""
     B, m, count, n, _ = blocks.shape
     return blocks.transpose(0, 1, 3, 2, 4).reshape(B, m * n, count * n)
+
+
+class SegmentLagrangian(ABC):
+    """L_d(x0, x1) for an interval of length h, x = (q, q', ..., q^(k-1)) in T^(k-1)Q.
+
+    lagrangian: L on T^(k)Q. h: length of the interval, in [s].
+    """
+
+    lagrangian: Lagrangian
+    h: float
+
+    @property
+    def k(self) -> int:
+        """Order of the Lagrangian."""
+        return self.lagrangian.order
+
+    @property
+    def n(self) -> int:
+        """Degrees of freedom."""
+        return self.lagrangian.nv
+
+    @property
+    def regularized(self) -> Regularized:
+        """The transformation between (x0, w) and (x0, x1)."""
+        return regularized(self.k, self.h)
+
+    @abstractmethod
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
+        """The segment with given ends, in regularized coordinates: x0, w of shape (B, k, n).
+
+        t0: time at its start, in [s]. Raises InputError if Newton's method fails.
+        """
+
+    @abstractmethod
+    def from_start(
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
+    ) -> Segment:
+        """(F^-)^-1: the segment that starts at x0 with momenta p0, both (B, k, n)."""
+
+    @abstractmethod
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+        """(F^+)^-1: the segment that ends at x1 with momenta p1, both (B, k, n)."""
+
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> Segment:
+        """The segment between two points of T^(k-1)Q, both (B, k, n)."""
+        return self.between(x0, self.regularized.w(x0, x1), t0)
+
+    def value(self, x0: Array, x1: Array) -> Array:
+        """L_d(x0, x1), shape (B,)."""
+        return self.joining(x0, x1).values

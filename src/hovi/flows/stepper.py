@@ -23,8 +23,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.flows.group_lagrangian import ChartedLagrangian, ChartedSegment
 from hovi.flows.legendre_transforms import hamiltonian
-from hovi.flows.scheme_lagrangian import SchemeLagrangian, SegmentLagrangian, uniform_grid
-from hovi.flows.segment import Segment
+from hovi.flows.scheme_lagrangian import SchemeLagrangian, uniform_grid
+from hovi.flows.segment import Segment, SegmentLagrangian
 from hovi.flows.symmetry import Symmetry
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
