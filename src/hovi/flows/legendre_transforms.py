@@ -19,8 +19,15 @@ from hovi.flows.segment import SegmentLagrangian
 from hovi.optimize.batched_newton import newton
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+
+SINGULAR = 1e-13
+"""Singular value relative to the largest, of a matrix with rows of one size, that is rounding."""
+INVOLVED = 0.1
+"""Part in a unit vector of the kernel above which a coordinate is named."""
 
 
 def legendre_minus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
@@ -77,14 +84,53 @@ def highest_derivative(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Ar
     """
     jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
 
-    def system(u: Array) -> tuple[Array, Array]:
-        _, gradient, hessian = lagrangian.evaluate(*jet, u)
-        return gradient[:, -1] - p[:, -1], hessian[:, -1, :, -1]
-
-    u, found = newton(system, np.zeros_like(p[:, -1]))
+    u, found = _highest_derivative(lagrangian, jet, p, None)
     if not found.all():
         raise InputError("the Lagrangian is not regular there: dL/dq^(k) = p has no solution.")
     return u
+
+
+def require_regular_lagrangian(
+    lagrangian: Lagrangian, x: Sequence[Array], p: Array, t: float = 0.0
+) -> None:
+    """Raise InputError where W = d2L/dq^(k)2 is singular to working precision at a start (x, p).
+
+    Momenta do not determine q^(k) there, and no flow begins. x: (q, q', ..., q^(k-1)), k arrays of
+    one row. p: shape (1, k, n). t: in [s].
+    """
+    u, found = _highest_derivative(lagrangian, x, p, np.array([t]))
+    u = np.where(found[:, None], u, 0.0)
+    W = lagrangian.evaluate(*x, u, t=np.array([t]))[2][0, -1, :, -1]
+    if not np.isfinite(W).all():
+        raise InputError("the second derivatives of the Lagrangian are not finite at the start.")
+    kernel = kernel_coordinates(W, lagrangian.nv)
+    if len(kernel):
+        raise InputError(_singular_start(lagrangian, kernel))
+
+
+def kernel_coordinates(matrix: Array, n: int, terms: Array | None = None) -> Indices:
+    """Which of n coordinates have part in the kernel of a matrix, none where it is regular.
+
+    matrix: shape (m n, m n), m unknowns for each coordinate. terms: sizes of what its entries are
+        sums of, the same shape; the entries themselves when None. Units differ from coordinate to
+        coordinate, so that rows and columns are scaled to one size first.
+    """
+    size = np.abs(matrix) if terms is None else terms
+    _, values, vectors = np.linalg.svd(matrix * _equilibration(size))
+    kernel = vectors[values <= SINGULAR * max(values[0], 1.0)]
+    parts = np.linalg.norm(kernel.reshape(-1, n), axis=0)
+    return np.flatnonzero(parts > INVOLVED)
+
+
+def coordinates_in_words(lagrangian: Lagrangian, coordinates: Indices) -> str:
+    """Joints of a scene's robot, or numbers; not more than six of them."""
+    scene = getattr(lagrangian, "scene", None)
+    if isinstance(scene, Scene):
+        shown = [repr(scene.robot.coordinate_names[i]) for i in coordinates]
+    else:
+        shown = [f"q[{i}]" for i in coordinates]
+    more = f" and {len(shown) - 6} more" if len(shown) > 6 else ""
+    return ", ".join(shown[:6]) + more
 
 
 def hamiltonian(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
@@ -105,6 +151,47 @@ def batch(x: npt.ArrayLike) -> Array:
     if array.ndim not in (2, 3):
         raise InputError(f"points and momenta have shape (k, n) or (B, k, n), got {array.shape}.")
     return array if array.ndim == 3 else array[None]
+
+
+def _highest_derivative(
+    lagrangian: Lagrangian, jet: Sequence[Array], p: Array, t: Array | None
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """q^(k) of dL/dq^(k) = p_{k-1}, shape (B, n), and where it was found, (B,)."""
+
+    def system(u: Array) -> tuple[Array, Array]:
+        _, gradient, hessian = lagrangian.evaluate(*jet, u, t=t)
+        return gradient[:, -1] - p[:, -1], hessian[:, -1, :, -1]
+
+    return newton(system, np.zeros_like(p[:, -1]))
+
+
+def _equilibration(size: Array) -> Array:
+    """Factors of entries, by row and column, that bring the largest of each near one. [Ruiz2001]"""
+    factors = np.ones_like(size)
+    for _ in range(5):
+        for axis in (0, 1):
+            largest = (size * factors).max(axis=axis, keepdims=True)
+            factors = factors / np.sqrt(np.where(largest > 0, largest, 1.0))
+    return factors
+
+
+def _singular_start(lagrangian: Lagrangian, kernel: Indices) -> str:
+    scene = getattr(lagrangian, "scene", None)
+    advice = (
+        "add a cost that resists it, a small multiple of its square for instance, or fix what "
+        "does not matter, such as a parametrization"
+    )
+    if isinstance(scene, Scene):
+        advice = "give the joints inertia, by the effect 'armature' for instance"
+        if scene.passive:
+            advice = (
+                f"the torque of passive joints ({', '.join(map(repr, scene.passive))}) costs "
+                "nothing, so plan between two states with hovi.plan, or let them carry torque"
+            )
+    return (
+        "the Lagrangian is singular in its highest derivative at the start: momenta do not "
+        f"determine q^({lagrangian.order}) of {coordinates_in_words(lagrangian, kernel)}; {advice}."
+    )
 
 
 def _momenta(lagrangian: Lagrangian, jet: list[Array]) -> Array:

@@ -121,8 +121,14 @@ class Segment:
         d/dw of phi_w - gamma^T (S/h) T^-T (p0 + h phi_x): for k = 2 the equations are scaled as
         h p and p~ - h p. It tends to d2L/dq^(k)2 (x) I as h tends to zero.
         """
+        own, carried = self.newton_terms
+        return own - carried
+
+    @property
+    def newton_terms(self) -> tuple[Array, Array]:
+        """The two matrices whose difference `newton_matrix` is: that of w, and that through x0."""
         K, m = self.condensed, self.k * self.x0.shape[2]
-        return np.asarray(K[:, m:, m:] - self._back @ K[:, :m, m:])
+        return K[:, m:, m:], np.asarray(self._back @ K[:, :m, m:])
 
     @property
     def tangent(self) -> Array:

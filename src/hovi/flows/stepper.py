@@ -22,7 +22,12 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.flows.group_lagrangian import ChartedLagrangian, ChartedSegment
-from hovi.flows.legendre_transforms import hamiltonian
+from hovi.flows.legendre_transforms import (
+    coordinates_in_words,
+    hamiltonian,
+    kernel_coordinates,
+    require_regular_lagrangian,
+)
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, uniform_grid
 from hovi.flows.segment import Segment, SegmentLagrangian
 from hovi.flows.symmetry import Symmetry
@@ -127,8 +132,9 @@ def flow(
         error in q above `tolerance` (relative to max(|q|, 1)); otherwise InputError states the time
         up to which the motion is accurate. Optimal control is unstable in both directions of time.
         Motions on groups are not monitored.
-    Raises InputError also for wrong shapes and steps without a solution, SchemeError for a scheme
-    that is not regular.
+    Raises InputError also for wrong shapes, steps without a solution, and a Lagrangian that is
+    singular in q^(k) at the start (passive joints, costs of a curve's shape alone), SchemeError for
+    a scheme that is not regular.
     """
     segment = _segment(ld) if isinstance(ld, DiscreteLagrangian) else ld
     if isinstance(segment, SchemeLagrangian | ChartedLagrangian) and segment.k == 2:
@@ -138,6 +144,7 @@ def flow(
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
+    require_regular_lagrangian(segment.lagrangian, _jet(segment, x), p[None], t0)
     stepper = _stepper(segment, x, p, t0)
     monitor = None
     if not force and not isinstance(segment, ChartedLagrangian):
@@ -145,6 +152,8 @@ def flow(
     records = _allocate(segment, x, p, steps)
     for i in range(steps):
         done = stepper.step()
+        if i == 0 and isinstance(done, Segment):
+            _require_regular_step(segment, done)
         records[0][i + 1], records[1][i + 1] = stepper.x, stepper.p
         records[2][i], records[3][i, : done.inner.shape[1]] = done.z[0], done.inner[0]
         if monitor is not None and isinstance(done, Segment):
@@ -268,6 +277,23 @@ def _start(
                 f"{array.shape}."
             )
     return x, p
+
+
+def _jet(ld: SegmentLagrangian | ChartedLagrangian, x: Array) -> list[Array]:
+    """(q, q', ..., q^(k-1)) of one point, k arrays of one row."""
+    return ld.split(x) if isinstance(ld, ChartedLagrangian) else list(x[:, None])
+
+
+def _require_regular_step(ld: SegmentLagrangian | ChartedLagrangian, segment: Segment) -> None:
+    """Raise InputError where the discrete Lagrangian is singular: W_d, and a step's equations."""
+    own, carried = segment.newton_terms
+    kernel = kernel_coordinates((own - carried)[0], ld.n, (np.abs(own) + np.abs(carried))[0])
+    if len(kernel):
+        raise InputError(
+            f"the discrete Lagrangian is singular at the start with h = {ld.h:g} s, where momenta "
+            f"do not determine the step of {coordinates_in_words(ld.lagrangian, kernel)}: take "
+            "another step, best a shorter one."
+        )
 
 
 def _allocate(
