@@ -17,7 +17,6 @@ from pathlib import Path
 
 import hovi
 from hovi.errors import SceneError
-from hovi.planning.task_file.writing import save_task
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp())
 folder.mkdir(parents=True, exist_ok=True)
@@ -51,7 +50,7 @@ for duration in (1.0, 0.5, 0.25, 0.125):
 # Save a changed task. Its URDF is copied beside it, so the folder is self-contained.
 
 slower = dataclasses.replace(task, duration=1.5).with_options(intervals=24)
-path = save_task(slower, folder / "slower_reach.toml")
+path = hovi.save_task(slower, folder / "slower_reach.toml")
 print(path.read_text())
 assert hovi.load_task(path).duration == 1.5
 

@@ -146,8 +146,8 @@ def main() -> None:
     peak = np.abs(resolved.trajectory.sample(np.linspace(0.0, 10.0, 20_001)).tau).max()
     print(
         f"The kept elbow moves between {angle.min():.2f} and {angle.max():.2f} degrees. The "
-        f"swing-up's largest torque is {peak:.3f} N m. Errors against the same minimum resolved to "
-        "round-off:\n"
+        f"refined swing-up's largest torque is {peak:.3f} N m. Errors against the same minimum "
+        "resolved to round-off:\n"
     )
     print_accuracy([paper, resolved])
     print_machine()

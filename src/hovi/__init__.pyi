@@ -54,6 +54,7 @@ from .planning.solver.status import Status as Status
 from .planning.task_file.reading import load_task as load_task
 from .planning.task_file.task import Task as Task
 from .planning.task_file.task_plan import plan_task as plan_task
+from .planning.task_file.writing import save_task as save_task
 from .robot.bundled_models import example as example
 from .robot.loading import load_robot as load_robot
 from .robot.robot import Robot as Robot

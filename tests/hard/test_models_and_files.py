@@ -32,7 +32,7 @@ AXIS = '<axis xyz="0 -1 0"/>'
 LIMIT = 'lower="-1000" upper="1000"'
 TREES = {
     "a cycle": ('parent link="base"', 'parent link="forearm"', "cycle"),
-    "a link twice": ("</robot>", '<link name="tip"/></robot>', "'tip' is there 2 times"),
+    "a link twice": ("</robot>", '<link name="tip"/></robot>', "'tip' occurs 2 times"),
     "two roots": ("</robot>", '<link name="floor"/></robot>', "'floor'"),
     "no such link": ('child link="tip"', 'child link="tipp"', "did you mean 'tip'"),
 }

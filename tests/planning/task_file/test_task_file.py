@@ -489,3 +489,11 @@ def test_a_wrong_obstacle_is_one_sentence(folder: Path, old: str, new: str, word
     sentence = refusal(folder, with_obstacles(REACH).replace(old, new))
     assert words in sentence
     assert "line" in sentence
+
+
+def test_options_under_their_old_names_warn() -> None:
+    task = load_task(example("two_link_reach"))
+    with pytest.warns(DeprecationWarning, match=r"task.intervals is now task.options.intervals"):
+        assert task.intervals == task.options.intervals
+    with pytest.raises(AttributeError, match="no attribute 'intervalls'"):
+        _ = task.intervalls

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -11,6 +12,7 @@ from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.units import as_duration
+from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.scene.scene import Scene
 
@@ -43,6 +45,14 @@ class Task:
                 f"the duration must be a positive number of seconds, got {self.duration}."
             )
         self.options.on(self.scene.robot)
+
+    def __getattr__(self, name: str) -> Any:
+        """An option by its own name, as tasks had it before: deprecated, use task.options."""
+        if name not in option_infos(PlanOptions):
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        message = f"task.{name} is now task.options.{name}, and task.with_options changes it."
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return getattr(self.options, name)
 
     def with_options(self, **changes: Any) -> Self:
         """The task with some of its options changed.
