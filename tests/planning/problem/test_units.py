@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
@@ -57,7 +56,5 @@ def test_a_duration_is_one_number_or_two(given: Any) -> None:
 
 
 @pytest.mark.parametrize("text", ["1" + " " * 10**6 + "!", " " * 10**6, "1" * 10**6, "." * 10**6])
-def test_the_time_to_read_a_text_grows_with_its_length_alone(text: str) -> None:
-    began = time.process_time()
-    number_and_unit(text)
-    assert time.process_time() - began < 60.0  # quadratic time would take hours
+def test_a_long_text_is_read_in_linear_time(text: str) -> None:
+    number_and_unit(text)  # in quadratic time this would not return for hours
