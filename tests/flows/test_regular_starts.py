@@ -113,11 +113,23 @@ def unstable() -> CasadiLagrangian:
 
 
 def test_a_step_whose_discrete_lagrangian_is_singular_is_refused() -> None:
-    for h in (1.9, 2.1):
+    for h in (1.0, 1.5):
         q, p = 1.0, 0.5
         one = flow(SchemeLagrangian(unstable(), galerkin(0, 1), h), [[q]], [[p]], 1, force=True)
         expected = ((1 + h**2 / 4) * q + h * p) / (1 - h**2 / 4)
         assert one.q[1, 0] == pytest.approx(expected, rel=1e-12)
     for h in (2.0 - 1e-14, 2.0 + 1e-14):
+        ld = SchemeLagrangian(unstable(), galerkin(0, 1), h)
         with pytest.raises(InputError, match=r"discrete .* singular .* q\[0\]: take another"):
-            flow(SchemeLagrangian(unstable(), galerkin(0, 1), h), [[1.0]], [[0.5]], 1, force=True)
+            flow(ld, [[0.0]], [[0.0]], 1, force=True)
+    ld = SchemeLagrangian(unstable(), galerkin(0, 1), 2.0)
+    with pytest.raises(InputError, match=r"matrix of Newton's method is singular.* 2 steps of 1 s"):
+        flow(ld, [[1.0]], [[0.5]], 1, force=True)
+
+
+@pytest.mark.parametrize("h", [1.97, 2.0 - 1e-14, 2.03])
+def test_a_solution_that_shorter_steps_contradict_is_refused(h: float) -> None:
+    # at h = 1.97 the midpoint rule ends at 99 and the motion at 5, at h = 2.03 it ends at -101
+    ld = SchemeLagrangian(unstable(), galerkin(0, 1), h)
+    with pytest.raises(InputError, match=r"misses the end of shorter steps .* use a shorter step"):
+        flow(ld, [[1.0]], [[0.5]], 1, force=True)

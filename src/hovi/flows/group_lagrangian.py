@@ -22,8 +22,17 @@ import numpy.typing as npt
 
 from hovi.discrete.interval_charts import IntervalCharts
 from hovi.errors import InputError, SchemeError
+from hovi.flows.legendre_transforms import jet_at_momenta
 from hovi.flows.regularized import Regularized, regularized
-from hovi.optimize.batched_newton import newton
+from hovi.flows.step_guesses import (
+    DOUBTFUL,
+    Trial,
+    continued_modes,
+    hard_step,
+    mismatch,
+    taylor_modes,
+)
+from hovi.optimize.batched_newton import System, roots
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace, bracket
 from hovi.scene.lagrangian import Lagrangian
@@ -97,31 +106,53 @@ class ChartedLagrangian:
     ) -> ChartedSegment:
         """The segment that starts at a point (1, 1, nq + ..) with momenta (1, k, nv).
 
-        By Newton's method. Raises InputError if there is none, or if it rotates too far.
+        By Newton's method, from the curve of `guess` continued or the exact jet, and where it fails
+        from the curve of shorter steps. Raises InputError if there is none, or if it rotates too
+        far.
         """
-        k, n, r, R = self.k, self.n, self.scheme.inner_modes, self.regularized
-        start = x0[0]
-        back = np.kron(R.back / self.h, np.eye(n))
+        if guess is None:
+            modes = self._taylor(x0, p0, t0)
+        else:
+            modes = continued_modes(self.k, np.append(guess.w, guess.inner, axis=1))
+        trial = self._attempt(self.h, x0, p0, t0, modes[0])
+        doubt = mismatch(self.h, self.k, trial.modes[None], modes)[0]
+        if trial.end is None or not doubt < DOUBTFUL:
+            trial = hard_step(self._attempt, self.h, x0, p0, t0, trial)
+        w, inner = trial.modes[None, : self.k], trial.modes[None, self.k :]
+        assert trial.end is not None
+        return ChartedSegment(w, self.regularized.z(w), inner, *trial.end)
+
+    def _step(self, start: Array, p0: Array, t0: float) -> System:
+        """The equations of a step from momenta and their matrix, in the modes."""
+        k, n = self.k, self.n
+        back = np.kron(self.regularized.back / self.h, np.eye(n))
 
         def system(u: Array) -> tuple[Array, Array]:
-            interval = self._interval(start, u.reshape(1, k + r, n))
+            interval = self._interval(start, u.reshape(1, -1, n))
             p, slack, H = self._expand(interval, start, t0)
             F = np.concatenate([back @ (p[0] - p0[0]).ravel(), self.h * slack.ravel()])
             H[: k * n] = back @ H[: k * n]
             H[k * n :] *= self.h
             return F[None], H[None]
 
-        first = (
-            np.zeros((1, k + r, n)) if guess is None else np.append(guess.w, guess.inner, axis=1)
-        )
-        u, found = newton(system, first.reshape(1, -1))
-        modes = u.reshape(1, k + r, n)
-        interval = self._interval(start, modes)
-        self._check(interval.ends[0, 0], bool(found.all()))
-        p1 = self._momenta(interval, start, t0)[1]
-        return ChartedSegment(
-            modes[:, :k], R.z(modes[:, :k]), modes[:, k:], self._end(start, interval)[None], p1
-        )
+        return system
+
+    def _attempt(self, h: float, x0: Array, p0: Array, t0: float, guess: Array | None) -> Trial:
+        """One step of length h, for `hard_step`; from the exact jet where no guess is given."""
+        ld = self if h == self.h else dataclasses.replace(self, h=h)
+        modes = ld._taylor(x0, p0, t0)[0] if guess is None else guess
+        found = roots(ld._step(x0[0], p0, t0), modes.reshape(1, -1))
+        modes, residual = found.u.reshape(modes.shape), float(found.residual[0])
+        interval = ld._interval(x0[0], modes[None])
+        if not (found.found[0] and self._rotation(interval.ends[0, 0]) < MAX_ROTATION):
+            return Trial(modes, residual, None)
+        p1 = ld._momenta(interval, x0[0], t0)[1]
+        return Trial(modes, residual, (ld._end(x0[0], interval)[None], p1))
+
+    def _taylor(self, x0: Array, p0: Array, t0: float) -> Array:
+        """Modes of the exact jet at the start, shape (1, k + r, nv)."""
+        jet = jet_at_momenta(self.lagrangian, self.split(x0[0]), p0, t0)
+        return taylor_modes(self.k, self.k + self.scheme.inner_modes, self.h, *jet)
 
     def jet(self, q0: Array, w: Array, inner: Array) -> tuple[Array, Array]:
         """(q, v) at the quadrature points of N intervals, for k = 1: (N Q, nq) and (N Q, nv).
@@ -254,11 +285,7 @@ class ChartedLagrangian:
         steps = many.point_steps(step)[:, :, : self.k + 1]
         return steps.reshape(C, -1, (self.k + 1) * n)
 
-    def _check(self, x1: Array, found: bool) -> None:
+    def _rotation(self, x1: Array) -> float:
+        """The largest rotation of an orientation in one step, in [rad]."""
         rotations = [x1[f.v][list(f.group.angular)] for f in self.space.curved]
-        largest = max((float(np.linalg.norm(rotation)) for rotation in rotations), default=0.0)
-        if not (found and largest < MAX_ROTATION):
-            raise InputError(
-                f"the discrete equations of a step of h = {self.h:g} s have no solution near the "
-                "initial guess: use a shorter step or smaller momenta."
-            )
+        return max((float(np.linalg.norm(rotation)) for rotation in rotations), default=0.0)

@@ -90,6 +90,29 @@ def highest_derivative(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Ar
     return u
 
 
+def jet_at_momenta(
+    lagrangian: Lagrangian, x: Sequence[Array], p: Array, t: float = 0.0
+) -> tuple[Array, Array]:
+    """q^(k) and q^(k+1) of the solution through (x, p), (B, n) each; zero where none is found.
+
+    q^(k+1) follows from p_{k-1}' = dL/dq^(k-1) - p_{k-2}, for k = 1 from p' = dL/dq. What a
+    Lagrangian's own time and the brackets of groups add is left out: this is a guess there.
+    x: (q, q', ..., q^(k-1)), k arrays of B rows. p: shape (B, k, n). t: in [s].
+    """
+    k, times = lagrangian.order, np.full(len(p), t)
+    top, found = _highest_derivative(lagrangian, x, p, times)
+    top = np.where(found[:, None] & np.isfinite(top), top, 0.0)
+    _, gradient, hessian = lagrangian.evaluate(*x, top, t=times)
+    rates = np.stack([*x[1:], top], axis=1)  # q', ..., q^(k)
+    known = np.einsum("bisj,bsj->bi", hessian[:, -1, :, :-1], rates)
+    force = gradient[:, -2] - known - (p[:, -2] if k > 1 else 0.0)
+    try:
+        rate = np.linalg.solve(hessian[:, -1, :, -1], force[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:
+        rate = np.zeros_like(top)
+    return top, np.where(np.isfinite(rate), rate, 0.0)
+
+
 def require_regular_lagrangian(
     lagrangian: Lagrangian, x: Sequence[Array], p: Array, t: float = 0.0
 ) -> None:

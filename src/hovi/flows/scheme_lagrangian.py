@@ -6,8 +6,7 @@ function of two end points in the theorems of the paper.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,8 +14,17 @@ import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
+from hovi.flows.legendre_transforms import jet_at_momenta
 from hovi.flows.segment import Segment, SegmentLagrangian, flat
-from hovi.optimize.batched_newton import newton
+from hovi.flows.step_guesses import (
+    DOUBTFUL,
+    Trial,
+    continued_modes,
+    hard_step,
+    mismatch,
+    taylor_modes,
+)
+from hovi.optimize.batched_newton import System, newton, roots
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
 
@@ -67,7 +75,29 @@ class SchemeLagrangian(SegmentLagrangian):
     def from_start(
         self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
     ) -> Segment:
-        """Newton's method for (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0."""
+        """Newton's method for (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0.
+
+        It starts from the curve of `guess` continued, the segment before, or from the exact jet at
+        (x0, p0), and where it fails from the curve of shorter steps.
+        """
+        B = len(x0)
+        if guess is None:
+            modes = self._taylor(x0, p0, t0)
+        else:
+            modes = continued_modes(self.k, np.concatenate([guess.w, guess.inner], axis=1))
+        found = roots(self._step(x0, p0, t0), modes.reshape(B, -1))
+        u = found.u.reshape(modes.shape)
+        easy = found.found & (mismatch(self.h, self.k, u, modes) < DOUBTFUL)
+        for i in np.flatnonzero(~easy):
+            start, p = x0[i : i + 1], p0[i : i + 1]
+            end = None if not found.found[i] else self._end(start, u[i : i + 1], t0)
+            first = Trial(u[i], float(found.residual[i]), end)
+            u[i] = hard_step(self._attempt, self.h, start, p, t0, first).modes
+        w, inner = self._split(u, B)
+        return self._segment(x0, w, inner, t0)
+
+    def _step(self, x0: Array, p0: Array, t0: float) -> System:
+        """The equations of a step from momenta and their matrix, in the modes."""
         B, m = len(x0), self.k * self.n
         back, given = self._back, (self.regularized.back / self.h @ p0).reshape(B, m)
 
@@ -79,8 +109,27 @@ class SchemeLagrangian(SegmentLagrangian):
             J[:, :m] -= back @ H[:, :m, m:]
             return F, J
 
-        w, inner = self._split(self._solve(system, self._guess(B, guess)), B)
-        return self._segment(x0, w, inner, t0)
+        return system
+
+    def _attempt(self, h: float, x0: Array, p0: Array, t0: float, guess: Array | None) -> Trial:
+        """One step of length h from a batch of one, for `hard_step`."""
+        ld = self if h == self.h else replace(self, h=h)
+        modes = ld._taylor(x0, p0, t0) if guess is None else guess[None]
+        found = roots(ld._step(x0, p0, t0), modes.reshape(1, -1))
+        u, residual = found.u.reshape(modes.shape), float(found.residual[0])
+        if not found.found[0]:
+            return Trial(u[0], residual, None)
+        return Trial(u[0], residual, ld._end(x0, u, t0))
+
+    def _end(self, x0: Array, modes: Array, t0: float) -> tuple[Array, Array]:
+        """x1 and p1."""
+        segment = self.at(x0, *self._split(modes, len(x0)), t0)
+        return segment.x1, segment.p1
+
+    def _taylor(self, x: Array, p: Array, t: float, at: float = 0.0) -> Array:
+        """Modes of the exact jet at one end, s = `at`, shape (B, k + r, n)."""
+        jet = jet_at_momenta(self.lagrangian, list(np.moveaxis(x, 1, 0)), p, t)
+        return taylor_modes(self.k, self.k + self.scheme.inner_modes, self.h, *jet, at)
 
     def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
         """Newton's method for (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, with x0 from w."""
@@ -96,7 +145,8 @@ class SchemeLagrangian(SegmentLagrangian):
             J[:, :, :m] -= H[:, m:, :m] @ moved
             return F, J
 
-        w, inner = self._split(self._solve(system, self._guess(B, None)), B)
+        first = self._taylor(x1, p1, t0 + self.h, 1.0).reshape(B, -1)
+        w, inner = self._split(self._solve(system, first), B)
         return self._segment(R.start(x1, w), w, inner, t0)
 
     def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
@@ -170,12 +220,7 @@ class SchemeLagrangian(SegmentLagrangian):
         modes = u.reshape(B, -1, self.n)
         return modes[:, : self.k], modes[:, self.k :]
 
-    def _guess(self, B: int, guess: Segment | None) -> Array:
-        if guess is None:
-            return np.zeros((B, (self.k + self.scheme.inner_modes) * self.n))
-        return np.concatenate([guess.w, guess.inner], axis=1).reshape(B, -1)
-
-    def _solve(self, system: Callable[[Array], tuple[Array, Array]], u: Array) -> Array:
+    def _solve(self, system: System, u: Array) -> Array:
         root, found = newton(system, u)
         if not found.all():
             raise InputError(

@@ -192,7 +192,7 @@ class _ChartedStepper:
         try:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
         except InputError as failure:
-            raise InputError(f"the flow ends at t = {t:.6g} s: {failure}") from failure
+            raise _ended(t, self._steps + 1, failure) from failure
         self.x, self.p, self._segment = segment.x1[0], segment.p1[0], segment
         self._steps += 1
         return segment
@@ -218,7 +218,7 @@ class _Stepper:
         try:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
         except InputError as failure:
-            raise InputError(f"the flow ends at t = {t:.6g} s: {failure}") from failure
+            raise _ended(t, self._steps + 1, failure) from failure
         dx = self._taylor @ self.x + self._moments @ segment.w[0]
         dp = self._momentum_taylor @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
         self.x, self._remainder[0] = compensated(self.x, dx, self._remainder[0])
@@ -226,6 +226,10 @@ class _Stepper:
         self._segment = segment
         self._steps += 1
         return segment
+
+
+def _ended(t: float, step: int, failure: InputError) -> InputError:
+    return InputError(f"the flow ends at t = {t:.6g} s, in step {step}: {failure}")
 
 
 class _RoundingMonitor:
