@@ -78,7 +78,7 @@ class SchemeLagrangian(SegmentLagrangian):
         """Newton's method for (w, c): phi_w = gamma^T (S/h) T^-T (p0 + h phi_x), phi_c = 0.
 
         It starts from the curve of `guess` continued, the segment before, or from the exact jet at
-        (x0, p0), and where it fails from the curve of shorter steps.
+        (x0, p0). Where it fails or ends far from there, shorter steps decide: see `hard_step`.
         """
         B = len(x0)
         if guess is None:
