@@ -91,3 +91,9 @@ def test_limits_on_torques_need_torques(arm_scene: Scene) -> None:
         InputError, match="limits on tau need a Lagrangian whose outputs are torques"
     ):
         solved(arm_scene, {"base": "none", "tau": 5.0})
+
+
+def test_passive_joints_need_torques(arm_scene: Scene) -> None:
+    scene = Scene(arm_scene.robot, passive=[arm_scene.robot.coordinate_names[1]])
+    with pytest.raises(InputError, match="passive joints need a Lagrangian of torques"):
+        solved(scene)

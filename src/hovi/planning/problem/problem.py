@@ -74,6 +74,8 @@ class TrajectoryProblem:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
         require_plannable(self.scene)
+        if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
+            raise InputError("passive joints need a Lagrangian of torques: leave them out.")
         robot, N = self.robot, self.grid.intervals
         start = self.start.on(robot, "start")
         end = goal_state(self.goal, "goal", robot, start[0], self.limits)
