@@ -59,6 +59,10 @@ def build_model(source: RobotSource) -> pin.Model:
     return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
 
 
+_LINK = "/link"
+"""Ending of the name of a link that has the name of a joint, while joints are removed."""
+
+
 def locked_and_coupled(
     model: pin.Model,
     geometry: list[pin.GeometryModel] | None,
@@ -78,13 +82,31 @@ def locked_and_coupled(
             if value:
                 dq[model.joints[index].idx_v] = value
         q = pin.integrate(model, pin.neutral(model), dq)
-        if shapes:
-            model, found = pin.buildReducedModel(model, shapes, ids, q)
-            shapes = list(found)
-        else:
-            model = pin.buildReducedModel(model, ids, q)
+        model, shapes = _reduced(model, shapes, ids, q)
     moving = _moving(couplings, locked)
     return with_mimics(model, moving) if moving else model, shapes
+
+
+def _reduced(
+    model: pin.Model, shapes: list[pin.GeometryModel], ids: list[int], q: Array
+) -> tuple[pin.Model, list[pin.GeometryModel]]:
+    """Model and geometry with joints fixed at q.
+
+    Pinocchio looks frames up by name alone, and refuses a link that has the name of a joint: such
+    links have another name meanwhile.
+    """
+    joints, model = set(model.names), model.copy()
+    for frame in model.frames:
+        if frame.type != pin.JOINT and frame.name in joints:
+            frame.name += _LINK
+    if shapes:
+        reduced, found = pin.buildReducedModel(model, shapes, ids, q)
+        shapes = list(found)
+    else:
+        reduced = pin.buildReducedModel(model, ids, q)
+    for frame in reduced.frames:
+        frame.name = frame.name.removesuffix(_LINK)
+    return reduced, shapes
 
 
 def locked_model(
