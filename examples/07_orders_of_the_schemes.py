@@ -25,7 +25,7 @@ start, goal = hovi.State([-pi / 2, 0.0]), hovi.State([0.3, 0.7], [0.5, -0.4])
 
 def cost(scheme: str, intervals: int) -> float:
     solution = hovi.plan(scene, start, goal, duration=1.0, scheme=scheme, intervals=intervals)
-    assert solution.success
+    assert solution.n_neg == 0  # "unresolved" where a coarse grid is more than 1 % off
     return solution.cost
 
 

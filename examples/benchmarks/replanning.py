@@ -19,9 +19,7 @@ LAPS = 40
 def solved(scene: str) -> tuple[hovi.Solution, Array]:
     """The motion of a scene and the configuration of its goal."""
     task = hovi.load_task(hovi.example(scene))
-    grid = hovi.Grid.uniform(
-        task.duration, task.options.intervals, hovi.schemes.by_name(task.options.scheme)
-    )
+    grid = hovi.Grid.uniform(task.duration, task.options.interval_count, task.options.table)
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
     solution = hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal))
     return solution, np.asarray(task.goal.q, dtype=float)

@@ -25,15 +25,13 @@ def measure(scene: str) -> dict[str, float]:
     task = hovi.load_task(hovi.example(scene))
     read = time.perf_counter()
     fresh = hovi.Scene(task.scene.robot, task.scene.effects)
-    grid = hovi.Grid.uniform(
-        task.duration, task.options.intervals, hovi.schemes.by_name(task.options.scheme)
-    )
+    grid = hovi.Grid.uniform(task.duration, task.options.interval_count, task.options.table)
     ld = hovi.DiscreteLagrangian(fresh.effort_lagrangian(), grid)
     problem = hovi.TrajectoryProblem(ld, task.start, task.goal)
     ready = time.perf_counter()
     solution = hovi.solve(problem)
     first = time.perf_counter() - ready
-    result = {"n": fresh.robot.nv, "N": task.options.intervals, "reading": read - began}
+    result = {"n": fresh.robot.nv, "N": task.options.interval_count, "reading": read - began}
     result |= {"set-up": ready - read, "first": first, "steps": solution.nit}
     result |= {"success": solution.success, "cost": solution.cost}
     result["warm"] = best_time(lambda: hovi.solve(problem), seconds=1.0)

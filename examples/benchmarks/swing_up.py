@@ -30,7 +30,7 @@ def solve(name: str, scheme: str = "", intervals: int = 0) -> tuple[hovi.Solutio
     solution = hovi.plan_task(
         task,
         scheme=scheme or task.options.scheme,
-        intervals=intervals or task.options.intervals,
+        intervals=intervals or task.options.interval_count,
     )
     return solution, time.perf_counter() - began
 

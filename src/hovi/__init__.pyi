@@ -46,10 +46,10 @@ from .planning.problem.tolerance import Tolerance as Tolerance
 from .planning.refinement.certificate import Certificate as Certificate
 from .planning.refinement.certificate import certify as certify
 from .planning.refinement.error_estimate import estimate_error as estimate_error
+from .planning.refinement.resolution import solve as solve
 from .planning.search.options import PlanOptions as PlanOptions
 from .planning.search.planner import plan as plan
 from .planning.solver.solver import Solution as Solution
-from .planning.solver.solver import solve as solve
 from .planning.solver.status import Status as Status
 from .planning.task_file.reading import load_task as load_task
 from .planning.task_file.task import Task as Task

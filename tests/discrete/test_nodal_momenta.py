@@ -8,7 +8,7 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -17,7 +17,7 @@ from samples.paper_arm import HANG, REACH_Q, REACH_V
 
 def reach(scene: Scene, intervals: int) -> Solution:
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, intervals, galerkin(3)))
-    return solve(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
+    return solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
 
 
 @pytest.mark.parametrize("gravity", [True, False])

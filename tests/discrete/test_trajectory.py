@@ -26,7 +26,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import InputError, TrajectoryFileError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -481,7 +481,7 @@ def test_the_full_duration_can_be_sampled_on_nonuniform_grids(scene: Scene) -> N
     grid = Grid(np.repeat([0.15, 0.15 / 13], [3, 91]), (galerkin(2),) * 94)
     assert grid.duration < 1.5 * (1 - 9 * np.finfo(float).eps)
     ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
-    uneven = solve(TrajectoryProblem(ld, State([0.0, 0.0]), State([0.3, 0.1]))).trajectory
+    uneven = solve_on_grid(TrajectoryProblem(ld, State([0.0, 0.0]), State([0.3, 0.1]))).trajectory
     np.testing.assert_allclose(uneven.sample(1.5).q[0], [0.3, 0.1], atol=1e-12)
     with pytest.raises(InputError, match="the motion lasts from 0 to"):
         uneven.sample(1.5 + 1e-12)

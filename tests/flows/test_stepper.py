@@ -18,7 +18,7 @@ from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import compensated, flow
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
@@ -208,7 +208,7 @@ def test_a_swing_up_is_replayed_from_its_momenta_until_it_is_unstable(arm_scene:
     grid = Grid.uniform(10.0, 100, galerkin(1))
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
     ends = State([-np.pi / 2, 0.0]), State([np.pi / 2, 0.0])
-    plan = solve(TrajectoryProblem(ld, *ends)).trajectory
+    plan = solve_on_grid(TrajectoryProblem(ld, *ends)).trajectory
     replay = flow(ld, ends[0], plan.momenta[0], 100)
     np.testing.assert_allclose(replay.q, plan.q, rtol=0, atol=1e-3)
     with pytest.raises(InputError, match="more than tolerance 1e-09"):
@@ -217,7 +217,7 @@ def test_a_swing_up_is_replayed_from_its_momenta_until_it_is_unstable(arm_scene:
 
 def test_a_short_reach_is_replayed_from_its_momenta(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 32, galerkin(2)))
-    plan = solve(
+    plan = solve_on_grid(
         TrajectoryProblem(ld, State([-np.pi / 2, 0.0]), State([0.3, 0.7], [0.5, -0.4]))
     ).trajectory
     replay = flow(ld, State(plan.q[0]), plan.momenta[0], 32)

@@ -101,7 +101,7 @@ def error_in(task: Task) -> str:
     ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
     if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
         return "it holds numbers that are not finite"
-    intervals, starts = task.options.intervals, task.options.starts
+    intervals, starts = task.options.interval_count, task.options.starts
     if not (np.min(task.duration) > 0 and 1 <= intervals <= 10**6 and starts >= 1):
         return "its duration, intervals or starts are not positive"
     task.scene.describe()

@@ -12,7 +12,7 @@ from hard.case import Case, Outcome, at_most, parameters
 from hard.scenes import HANG_JET, REACH, REACH_JET, START, UP, UP_JET, arm, problem, summary
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import flow
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.standard_lagrangians import spline
 from hovi.schemes import galerkin
@@ -52,13 +52,13 @@ def naive_floor() -> str:
 
 def reference() -> Solution:
     """The reach on 200 intervals, accurate to round-off."""
-    return solve(problem(arm(), START, REACH, 1.0, 200, "galerkin-3"))
+    return solve_on_grid(problem(arm(), START, REACH, 1.0, 200, "galerkin-3"))
 
 
 def fine_reach(intervals: int) -> Callable[[], Outcome]:
     def run() -> Outcome:
         exact = reference().trajectory
-        found = solve(problem(arm(), START, REACH, 1.0, intervals))
+        found = solve_on_grid(problem(arm(), START, REACH, 1.0, intervals))
         share = intervals // 200
         errors = [
             np.abs(getattr(found.trajectory, name)[::share] - getattr(exact, name)).max()
@@ -104,7 +104,7 @@ def naive_step_test() -> str:
 
 
 def bounded_swing_up() -> Outcome:
-    found = solve(problem(arm(), START, UP, 10.0, 100))
+    found = solve_on_grid(problem(arm(), START, UP, 10.0, 100))
     largest = np.abs(found.trajectory.q).max()
     good = found.status is Status.MINIMUM and largest < 100 and np.isfinite(found.cost)
     return Outcome(f"{summary([found])}, |q| <= {largest:.2g}", bool(good))
@@ -119,7 +119,7 @@ def naive_short() -> str:
 
 
 def short_times() -> Outcome:
-    found = [solve(problem(arm(), START, REACH, T, 32)) for T in TIMES]
+    found = [solve_on_grid(problem(arm(), START, REACH, T, 32)) for T in TIMES]
     good = all(s.status is Status.MINIMUM and s.nit <= 15 for s in found)
     close = [abs(s.cost / cost - 1) <= 2e-5 for s, cost in zip(found, TIMES.values(), strict=True)]
     return Outcome(summary(found), good and all(close))
@@ -135,7 +135,7 @@ def naive_rest() -> str:
 
 
 def rest() -> Outcome:
-    found = solve(problem(arm(), START, START, 3.0, 32))
+    found = solve_on_grid(problem(arm(), START, START, 3.0, 32))
     good = found.success and found.nit <= 1 and abs(found.cost) < 1e-25
     return Outcome(summary([found]), good)
 
@@ -143,7 +143,9 @@ def rest() -> Outcome:
 def naive_noether() -> str:
     parts = []
     for N in (200, 10_000):
-        best = solve(problem(arm(False), START, REACH, 1.0, N, "taylor-midpoint")).trajectory
+        best = solve_on_grid(
+            problem(arm(False), START, REACH, 1.0, N, "taylor-midpoint")
+        ).trajectory
         nodes = naive.Problem(np.hstack([best.q, best.v]), 1.0 / N, naive.Cost(gravity=False))
         p = nodes.momenta[:, 0]
         parts.append(f"spread {np.ptp(p) / np.abs(p).max():.1g} at N = {N}")
@@ -165,7 +167,7 @@ def noether_of_the_reach(intervals: int) -> Callable[[], Outcome]:
 
     def run() -> Outcome:
         posed = problem(arm(False), START, REACH, 1.0, intervals)
-        motion = solve(posed).trajectory
+        motion = solve_on_grid(posed).trajectory
         p, size = motion.momenta, np.abs(motion.momenta).max(axis=(0, 2))[:, None]
         D = posed.ld.derivatives(motion.path)
         spread = np.ptp(p[:, 0, 0]) / np.abs(p[:, 0, 0]).max()

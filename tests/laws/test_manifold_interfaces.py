@@ -26,7 +26,7 @@ from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.certificate import certify
 from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, guess_path, solve
+from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.loading import load_robot
@@ -52,7 +52,7 @@ def free_motion() -> Solution:
     grid = Grid.uniform(1.0, 6, galerkin(2))
     ld = DiscreteLagrangian(Scene(robot).effort_lagrangian(), grid)
     q0, q1 = configurations(robot, 2, 3, 0.5)
-    solution = solve(TrajectoryProblem(ld, State(q0), State(q1)))
+    solution = solve_on_grid(TrajectoryProblem(ld, State(q0), State(q1)))
     assert solution.success
     return solution
 

@@ -20,7 +20,7 @@ from hovi.effects import Armature, Effect, Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -43,7 +43,7 @@ def solved(
     scene = Scene(robot, effects)
     grid = Grid.uniform(T, intervals, by_name(scheme))
     problem = TrajectoryProblem(DiscreteLagrangian(scene.effort_lagrangian(), grid), start, goal)
-    solution = solve(problem, guess)
+    solution = solve_on_grid(problem, guess)
     assert solution.success, solution.message
     return solution
 

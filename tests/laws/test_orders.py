@@ -19,7 +19,7 @@ from hovi.discrete.state import State
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects import Gravity
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
@@ -44,7 +44,11 @@ def reach(scheme: str, intervals: int) -> Solution:
     grid = Grid.uniform(1.0, intervals, by_name(scheme))
     ld = DiscreteLagrangian(arm().effort_lagrangian(), grid)
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    solution = solve(problem) if scheme == "galerkin-4" else solve(problem, reference().trajectory)
+    solution = (
+        solve_on_grid(problem)
+        if scheme == "galerkin-4"
+        else solve_on_grid(problem, reference().trajectory)
+    )
     assert solution.success
     return solution
 

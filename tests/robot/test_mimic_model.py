@@ -219,7 +219,7 @@ def test_replayed_torques_of_the_panda_with_gripper_follow_the_plan(tmp_path: Pa
     start = robot.pose("default")
     goal = start + np.array([0.5, -0.4, 0.3, 0.6, -0.2, 0.4, 0.5, 0.03])
     solution = plan(Scene(robot, [Gravity()]), start, goal, 1.5, limits="none", intervals=8)
-    assert solution.success
+    assert solution.n_neg == 0
     replayed = replay_dynamics(solution.trajectory)
     assert max(replayed.angle, replayed.slide, replayed.largest_tip) < 1e-7
     solution.trajectory.save(tmp_path / "motion.npz")

@@ -14,7 +14,7 @@ from hovi.discrete.motion_error import MotionError
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import UnmeasurableError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.schemes import galerkin
 
 INNER_MODES = 8
@@ -74,7 +74,7 @@ def resolve(
     change = None
     while True:
         grid = Grid.uniform(T, intervals, scheme)
-        solution = solve(on_grid(problem, grid), previous.trajectory)
+        solution = solve_on_grid(on_grid(problem, grid), previous.trajectory)
         if not solution.success:
             raise UnmeasurableError(
                 f"no reference motion was found with {scheme.name} on {intervals} intervals: "

@@ -12,7 +12,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.guess import Curve
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.schemes import by_name
 
@@ -54,7 +54,7 @@ class VariationalMethod(Method):
 
         def run() -> Answer:
             watch = Stopwatch(self._clock)
-            found = solve(problem, path)
+            found = solve_on_grid(problem, path)
             seconds = watch.seconds
             cost = found.cost if np.isfinite(found.cost) else float("inf")
             motion = found.trajectory.configurations

@@ -120,7 +120,7 @@ def work_precision(
             methods, resolved.reference, time, report, MEASURING_SHARE, repeats, enough
         )
         report("measuring plan(tolerance=)", time.fraction)
-        intervals = task.options.intervals
+        intervals = task.options.interval_count
         chosen = choices(problem, curve, resolved.reference, time, intervals, repeats, clock)
     finally:
         for method in methods:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.robot.mass_matrix import light_joints
 from hovi.robot.mimic_model import couplings_of
 from hovi.robot.mimic_tags import held_values
 from hovi.robot.model import couplings_in
@@ -115,6 +116,12 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
         zero = np.flatnonzero(np.asarray(limit) == 0.0)
         if len(zero):
             yield f"the {what} limit is 0 at {_joints_at(model, zero)}"
+    light = [f"{name} ({inertia:.2g} kg m^2)" for name, inertia in light_joints(model).items()]
+    if light:
+        yield (
+            f"little inertia about {_some(light)}: without limits or the effects "
+            "armature and acceleration_cost a least-torque motion may whirl there"
+        )
     if source.urdf is None:
         return
     robot = checked_urdf(source.urdf, source.reference)

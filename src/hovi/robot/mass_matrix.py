@@ -10,8 +10,12 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.mimic_model import CoordinateMap, uncoupled
+from hovi.robot.space.joint_kinds import ANGLE, kind_of
 
 Array = npt.NDArray[np.float64]
+
+LIGHT_SHARE = 3e-3
+"""Inertia of a light joint, relative to that of the heaviest."""
 
 
 class MassMatrix:
@@ -83,3 +87,22 @@ def _sample_configurations(model: pin.Model) -> Iterator[Array]:
 def _link_of(model: pin.Model, joint: int) -> str:
     frames = (f for f in model.frames if f.parentJoint == joint and f.type == pin.BODY)
     return next((f" (link {frame.name!r})" for frame in frames), "")
+
+
+def light_joints(model: pin.Model) -> dict[str, float]:
+    """Turning joints of one coordinate that are far lighter than the heaviest, by name.
+
+    The value is the least M_jj at four fixed random configurations, armature included, in [kg m^2];
+    light is below LIGHT_SHARE of the largest M_jj.
+    """
+    joints = [
+        (str(name), joint.idx_v)
+        for joint, name in zip(model.joints[1:], model.names[1:], strict=True)
+        if kind_of(joint).units == (ANGLE,)
+    ]
+    if not joints:
+        return {}
+    samples = np.array(list(_sample_configurations(model)))
+    inertia = np.diagonal(MassMatrix(model)(samples), axis1=1, axis2=2)  # (samples, nv)
+    least, most = inertia.min(axis=0), inertia[:, [i for _, i in joints]].max()
+    return {name: float(least[i]) for name, i in joints if least[i] < LIGHT_SHARE * most}

@@ -17,7 +17,7 @@ from hovi.schemes.classic import (
     taylor_trapezoid,
     trapezoid_difference,
 )
-from hovi.schemes.galerkin_table import galerkin
+from hovi.schemes.galerkin_table import galerkin, is_galerkin
 from hovi.schemes.interval_curve import end_basis, gamma, inverse_gamma
 from hovi.schemes.regularity import is_regular, regularity_matrix, require_regular
 from hovi.schemes.scheme import Scheme
@@ -62,6 +62,7 @@ __all__ = [
     "gamma",
     "hermite_simpson",
     "inverse_gamma",
+    "is_galerkin",
     "is_regular",
     "mean_difference",
     "regularity_matrix",

@@ -62,3 +62,10 @@ def _table(inner_modes: int, derivatives: int, count: int) -> Scheme:
         return Scheme(name, 2 * fewest, points, weights, interval_rows(points, inner_modes))
     table = jet_rows(points, derivatives, inner_modes)
     return Scheme(f"{name}-k{derivatives}", 2 * fewest, points, weights, table)
+
+
+def is_galerkin(scheme: Scheme) -> bool:
+    """Whether a scheme is a member of the family, so that it has a curve of its own."""
+    r, k, points = scheme.inner_modes, scheme.derivatives, len(scheme.points)
+    known = 0 <= r <= MAX_INNER_MODES and k <= MAX_DERIVATIVES and r + k <= points <= MAX_POINTS
+    return known and scheme.key == _table(r, k, points).key

@@ -32,7 +32,7 @@ from hovi.discrete.state import State
 from hovi.effects import Gravity, JointLimitPotential
 from hovi.errors import InputError, SchemeError, UnmeasurableError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -50,7 +50,7 @@ def reach(scene: Scene, intervals: int = 8, modes: int = 1) -> TrajectoryProblem
 @pytest.fixture(scope="module")
 def setting(arm_scene: Scene) -> Setting:
     problem = reach(arm_scene, 32, 3)
-    guess = guess_curve("near", problem, solve(problem).trajectory)
+    guess = guess_curve("near", problem, solve_on_grid(problem).trajectory)
     return Setting(problem, guess, guess)
 
 
@@ -117,7 +117,7 @@ def test_an_unknown_table_raises_with_a_suggestion() -> None:
 def test_legendre_gauss_collocation_equals_galerkin_with_two_modes_fewer(
     setting: Setting, modes: int
 ) -> None:
-    ours = solve(reach(setting.problem.scene, 8, modes))
+    ours = solve_on_grid(reach(setting.problem.scene, 8, modes))
     method = CollocationMethod(setting, f"lg-{modes + 2}", Kernels(compiled=False))
     theirs = method.prepare(8).solve()
     assert theirs.success
@@ -130,7 +130,7 @@ def test_legendre_gauss_collocation_equals_galerkin_with_two_modes_fewer(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_collocation_converges_with_its_order(setting: Setting, name: str) -> None:
-    exact = solve(reach(setting.problem.scene, 64, 5)).cost
+    exact = solve_on_grid(reach(setting.problem.scene, 64, 5)).cost
     method = CollocationMethod(setting, name, Kernels(compiled=False))
     assert method.order is not None
     errors = [abs(method.prepare(N).solve().cost / exact - 1) for N in (24, 48)]

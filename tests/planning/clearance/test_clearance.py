@@ -18,7 +18,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
-from hovi.planning.solver.solver import guess_path, solve
+from hovi.planning.solver.solver import guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 
@@ -77,11 +77,11 @@ def test_the_model_with_distances_is_that_of_linear_and_square_terms(
 
 def test_a_ball_on_the_path_is_passed_at_the_margin(arm_scene: hovi.Scene) -> None:
     """At 10,000 samples; the bound is active, and the cost is higher than without the ball."""
-    free = solve(problem(arm_scene))
+    free = solve_on_grid(problem(arm_scene))
     kept = problem(arm_scene, BALL)
     assert kept.clearance is not None
     assert least_distance(free.trajectory, arm_scene.robot, kept.clearance) < -0.05
-    solution = solve(kept)
+    solution = solve_on_grid(kept)
     assert solution.status is Status.MINIMUM, solution.message
     assert solution.n_neg == 0
     distance = least_distance(solution.trajectory, arm_scene.robot, kept.clearance)
@@ -91,8 +91,8 @@ def test_a_ball_on_the_path_is_passed_at_the_margin(arm_scene: hovi.Scene) -> No
 
 
 def test_a_distant_obstacle_changes_nothing(arm_scene: hovi.Scene) -> None:
-    free = solve(problem(arm_scene))
-    far = solve(problem(arm_scene, Sphere([-5.0, 3.0, 0.0], 0.3)))
+    free = solve_on_grid(problem(arm_scene))
+    far = solve_on_grid(problem(arm_scene, Sphere([-5.0, 3.0, 0.0], 0.3)))
     assert far.cost == pytest.approx(free.cost, rel=1e-9)
     np.testing.assert_allclose(far.trajectory.q, free.trajectory.q, atol=1e-6)
 
@@ -100,7 +100,7 @@ def test_a_distant_obstacle_changes_nothing(arm_scene: hovi.Scene) -> None:
 def test_approaches_are_those_of_dense_sampling(arm_scene: hovi.Scene) -> None:
     given = problem(arm_scene, BALL, intervals=6)
     assert given.distances is not None
-    motion = solve(problem(arm_scene, intervals=6)).trajectory
+    motion = solve_on_grid(problem(arm_scene, intervals=6)).trajectory
     found = approach_along(motion, given.distances, 0.05)
     dense = given.distances.values(motion.configurations(np.linspace(0.0, 1.5, 60_001)))
     near = dense.min(axis=0) < 0.05
@@ -130,7 +130,7 @@ def test_an_end_within_the_margin_is_infeasible_before_any_step(
 def test_a_ball_that_cannot_be_passed_is_infeasible_and_named(arm_scene: hovi.Scene) -> None:
     """The upper arm cannot pass it in its plane, for any motion of the forearm."""
     barred = problem(arm_scene, Sphere([0.49, 0.0, -0.41], 0.2, name="ball"))
-    solution = solve(barred)
+    solution = solve_on_grid(barred)
     assert solution.status is Status.INFEASIBLE
     for word in ("'upper_arm'", "obstacle 'ball'", "overlap by", "at t ="):
         assert word in solution.message

@@ -17,7 +17,7 @@ from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tole
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
 from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
@@ -52,7 +52,7 @@ def true_error(solution: Solution, frame: str | None = None) -> float:
     assert problem is not None
     tables = tuple(galerkin(scheme.inner_modes + 6) for scheme in grid.schemes)
     fine = Grid(grid.steps, tables).halved(np.ones(grid.intervals, dtype=bool))
-    reference = solve(problem.on(fine), solution.trajectory)
+    reference = solve_on_grid(problem.on(fine), solution.trajectory)
     assert reference.success
     costs = solution.cost, reference.cost
     error = deviation(solution.trajectory, reference.trajectory, costs, frame)
@@ -121,7 +121,7 @@ def test_no_error_below_rounding_is_claimed(arm_scene: Scene) -> None:
 def test_a_time_limit_is_reported_with_the_error_so_far(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 4, galerkin(0)))
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    first = solve(problem)
+    first = solve_on_grid(problem)
     tolerance = Tolerance(1e-9)
     ended = refine_to_tolerance(first, tolerance, time_limit=1e-9)
     accuracy = accuracy_of(ended)
@@ -165,7 +165,7 @@ def test_the_estimate_of_a_minimum_that_moves_away_is_corrected(arm_scene: Scene
     assert found.problem is not None
     assert found.error_estimate is not None
     every = np.ones(found.trajectory.grid.intervals, dtype=bool)
-    finer = solve(found.problem.on(found.trajectory.grid.halved(every)), found.trajectory)
+    finer = solve_on_grid(found.problem.on(found.trajectory.grid.halved(every)), found.trajectory)
     assert abs(finer.cost / found.cost - 1) <= 10 * found.error_estimate
 
 
@@ -267,7 +267,7 @@ def test_motions_under_limits(arm_scene: Scene, tolerance: float) -> None:
     every = np.ones(found.trajectory.grid.intervals, dtype=bool)
     grid = found.trajectory.grid.halved(every)
     grid = grid.halved(np.ones(grid.intervals, dtype=bool))
-    reference = solve(found.problem.on(grid), found.trajectory)
+    reference = solve_on_grid(found.problem.on(grid), found.trajectory)
     assert reference.success
     true = abs(found.cost / reference.cost - 1)
     assert accuracy.error / 10 <= true <= tolerance

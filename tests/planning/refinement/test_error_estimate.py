@@ -19,7 +19,7 @@ from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -54,7 +54,7 @@ def reach_problem(scene: Scene, grid: Grid) -> TrajectoryProblem:
 
 @pytest.fixture(scope="module")
 def reach_reference(arm_scene: Scene) -> Solution:
-    return solve(reach_problem(arm_scene, Grid.uniform(1.0, 24, galerkin(6))))
+    return solve_on_grid(reach_problem(arm_scene, Grid.uniform(1.0, 24, galerkin(6))))
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def ur5_scene() -> Scene:
 
 @pytest.fixture(scope="module")
 def ur5_reference(ur5_scene: Scene) -> Solution:
-    return solve(ur5_problem(ur5_scene, Grid.uniform(1.5, 32, galerkin(6))))
+    return solve_on_grid(ur5_problem(ur5_scene, Grid.uniform(1.5, 32, galerkin(6))))
 
 
 def true_error(solution: Solution, reference: Solution) -> MotionError:
@@ -85,7 +85,7 @@ def assert_close(estimate: MotionError, true: MotionError, factor: float) -> Non
 def test_the_reference_solves_pontryagins_equations(
     arm_scene: Scene, reach_reference: Solution
 ) -> None:
-    coarse = solve(reach_problem(arm_scene, Grid.uniform(1.0, 16, galerkin(1)))).trajectory
+    coarse = solve_on_grid(reach_problem(arm_scene, Grid.uniform(1.0, 16, galerkin(1)))).trajectory
     nodes = np.concatenate([coarse.q, coarse.v, coarse.momenta[:, 0], coarse.momenta[:, 1]], 1)
     ends = HANG, REST, REACH_Q, REACH_V
     exact = extremal(ends, 1.0, (coarse.t, nodes.T), 1e-9)
@@ -104,7 +104,7 @@ def test_the_estimate_is_the_error_within_a_factor_of_two(
     arm_scene: Scene, reach_reference: Solution, scheme: str, intervals: int
 ) -> None:
     grid = Grid.uniform(1.0, intervals, by_name(scheme))
-    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    solution = solve_on_grid(reach_problem(arm_scene, grid), reach_reference.trajectory)
     estimate = estimate_error(solution)
     assert estimate is not None
     assert_close(estimate, true_error(solution, reach_reference), 2.0)
@@ -115,7 +115,7 @@ def test_the_estimate_is_the_error_of_six_joints(
     ur5_scene: Scene, ur5_reference: Solution, inner_modes: int, intervals: int
 ) -> None:
     grid = Grid.uniform(1.5, intervals, galerkin(inner_modes))
-    solution = solve(ur5_problem(ur5_scene, grid), ur5_reference.trajectory)
+    solution = solve_on_grid(ur5_problem(ur5_scene, grid), ur5_reference.trajectory)
     estimate = estimate_error(solution)
     assert estimate is not None
     assert_close(estimate, true_error(solution, ur5_reference), 2.0)
@@ -124,7 +124,7 @@ def test_the_estimate_is_the_error_of_six_joints(
 def test_one_more_mode_would_not_suffice(ur5_scene: Scene, ur5_reference: Solution) -> None:
     # with one and with two inner modes the costs have the same error, so the difference is useless
     costs = [
-        solve(
+        solve_on_grid(
             ur5_problem(ur5_scene, Grid.uniform(1.5, 16, galerkin(r))), ur5_reference.trajectory
         ).cost
         for r in (1, 2)
@@ -139,7 +139,7 @@ def test_unequal_intervals_of_unequal_degree_are_estimated_too(
     steps = np.array([0.05, 0.1, 0.15, 0.2, 0.1, 0.15, 0.1, 0.05, 0.1])
     degrees = [1, 2, 3, 2, 4, 1, 2, 3, 2]
     grid = Grid(steps, tuple(galerkin(r) for r in degrees))
-    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    solution = solve_on_grid(reach_problem(arm_scene, grid), reach_reference.trajectory)
     estimate = estimate_error(solution)
     assert estimate is not None
     assert_close(estimate, true_error(solution, reach_reference), 2.0)
@@ -152,7 +152,7 @@ def test_the_contributions_of_the_intervals_add_up_to_the_error_of_the_cost(
     arm_scene: Scene, reach_reference: Solution
 ) -> None:
     grid = Grid.uniform(1.0, 12, galerkin(2))
-    solution = solve(reach_problem(arm_scene, grid), reach_reference.trajectory)
+    solution = solve_on_grid(reach_problem(arm_scene, grid), reach_reference.trajectory)
     finer = finer_than(solution)
     assert finer is not None
     assert np.sum(finer.gains) == pytest.approx(solution.cost - reach_reference.cost, rel=0.05)
@@ -162,7 +162,7 @@ def test_an_exact_cubic_has_no_error(arm_scene: Scene) -> None:
     # at rest without gravity no torque is needed
     scene = Scene(arm_scene.robot)
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(0)))
-    still = solve(TrajectoryProblem(ld, State(HANG), State(HANG)))
+    still = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(HANG)))
     estimate = estimate_error(still)
     assert estimate is not None
     assert (estimate.cost, estimate.angle, estimate.largest_tau) == (0.0, 0.0, 0.0)
@@ -209,7 +209,7 @@ def test_an_unknown_frame_and_another_duration_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="has no frame 'tol0'"):
         estimate_error(reach_reference, frame="tol0")
-    longer = solve(reach_problem(arm_scene, Grid.uniform(2.0, 8, galerkin(2))))
+    longer = solve_on_grid(reach_problem(arm_scene, Grid.uniform(2.0, 8, galerkin(2))))
     with pytest.raises(InputError, match="same duration can be compared, not 2 s with 1 s"):
         true_error(longer, reach_reference)
 

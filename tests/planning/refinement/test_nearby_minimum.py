@@ -16,7 +16,7 @@ from hovi.planning.refinement.error_estimate import prolonged
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import NearbyMinimum, nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.bundled_models import example
@@ -33,7 +33,7 @@ UR5_GOAL = [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
 def ur5() -> Solution:
     scene = Scene(load_robot("ur5"), effects=[Gravity()])
     ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.5, 12, galerkin(4)))
-    solution = solve(TrajectoryProblem(ld, State(UR5_START), State(UR5_GOAL)))
+    solution = solve_on_grid(TrajectoryProblem(ld, State(UR5_START), State(UR5_GOAL)))
     assert solution.success
     return solution
 
@@ -61,7 +61,7 @@ def test_it_is_the_optimisers_minimum(ur5: Solution) -> None:
     found = approached(ur5, problem)
     assert found is not None
     solution = found.solution()
-    exact = solve(problem, prolonged(ur5.trajectory.path, problem.grid))
+    exact = solve_on_grid(problem, prolonged(ur5.trajectory.path, problem.grid))
     assert solution is not None
     assert (solution.success, solution.status, solution.n_neg) == (True, Status.MINIMUM, 0)
     assert solution.cost == pytest.approx(exact.cost, rel=1e-13)
@@ -77,14 +77,14 @@ def test_its_value_gives_the_difference_of_costs(ur5: Solution) -> None:
     problem = finer(ur5)
     found = approached(ur5, problem)
     assert found is not None
-    exact = solve(problem, prolonged(ur5.trajectory.path, problem.grid)).cost
+    exact = solve_on_grid(problem, prolonged(ur5.trajectory.path, problem.grid)).cost
     assert ur5.cost - found.value == pytest.approx(ur5.cost - exact, rel=0.02)
 
 
 def test_a_minimum_some_way_off_takes_several_hessians(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 8, galerkin(3)))
-    there = solve(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
-    other = solve(TrajectoryProblem(ld, State(HANG), State(np.add(REACH_Q, 0.2), REACH_V)))
+    there = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
+    other = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(np.add(REACH_Q, 0.2), REACH_V)))
     assert there.problem is not None
     problem, objective = there.problem, ActionObjective(there.problem)
     start = moved(other.trajectory.path, problem.grid, problem.boundary, problem.robot)
@@ -101,7 +101,7 @@ def test_a_minimum_some_way_off_takes_several_hessians(arm_scene: Scene) -> None
 def test_far_from_a_minimum_nothing_is_found(arm_scene: Scene) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(3.0, 16, galerkin(2)))
     problem = TrajectoryProblem(ld, State(HANG), State(-HANG))
-    start = solve(problem, max_iterations=1).trajectory.path
+    start = solve_on_grid(problem, max_iterations=1).trajectory.path
     objective = ActionObjective(problem)
     assert nearby_minimum(objective, start, objective.model(start, None, None)) is None
 
@@ -122,7 +122,7 @@ def test_interpolated_slopes_are_nearer_to_the_right_ones(ur5: Solution) -> None
     assert ur5.problem is not None
     path = prolonged(ur5.trajectory.path, problem.grid)
     objective = ActionObjective(problem)
-    (right,) = objective.outputs(solve(problem, path).trajectory.path)
+    (right,) = objective.outputs(solve_on_grid(problem, path).trajectory.path)
     (own,) = objective.outputs(path)
     (interpolated,) = interpolated_slopes(ur5.problem.ld, ur5.trajectory.path, problem.ld)
     assert np.abs(interpolated - right).max() < 0.2 * np.abs(own - right).max()
@@ -133,7 +133,7 @@ def test_a_grid_of_other_intervals_and_degrees_sees_the_same_torques(arm_scene: 
     mixed = Grid(np.array([0.3, 0.2, 0.1, 0.4]), tuple(galerkin(r) for r in (6, 5, 5, 8)))
     ld = DiscreteLagrangian(lagrangian, mixed)
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V))
-    motion = solve(problem).trajectory
+    motion = solve_on_grid(problem).trajectory
     other = DiscreteLagrangian(lagrangian, Grid(np.full(5, 0.2), (galerkin(2),) * 5))
     (interpolated,) = interpolated_slopes(ld, motion.path, other)
     tau = motion.sample(other.point_times[0]).tau
@@ -146,7 +146,7 @@ def test_a_hessian_weighted_so_stays_definite_beside_a_minimum() -> None:
     grid = Grid.uniform(task.duration, 10, galerkin(4))
     ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
     assert isinstance(task.goal, State)
-    solution = solve(TrajectoryProblem(ld, task.start, task.goal))
+    solution = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
     problem = finer(solution)
     start, objective = prolonged(solution.trajectory.path, problem.grid), ActionObjective(problem)
     efforts = interpolated_slopes(ld, solution.trajectory.path, problem.ld)
@@ -157,4 +157,4 @@ def test_a_hessian_weighted_so_stays_definite_beside_a_minimum() -> None:
     minimum = found.solution()
     assert minimum is not None
     assert ActionObjective(problem).model(minimum.trajectory.path, None, None).factor(0.0)
-    assert found.steps < 0.5 * solve(problem, start).nit
+    assert found.steps < 0.5 * solve_on_grid(problem, start).nit

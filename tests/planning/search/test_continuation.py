@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,7 @@ from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -24,6 +26,8 @@ from samples.uneven_chain import uneven_chain
 
 STEPS = 300
 """Too few steps for a direct solve with a light hand, which takes some 500; enough per stage."""
+
+GRID: dict[str, Any] = {"scheme": "galerkin-2", "intervals": 16, "limits": "none"}
 
 
 @pytest.fixture(scope="module")
@@ -47,32 +51,29 @@ def job(light_hand: Scene) -> Job:
 
 @pytest.fixture(scope="module")
 def failed(job: Job) -> Solution:
-    return solve(job.problem(), max_iterations=STEPS)
+    return solve_on_grid(job.problem(), max_iterations=STEPS)
 
 
 def test_masses_of_a_million_to_one_are_solved_with_decreasing_rotor_inertia(
-    light_hand: Scene, failed: Solution
+    job: Job, failed: Solution
 ) -> None:
     assert failed.status is Status.ITERATION_LIMIT
-    found = plan(light_hand, HANG, -HANG, 3.0, limits="none", max_iterations=STEPS)
+    found = solve_by_continuation(job, failed)
     assert found.status is Status.MINIMUM
     assert found.n_neg == 0
     assert found.minima == (found.cost,)
     assert (
         "The direct solve ended in iteration_limit; continuation in inertia found" in found.message
     )
-    assert found.problem is not None
-    assert not found.problem.scene.model.armature.any()
-    again = solve(found.problem, found.trajectory)
+    assert not job.scene.model.armature.any()
+    again = solve_on_grid(job.problem(), found.trajectory)
     assert again.nit <= 2
     assert again.cost == pytest.approx(found.cost, rel=1e-9)
     assert again.n_neg == 0
 
 
 def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Solution) -> None:
-    found = plan(
-        light_hand, HANG, -HANG, 3.0, limits="none", continuation=False, max_iterations=STEPS
-    )
+    found = plan(light_hand, HANG, -HANG, 3.0, continuation=False, max_iterations=STEPS, **GRID)
     assert (found.status, found.cost, found.message) == (
         failed.status,
         failed.cost,
@@ -81,12 +82,10 @@ def test_a_plan_without_continuation_is_one_solve(light_hand: Scene, failed: Sol
 
 
 def test_a_valley_of_positive_curvature_gets_more_steps(arm_scene: Scene) -> None:
-    stopped = plan(
-        arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5, continuation=False
-    )
+    stopped = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, continuation=False, **GRID)
     assert stopped.status is Status.ITERATION_LIMIT
     assert stopped.n_neg == 0
-    found = plan(arm_scene, HANG, REACH_Q, 1.0, limits="none", max_iterations=5)
+    found = plan(arm_scene, HANG, REACH_Q, 1.0, max_iterations=5, **GRID)
     assert found.status is Status.MINIMUM
     assert "continuation in steps found this minimum in 1 stage and" in found.message
 
@@ -139,7 +138,7 @@ def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
 
 def test_a_continuation_that_fails_names_what_was_tried(job: Job) -> None:
     hurried = job.with_options(max_iterations=2)
-    failed = solve(hurried.problem(), max_iterations=2)
+    failed = solve_on_grid(hurried.problem(), max_iterations=2)
     found = solve_by_continuation(hurried, failed)
     assert (found.success, found.status) == (False, Status.ITERATION_LIMIT)
     assert found.cost <= failed.cost
@@ -154,7 +153,7 @@ def test_problems_that_fail_before_any_step_are_not_continued(arm_scene: Scene) 
     job = Job(
         arm_scene, grid, State(HANG), State(-HANG), PlanOptions(max_iterations=50, limits=limits)
     )
-    contradiction = solve(job.problem())
+    contradiction = solve_on_grid(job.problem())
     assert contradiction.status is Status.INFEASIBLE
     assert not may_help(contradiction)
     found = plan(arm_scene, HANG, -HANG, 1.0, limits=limits)

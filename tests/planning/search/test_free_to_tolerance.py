@@ -19,7 +19,7 @@ from hovi.planning.refinement.adaptive import refine_to_tolerance
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.planner import plan
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
@@ -148,7 +148,7 @@ def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(
             if refined and later_steps is None:
                 raise KeyboardInterrupt
             most = later_steps if refined and later_steps is not None else 500
-            return solve(problem, guess, max_iterations=most)
+            return solve_on_grid(problem, guess, max_iterations=most)
 
         return solve_for
 
@@ -157,7 +157,7 @@ def test_a_motion_within_the_tolerance_is_kept_if_a_later_round_fails(
         return refined[-1]
 
     ld = DiscreteLagrangian(task.scene.effort_lagrangian(), coarse)
-    first = solve(TrajectoryProblem(ld, task.start, task.goal))
+    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
     found = free_to_tolerance(FreeDuration(*BOUNDS, WEIGHT), on_grid, each_refine, first)
     assert accuracy_of(refined[0]).reached
     assert found.success == (later_steps is not None)

@@ -23,7 +23,7 @@ from hovi.planning.search.homotopies import (
 )
 from hovi.planning.search.job import Job
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, galerkin
@@ -95,9 +95,9 @@ def test_another_duration_without_gravity_is_the_same_motion(job: Job) -> None:
     # tau scales like 1/T^2, hence the cost like 1/T^3
     grid = Grid.uniform(1.0, 8, galerkin(2))
     floating = dataclasses.replace(job, scene=Scene(job.scene.robot), grid=grid)
-    whole = solve(floating.problem())
+    whole = solve_on_grid(floating.problem())
     for stage, share in zip(other_durations(floating), (0.125, 0.25, 0.5), strict=True):
-        other = solve(stage.job.problem(), whole.trajectory)
+        other = solve_on_grid(stage.job.problem(), whole.trajectory)
         assert other.cost == pytest.approx(whole.cost / share**3, rel=1e-9)
         np.testing.assert_allclose(other.trajectory.q, whole.trajectory.q, atol=1e-7)
 

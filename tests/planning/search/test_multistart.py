@@ -14,7 +14,7 @@ from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import SAME_COST, Pool, default_processes, distinct, explore
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
@@ -70,7 +70,7 @@ def test_solutions_come_in_the_order_of_the_guesses(
     found = Pool(job, processes).solve_all(guesses)
     assert len(found) == len(guesses)
     for guess, solution in zip(guesses, found, strict=True):
-        alone = solve(problem, guess)
+        alone = solve_on_grid(problem, guess)
         assert solution.cost == alone.cost
         assert solution.status == alone.status
         assert solution.trajectory.q.tobytes() == alone.trajectory.q.tobytes()
@@ -100,7 +100,7 @@ def fake(solution: Solution, cost: float, status: Status = Status.MINIMUM) -> So
 
 @pytest.fixture(scope="module")
 def any_solution(job: Job, guesses: list) -> Solution:
-    return solve(job.problem(), guesses[0])
+    return solve_on_grid(job.problem(), guesses[0])
 
 
 def test_minima_are_sorted_and_equal_ones_count_once(any_solution: Solution) -> None:
@@ -129,7 +129,7 @@ def test_without_a_minimum_the_best_other_solution_is_kept(any_solution: Solutio
 
 def test_one_start_is_the_guess(job: Job, guesses: list) -> None:
     (only,) = search(job, guesses, 1)
-    assert only.cost == solve(job.problem(), guesses[0]).cost
+    assert only.cost == solve_on_grid(job.problem(), guesses[0]).cost
 
 
 def test_minima_of_a_search_are_minima_by_ascending_cost(job: Job, guesses: list) -> None:
@@ -141,9 +141,11 @@ def test_minima_of_a_search_are_minima_by_ascending_cost(job: Job, guesses: list
     for solution in minima:
         assert solution.status is Status.MINIMUM
         assert solution.n_neg == 0
-        again = solve(job.problem(), solution.trajectory.path)
+        again = solve_on_grid(job.problem(), solution.trajectory.path)
         assert again.cost == pytest.approx(solution.cost, rel=1e-12)
-    assert any(cost == pytest.approx(solve(job.problem(), guesses[0]).cost) for cost in costs)
+    assert any(
+        cost == pytest.approx(solve_on_grid(job.problem(), guesses[0]).cost) for cost in costs
+    )
 
 
 def test_more_starts_are_never_worse(job: Job, guesses: list) -> None:

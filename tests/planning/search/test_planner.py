@@ -17,7 +17,7 @@ from hovi.planning.search.final_stages import MAX_REFINED
 from hovi.planning.search.planner import plan
 from hovi.planning.search.search import COARSE_INTERVALS
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
@@ -63,17 +63,35 @@ def test_one_start_is_one_solve(arm_scene: Scene) -> None:
     assert planned.cost == pytest.approx(REACH_COST, rel=1e-9)
     assert planned.minima == (planned.cost,)
     assert planned.problem is not None
-    solved = solve(planned.problem)
+    solved = solve_on_grid(planned.problem)
     assert planned.cost == solved.cost
     assert planned.trajectory.q.tobytes() == solved.trajectory.q.tobytes()
     assert planned.setup_seconds >= 0
     assert planned.solve_seconds > 0
 
 
-def test_defaults_are_galerkin_2_on_sixteen_intervals(arm_scene: Scene) -> None:
-    motion = plan(arm_scene, HANG, GOAL, 1.0, limits="none").trajectory
-    assert motion.grid.intervals == 16
-    assert {scheme.name for scheme in motion.grid.schemes} == {"galerkin-2"}
+def test_the_default_is_a_tolerance_of_a_thousandth(arm_scene: Scene) -> None:
+    found = plan(arm_scene, HANG, GOAL, 1.0, limits="none")
+    assert found.accuracy is not None
+    assert found.accuracy.tolerance.size == 1e-3
+    assert found.accuracy.reached
+
+
+@pytest.mark.parametrize(
+    ("named", "scheme", "intervals"),
+    [
+        ({"intervals": 20}, "galerkin-2", 20),
+        ({"scheme": "galerkin-1x5"}, "galerkin-1x5", 16),
+        ({"scheme": "galerkin-3", "intervals": 12}, "galerkin-3", 12),
+    ],
+)
+def test_naming_a_scheme_or_intervals_fixes_the_grid(
+    arm_scene: Scene, named: dict[str, Any], scheme: str, intervals: int
+) -> None:
+    found = plan(arm_scene, HANG, GOAL, 1.0, limits="none", **named)
+    assert found.accuracy is None
+    assert found.trajectory.grid.intervals == intervals
+    assert {each.name for each in found.trajectory.grid.schemes} == {scheme}
 
 
 def test_configurations_are_states_at_rest(arm_scene: Scene) -> None:
@@ -184,10 +202,10 @@ def test_minima_are_ranked_on_the_requested_grid(arm_scene: Scene) -> None:
     assert found.minima[0] == found.cost
     assert found.problem is not None
     assert found.cost == pytest.approx(found.problem.ld.action(motion.path), rel=1e-13)
-    again = solve(found.problem, motion.path)
+    again = solve_on_grid(found.problem, motion.path)
     assert again.cost == pytest.approx(found.cost, rel=1e-12)
     grid = Grid.uniform(3.0, COARSE_INTERVALS, by_name("galerkin-2"))
-    coarse = solve(found.problem.on(grid), motion)
+    coarse = solve_on_grid(found.problem.on(grid), motion)
     assert found.cost == pytest.approx(coarse.cost, rel=0.05)
     assert abs(found.cost - coarse.cost) > 1e-6  # the cost is not the coarse grid's
 
@@ -208,7 +226,7 @@ def test_progress_is_text_and_an_increasing_fraction(arm_scene: Scene) -> None:
 
 
 def test_a_time_limit_ends_a_search_of_any_length(arm_scene: Scene) -> None:
-    found = swing_up(arm_scene, starts=2000, time_limit=0.3)
+    found = swing_up(arm_scene, starts=2000, time_limit=0.3, intervals=40)
     assert "The search ended after" in found.message
     assert "of 2000 starts" in found.message
     assert found.status in (Status.MINIMUM, Status.TIME_LIMIT)

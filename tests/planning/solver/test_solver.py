@@ -18,7 +18,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.non_finite import non_finite_sentence
-from hovi.planning.solver.solver import Solution, guess_path, solve
+from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.solver.warm_start import follow
 from hovi.planning.task_file.reading import load_task
@@ -52,7 +52,7 @@ def problem_on(
 
 @pytest.fixture(scope="module")
 def reach(arm_scene: Scene) -> Solution:
-    return solve(problem_on(arm_scene))
+    return solve_on_grid(problem_on(arm_scene))
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ def test_the_reach_solves_pontryagins_equations(reach: Solution) -> None:
 def test_a_reach_in_a_millisecond_solves_pontryagins_equations(arm_scene: Scene) -> None:
     T = 1e-3
     problem = problem_on(arm_scene, duration=T)
-    fast = solve(problem)
+    fast = solve_on_grid(problem)
     assert fast.status is Status.MINIMUM
     assert fast.n_neg == 0
     assert fast.cost == pytest.approx(3.13597e10, rel=1e-5)
@@ -152,7 +152,7 @@ def test_ipopt_finds_the_same_minimum(name: str) -> None:
         intervals=8,
         scheme=task.options.scheme,
     )
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert solution.status is Status.MINIMUM
     cost, nodes = least_action(problem, solution.trajectory.path)
     assert solution.cost == pytest.approx(cost, rel=1e-7)
@@ -175,11 +175,11 @@ def test_pontryagins_hamiltonian_is_constant(arm_scene: Scene, reach: Solution) 
 
 def test_momenta_are_the_derivatives_of_the_least_cost(arm_scene: Scene) -> None:
     base = problem_on(arm_scene, intervals=6)
-    origin = solve(base)
+    origin = solve_on_grid(base)
 
     def least_cost(x: Array) -> Array:
         moved = base.between(State(x[0], x[1]), State(x[2], x[3]))
-        return np.array(solve(moved, origin.trajectory).cost)
+        return np.array(solve_on_grid(moved, origin.trajectory).cost)
 
     found = derivative(least_cost, np.stack([HANG, REST, REACH_Q, REACH_V]), step=3e-3)
     p = origin.trajectory.momenta
@@ -190,7 +190,7 @@ def test_momenta_are_the_derivatives_of_the_least_cost(arm_scene: Scene) -> None
 def test_nodes_and_momenta_do_not_depend_on_the_algebra(arm_scene: Scene) -> None:
     # more than a thousand intervals are merged in pairs, fewer use a banded matrix
     few, many = (
-        solve(problem_on(arm_scene, intervals=N, scheme="galerkin-1")) for N in (505, 1010)
+        solve_on_grid(problem_on(arm_scene, intervals=N, scheme="galerkin-1")) for N in (505, 1010)
     )
     assert few.status is many.status is Status.MINIMUM
     assert few.cost == pytest.approx(REACH_COST, rel=1e-10)
@@ -213,7 +213,7 @@ def test_a_grid_of_unequal_steps_has_the_same_minimum(arm_scene: Scene, kind: st
     }[kind]
     grid = Grid(shares / shares.sum(), (by_name("galerkin-3"),) * N)
     problem = problem_on(arm_scene, grid=grid)
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert_fits(problem, solution)
     assert_stationary(problem, solution, 1e-9)
     assert solution.status is Status.MINIMUM
@@ -224,7 +224,7 @@ def test_intervals_of_different_schemes_are_solved_together(arm_scene: Scene) ->
     names = ["galerkin-2", "galerkin-3", "galerkin-1", "galerkin-4"] * 8
     grid = Grid(np.full(32, 1 / 32), tuple(by_name(name) for name in names))
     problem = problem_on(arm_scene, grid=grid)
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert_fits(problem, solution)
     assert_stationary(problem, solution, 1e-9)
     assert solution.cost == pytest.approx(REACH_COST, rel=1e-5)
@@ -236,7 +236,7 @@ def test_intervals_of_different_schemes_are_solved_together(arm_scene: Scene) ->
 @pytest.mark.parametrize("intervals", [1, 2, 3])
 def test_a_few_intervals_suffice(arm_scene: Scene, scheme: str, intervals: int) -> None:
     problem = problem_on(arm_scene, intervals=intervals, scheme=scheme)
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert solution.status is Status.MINIMUM
     assert_fits(problem, solution)
     if intervals > 1 or scheme == "galerkin-3":
@@ -249,7 +249,7 @@ def test_a_few_intervals_suffice(arm_scene: Scene, scheme: str, intervals: int) 
 
 def test_newton_from_the_cubic_leads_to_a_saddle(arm_scene: Scene, saddle: DiscretePath) -> None:
     problem = problem_on(arm_scene)
-    solution = solve(problem, saddle, escape_saddles=False)
+    solution = solve_on_grid(problem, saddle, escape_saddles=False)
     assert not solution.success
     assert solution.status is Status.SADDLE
     assert solution.cost == pytest.approx(44.8177, abs=1e-3)
@@ -263,7 +263,7 @@ def test_the_saddle_is_left_unless_escape_saddles_is_false(
     arm_scene: Scene, saddle: DiscretePath
 ) -> None:
     problem = problem_on(arm_scene)
-    solution = solve(problem, saddle)
+    solution = solve_on_grid(problem, saddle)
     assert solution.status is Status.MINIMUM
     assert solution.n_neg == 0
     assert solution.cost < 44.0
@@ -274,11 +274,11 @@ def test_the_saddle_is_left_unless_escape_saddles_is_false(
 def test_holding_the_arm_horizontal_is_a_saddle_that_is_left(arm_scene: Scene) -> None:
     level = State(REST)
     problem = problem_on(arm_scene, level, level, duration=10.0)
-    held = solve(problem, escape_saddles=False)
+    held = solve_on_grid(problem, escape_saddles=False)
     assert held.status is Status.SADDLE
     assert held.cost == pytest.approx(300.59, abs=0.01)
     assert held.n_neg == 25
-    left = solve(problem)
+    left = solve_on_grid(problem)
     assert left.status is Status.MINIMUM
     assert left.n_neg == 0
     assert left.cost < 100.0
@@ -290,7 +290,7 @@ def test_holding_the_arm_horizontal_is_a_saddle_that_is_left(arm_scene: Scene) -
 @pytest.mark.parametrize("duration", [1.0, 5.0, 10.0])
 def test_swing_ups_end_in_minima(arm_scene: Scene, duration: float) -> None:
     problem = problem_on(arm_scene, START, State(-HANG), duration=duration)
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert solution.status is Status.MINIMUM
     assert solution.n_neg == 0
     assert solution.cost < {1.0: 163.0, 5.0: 5.0, 10.0: 2.5}[duration]
@@ -311,7 +311,7 @@ def test_random_motions_are_minima_or_report_failure(two_link: Robot, pendulum: 
                 duration=float(10 ** random.uniform(-2, 1)),
                 intervals=16,
             )
-            solution = solve(problem)
+            solution = solve_on_grid(problem)
             assert_fits(problem, solution)
             assert solution.success == (solution.status is Status.MINIMUM)
             assert solution.status is Status.MINIMUM
@@ -324,7 +324,7 @@ def test_random_motions_are_minima_or_report_failure(two_link: Robot, pendulum: 
 
 @pytest.mark.parametrize("scheme", ["taylor-midpoint", "galerkin-0", "galerkin-2"])
 def test_staying_at_rest_is_a_success_in_one_step(arm_scene: Scene, scheme: str) -> None:
-    solution = solve(problem_on(arm_scene, START, START, duration=3.0, scheme=scheme))
+    solution = solve_on_grid(problem_on(arm_scene, START, START, duration=3.0, scheme=scheme))
     assert solution.status is Status.MINIMUM
     assert solution.nit <= 1
     assert solution.cost == pytest.approx(0.0, abs=1e-25)
@@ -333,7 +333,7 @@ def test_staying_at_rest_is_a_success_in_one_step(arm_scene: Scene, scheme: str)
 
 def test_without_gravity_a_turning_joint_needs_no_torque(pendulum: Robot) -> None:
     problem = problem_on(Scene(pendulum), State([0.0], [2.0]), State([6.0], [2.0]), duration=3.0)
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     assert solution.status is Status.MINIMUM
     assert solution.cost == pytest.approx(0.0, abs=1e-20)
     np.testing.assert_allclose(solution.trajectory.q[:, 0], 2 * solution.trajectory.t, atol=1e-13)
@@ -344,7 +344,7 @@ def test_one_joint_without_gravity_moves_by_the_cubic(pendulum: Robot) -> None:
     problem = problem_on(
         Scene(pendulum), State([0.0], [1.0]), State([2.0]), duration=2.0, intervals=5
     )
-    solution = solve(problem)
+    solution = solve_on_grid(problem)
     J = 1.0 + 1.6e-4  # m l^2 and the bob's own 2/5 m r^2
     T, d, v0 = 2.0, 2.0, 1.0
     spline = 6 * d**2 / T**3 - 6 * d * v0 / T**2 + 2 * v0**2 / T
@@ -357,9 +357,9 @@ def test_one_joint_without_gravity_moves_by_the_cubic(pendulum: Robot) -> None:
 
 def test_the_iteration_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     problem = problem_on(arm_scene)
-    costs = [solve(problem, max_iterations=k).cost for k in (1, 2, 4)]
+    costs = [solve_on_grid(problem, max_iterations=k).cost for k in (1, 2, 4)]
     assert costs == sorted(costs, reverse=True)
-    stopped = solve(problem, max_iterations=2)
+    stopped = solve_on_grid(problem, max_iterations=2)
     assert (stopped.success, stopped.status) == (False, Status.ITERATION_LIMIT)
     assert stopped.nit == len(stopped.history) == 2
     assert "iteration limit was reached after 2 steps" in stopped.message
@@ -373,7 +373,7 @@ def test_another_newton_step_changes_nothing(arm_scene: Scene) -> None:
     wound = State(goal, turns={"j2s6s200_joint_6": 1})
     ends, scene = (State(robot.neutral()), wound), Scene(robot, [Gravity()])
     for problem in (problem_on(arm_scene), problem_on(scene, *ends, duration=2.0, intervals=8)):
-        solution = solve(problem)
+        solution = solve_on_grid(problem)
         assert solution.success, solution.message
         objective, path = ActionObjective(problem), solution.trajectory.path
         model = objective.model(path, None, None)
@@ -382,12 +382,12 @@ def test_another_newton_step_changes_nothing(arm_scene: Scene) -> None:
         rest = factor.solve(-model.gradient)
         assert objective.relative_size(path, rest, model) <= 1e-11
         assert solution.nit == len(solution.history)
-        assert solve(problem, max_iterations=solution.nit - 1).nit == solution.nit - 1
+        assert solve_on_grid(problem, max_iterations=solution.nit - 1).nit == solution.nit - 1
 
 
 def test_the_time_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     problem = problem_on(arm_scene)
-    stopped = solve(problem, time_limit=0.0)
+    stopped = solve_on_grid(problem, time_limit=0.0)
     assert (stopped.success, stopped.status) == (False, Status.TIME_LIMIT)
     assert stopped.cost == pytest.approx(problem.ld.action(guess_path(problem, "cubic")))
     assert "time limit was reached" in stopped.message
@@ -400,7 +400,7 @@ def test_an_interrupt_gives_the_best_so_far(arm_scene: Scene) -> None:
             raise KeyboardInterrupt
 
     problem = problem_on(arm_scene)
-    stopped = solve(problem, report=report)
+    stopped = solve_on_grid(problem, report=report)
     assert (stopped.success, stopped.status) == (False, Status.INTERRUPTED)
     assert stopped.cost < problem.ld.action(guess_path(problem, "cubic"))
     assert_fits(problem, stopped)
@@ -412,7 +412,7 @@ def test_a_guess_of_infinite_cost_is_diverged_with_joint_and_time(arm_scene: Sce
     inner = path.inner.copy()
     inner[3] = 1e200
     with np.errstate(over="ignore", invalid="ignore"):
-        solution = solve(problem, dataclasses.replace(path, inner=inner))
+        solution = solve_on_grid(problem, dataclasses.replace(path, inner=inner))
     assert (solution.success, solution.status) == (False, Status.DIVERGED)
     assert "try another initial guess" in solution.message
     assert "the torque of joint 'shoulder' is nan at t = 0.09" in solution.message
@@ -431,28 +431,30 @@ def test_a_guess_of_infinite_cost_is_diverged_with_joint_and_time(arm_scene: Sce
 
 @pytest.mark.parametrize("guess", ["cubic", "minimum-jerk"])
 def test_named_guesses_lead_to_minima(arm_scene: Scene, guess: str) -> None:
-    solution = solve(problem_on(arm_scene), guess)
+    solution = solve_on_grid(problem_on(arm_scene), guess)
     assert solution.status is Status.MINIMUM
     assert solution.cost == pytest.approx(REACH_COST, rel=1e-9)
 
 
 def test_a_motion_on_another_grid_is_a_guess(arm_scene: Scene, reach: Solution) -> None:
-    solution = solve(problem_on(arm_scene, intervals=48, scheme="galerkin-3"), reach.trajectory)
+    solution = solve_on_grid(
+        problem_on(arm_scene, intervals=48, scheme="galerkin-3"), reach.trajectory
+    )
     assert solution.nit <= 3
     assert solution.cost == pytest.approx(REACH_COST, rel=1e-9)
-    slower = solve(problem_on(arm_scene, duration=1.05), reach.trajectory)
+    slower = solve_on_grid(problem_on(arm_scene, duration=1.05), reach.trajectory)
     assert slower.status is Status.MINIMUM
     assert slower.cost < REACH_COST
 
 
 def test_a_path_is_a_guess_on_its_own_grid_only(arm_scene: Scene, reach: Solution) -> None:
-    again = solve(problem_on(arm_scene), reach.trajectory.path)
+    again = solve_on_grid(problem_on(arm_scene), reach.trajectory.path)
     assert again.nit <= 1
     assert again.cost == pytest.approx(reach.cost, rel=1e-13)
     with pytest.raises(
         InputError, match=r"shape \(17, 2\), got \(33, 2\).*Trajectory to change grids"
     ):
-        solve(problem_on(arm_scene, intervals=16), reach.trajectory.path)
+        solve_on_grid(problem_on(arm_scene, intervals=16), reach.trajectory.path)
 
 
 @pytest.mark.parametrize("scheme", ["galerkin-1", "galerkin-3"])
@@ -460,7 +462,7 @@ def test_a_path_with_other_inner_modes_is_refused(
     arm_scene: Scene, reach: Solution, scheme: str
 ) -> None:
     with pytest.raises(InputError, match="guess's inner must be"):
-        solve(problem_on(arm_scene, scheme=scheme), reach.trajectory.path)
+        solve_on_grid(problem_on(arm_scene, scheme=scheme), reach.trajectory.path)
 
 
 @pytest.mark.parametrize("name", ["q", "v", "z", "inner"])
@@ -468,13 +470,15 @@ def test_a_path_that_is_not_finite_is_refused(arm_scene: Scene, reach: Solution,
     broken = getattr(reach.trajectory.path, name).copy()
     broken[2] = np.nan
     with pytest.raises(InputError, match=f"guess's {name} must be finite"):
-        solve(problem_on(arm_scene), dataclasses.replace(reach.trajectory.path, **{name: broken}))
+        solve_on_grid(
+            problem_on(arm_scene), dataclasses.replace(reach.trajectory.path, **{name: broken})
+        )
 
 
 def test_a_path_between_other_ends_is_moved_to_them(arm_scene: Scene, reach: Solution) -> None:
     goal = State(REACH_Q + 0.1, REACH_V)
     problem = problem_on(arm_scene, START, goal)
-    solution = solve(problem, reach.trajectory.path)
+    solution = solve_on_grid(problem, reach.trajectory.path)
     assert solution.status is Status.MINIMUM
     assert_fits(problem, solution)
 
@@ -482,25 +486,25 @@ def test_a_path_between_other_ends_is_moved_to_them(arm_scene: Scene, reach: Sol
 def test_an_inconsistent_path_is_refused(arm_scene: Scene, reach: Solution) -> None:
     path = reach.trajectory.path
     with pytest.raises(InputError, match="guess's z does not match its q and v"):
-        solve(problem_on(arm_scene), dataclasses.replace(path, z=path.z + 1.0))
+        solve_on_grid(problem_on(arm_scene), dataclasses.replace(path, z=path.z + 1.0))
 
 
 def test_a_motion_of_another_robot_is_no_guess(pendulum: Robot, reach: Solution) -> None:
     problem = problem_on(Scene(pendulum), State([0.0]), State([1.0]))
     with pytest.raises(InputError, match="has 2 velocities, but robot 'pendulum' has 1"):
-        solve(problem, reach.trajectory)
+        solve_on_grid(problem, reach.trajectory)
 
 
 def test_an_unknown_guess_is_refused(arm_scene: Scene) -> None:
     with pytest.raises(InputError, match="no guess 'cubik': did you mean 'cubic'"):
-        solve(problem_on(arm_scene), "cubik")
+        solve_on_grid(problem_on(arm_scene), "cubik")
 
 
 # The solution
 
 
 def test_the_same_input_gives_the_same_bytes(arm_scene: Scene) -> None:
-    runs = [solve(problem_on(Scene(arm_scene.robot, [Gravity(9.8)]))) for _ in range(2)]
+    runs = [solve_on_grid(problem_on(Scene(arm_scene.robot, [Gravity(9.8)]))) for _ in range(2)]
     assert runs[0].cost == runs[1].cost
     assert runs[0].history == runs[1].history
     for name in ("q", "v", "z", "inner"):
@@ -527,14 +531,16 @@ def test_the_trajectory_holds_its_momenta_scene_and_metadata(
 
 def test_every_step_is_reported(arm_scene: Scene) -> None:
     reports: list[tuple[int, float]] = []
-    solution = solve(problem_on(arm_scene), report=lambda k, cost: reports.append((k, cost)))
+    solution = solve_on_grid(
+        problem_on(arm_scene), report=lambda k, cost: reports.append((k, cost))
+    )
     assert [k for k, _ in reports] == list(range(1, solution.nit + 1))
     assert (np.diff([cost for _, cost in reports]) <= 1e-12).all()
 
 
 def test_a_heavier_weight_costs_in_proportion(arm_scene: Scene, reach: Solution) -> None:
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian([4.0, 4.0]), reach.trajectory.grid)
-    solution = solve(TrajectoryProblem(ld, START, GOAL))
+    solution = solve_on_grid(TrajectoryProblem(ld, START, GOAL))
     assert solution.cost == pytest.approx(4 * reach.cost, rel=1e-12)
     np.testing.assert_allclose(solution.trajectory.q, reach.trajectory.q, atol=1e-9)
 
@@ -548,7 +554,7 @@ def test_replanning_finds_the_minimum_between_other_states(
     goal = State(REACH_Q + 0.02, REACH_V - 0.01)
     again = reach.replan(goal=goal)
     problem = problem_on(arm_scene, START, goal)
-    fresh = solve(problem)
+    fresh = solve_on_grid(problem)
     assert again.status is Status.MINIMUM
     assert_fits(problem, again)
     assert again.cost == pytest.approx(fresh.cost, rel=1e-12)
@@ -583,7 +589,7 @@ def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, reach: S
         problem = problem_on(arm_scene, START, State(REACH_Q + size, REACH_V - size))
         ahead = follow(reach.trajectory.path, problem)
         check_path(ahead, problem.grid, problem.robot)
-        truth = solve(problem, ahead).trajectory
+        truth = solve_on_grid(problem, ahead).trajectory
         errors.append(np.abs(ahead.q - truth.q).max())
     order = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
     assert order == pytest.approx(2.0, abs=0.3)
@@ -591,7 +597,7 @@ def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, reach: S
 
 def test_corrections_improve_on_first_order(arm_scene: Scene, reach: Solution) -> None:
     problem = problem_on(arm_scene, START, State(REACH_Q + 0.05, REACH_V))
-    truth = solve(problem, follow(reach.trajectory.path, problem)).trajectory
+    truth = solve_on_grid(problem, follow(reach.trajectory.path, problem)).trajectory
     errors = []
     for corrections in (0, 1, 6):
         ahead = follow(reach.trajectory.path, problem, corrections)
@@ -605,7 +611,7 @@ def test_an_arm_replans_to_a_goal_nearby_in_at_most_four_steps() -> None:
     task = load_task(example("ur5_reach"))
     grid = Grid.uniform(task.duration, 16, by_name("galerkin-2"))
     ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
-    motion = solve(TrajectoryProblem(ld, task.start, task.goal))
+    motion = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
     home = goal = np.asarray(task.goal.q, dtype=float)
     random = np.random.default_rng(1)
     for _ in range(20):

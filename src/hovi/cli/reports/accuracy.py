@@ -15,11 +15,11 @@ from hovi.planning.task_file.task import Task
 
 def scheme_text(task: Task, grid: Grid) -> str:
     """The scheme of the task, or those chosen for its tolerance."""
-    if task.options.tolerance is None:
+    if task.options.names_grid:
         return task.options.scheme_name
-    names = [scheme.name for scheme, _ in grid.groups]
-    modes = sorted(scheme.inner_modes for scheme, _ in grid.groups)
-    return names[0] if len(names) == 1 else f"galerkin-{modes[0]} to galerkin-{modes[-1]}"
+    by_modes = sorted((scheme.inner_modes, scheme.name) for scheme, _ in grid.groups)
+    names = [name for _, name in by_modes]
+    return names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
 
 
 def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
@@ -39,7 +39,7 @@ def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:
         for grid_round in accuracy.rounds
     ]
     return {
-        "tolerance": as_number_or_text(task.options.tolerance),
+        "tolerance": as_number_or_text(task.options.effective_tolerance),
         "tolerance_reached": accuracy.reached,
         "tolerance_reason": accuracy.reason or None,
         "errors": None if accuracy.estimate is None else errors_json(accuracy.estimate),

@@ -15,8 +15,6 @@ NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"
 
 COARSE_GAP = 0.01
 """Relative difference of action and integral beyond which a grid is reported as coarse."""
-INVALID_COST_GAP = 0.5
-"""Relative difference beyond which the cost is not that of the motion."""
 GAP_FLOOR = 1e-20
 """Absolute difference that counts as rounding, such as for a robot at rest."""
 
@@ -53,7 +51,7 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     ]
     if certificate.bound is not None:
         lines.append(("bound", f"this minimum costs at most {certificate.bound:.10g}"))
-    if COARSE_GAP < _gap(certificate) <= INVALID_COST_GAP:
+    if _gap(certificate) > COARSE_GAP:
         lines.append(
             (
                 "! coarse",
@@ -69,16 +67,6 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     )
     lines.append(("replay", _text_or_reason(certificate.replay, _replay, missing, "replay")))
     return lines
-
-
-def coarse_grid(certificate: Certificate | None) -> str:
-    """A warning if the grid is too coarse for the cost to be meaningful; "" otherwise."""
-    if certificate is None or _gap(certificate) <= INVALID_COST_GAP:
-        return ""
-    return (
-        f"the grid is too coarse for this motion: discrete action {certificate.action:.2g}, "
-        f"integral {certificate.integral:.3g}; use more intervals or a tolerance"
-    )
 
 
 def _gap(certificate: Certificate) -> float:

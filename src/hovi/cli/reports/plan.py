@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
-from hovi.cli.reports.certificate import certificate_json, certificate_lines, coarse_grid
+from hovi.cli.reports.certificate import certificate_json, certificate_lines
 from hovi.cli.reports.limit_margins import LimitMargins, least_distance, limit_margins
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.terminal_table import print_table, terminal_table
@@ -57,7 +57,7 @@ def print_report(
     solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
 ) -> None:
     """Print a summary, the peaks of the motion, the certificate and the output file."""
-    for label, text in _summary(solution, task, coarse_grid(certificate)):
+    for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
     extremes, margins = peaks(solution.trajectory), limit_margins(solution)
     if margins is not None:
@@ -85,14 +85,13 @@ def _estimate(solution: Solution, certificate: Certificate | None) -> float | No
     return None if certificate.errors is None else certificate.errors.cost
 
 
-def _summary(solution: Solution, task: Task, coarse: str) -> list[tuple[str, str]]:
-    """Labels and their text. coarse: why the cost is meaningless, or ""."""
+def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
+    """Labels and their text."""
     grid = solution.trajectory.grid
     rows = [
         ("status", str(solution.status)),
         ("message", solution.message),
         ("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"),
-        *([("!", coarse)] if coarse else []),
         ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
@@ -113,9 +112,10 @@ def _infeasible_note(solution: Solution) -> str:
 
 def _intervals(solution: Solution, task: Task) -> str:
     taken = solution.trajectory.grid.intervals
-    if task.options.tolerance is not None:
+    if not task.options.names_grid:
         return f"{taken} intervals{steps_text(solution.trajectory.grid)}"
-    asked = "" if taken == task.options.intervals else f" ({task.options.intervals} asked for)"
+    wanted = task.options.interval_count
+    asked = "" if taken == wanted else f" ({wanted} asked for)"
     return f"{taken} intervals{asked}"
 
 

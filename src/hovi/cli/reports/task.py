@@ -19,9 +19,9 @@ def describe_task(task: Task) -> str:
     from hovi.planning.problem.tolerance import as_number_or_text
 
     robot, options = task.scene.robot, task.options
-    how = f"{options.scheme_name} on {options.intervals} intervals"
-    if options.tolerance is not None:
-        how = f"tolerance {as_number_or_text(options.tolerance)}"
+    how = f"{options.scheme_name} on {options.interval_count} intervals"
+    if not options.names_grid:
+        how = f"tolerance {as_number_or_text(options.effective_tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
     if options.clearance.wanted:

@@ -17,6 +17,8 @@ SAMPLES = 33
 """Samples per interval in the first pass, both ends included."""
 REFINEMENT_SHARE = 0.05
 """Extremes closer than this to a bound, as a share of its range, are refined."""
+PEAK_SHARE = 2e-3
+"""Distance of a local extreme from a bound, as a share of its range, within which it is refined."""
 AT_LIMIT = 1e-3
 """Distance to a bound, as a share of its range, within which an output is at the bound."""
 
@@ -48,7 +50,8 @@ class Excess:
 def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     """The extremes of q, v, a and tau along the interpolant, compared with the limits.
 
-    Every interval is sampled, and again more densely around the extremes that are near a bound.
+    Every interval is sampled, and again more densely around all extremes that are near a bound:
+    a motion along a bound has several, and the highest sample need not be next to the highest one.
     """
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     s = np.linspace(0.0, 1.0, SAMPLES)
@@ -59,7 +62,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
         outside = sign * (outputs - bound) / limits.ranges
         index = np.argmax(outside, axis=1)  # (N, 4, nv)
         largest = np.take_along_axis(outside, index[:, None], axis=1)[:, 0]
-        sides.append(_refined(trajectory, limits, sign, bound, largest, s[index]))
+        sides.append(_refined(trajectory, limits, sign, bound, outside, largest, s[index]))
     (lower, at_lower), (upper, at_upper) = sides
     return Excess(lower, upper, at_lower, at_upper)
 
@@ -72,29 +75,46 @@ def _outputs(trajectory: Trajectory, k: npt.NDArray[np.intp], s: Array) -> Array
 
 
 def _refined(
-    trajectory: Trajectory, limits: Limits, sign: float, bound: Array, largest: Array, s: Array
+    trajectory: Trajectory,
+    limits: Limits,
+    sign: float,
+    bound: Array,
+    outside: Array,
+    largest: Array,
+    s: Array,
 ) -> tuple[Array, Array]:
-    """Excesses and their positions, sampled more densely around those that are near a bound."""
+    """Excesses and their positions, sampled more densely around extremes near a bound.
+
+    outside: of the samples, (N, SAMPLES, 4, nv). largest, s: of the highest ones, (N, 4, nv).
+    """
+    k, sample, kind, joint = np.nonzero(_near_extremes(outside, largest))
+    if len(k) == 0:
+        return largest, s
     largest, s = largest.copy(), s.copy()
-    near = np.isfinite(largest) & (largest > -REFINEMENT_SHARE)
-    spots = np.argwhere(near)
-    width = 1.0 / (SAMPLES - 1)
+    at, width, rows = sample / (SAMPLES - 1), 1.0 / (SAMPLES - 1), np.arange(len(k))
     for _ in range(2):
-        if len(spots) == 0:
-            break
-        around = s[near][:, None] + width * np.linspace(-1, 1, SAMPLES)
-        around = np.clip(around, 0.0, 1.0)
-        k, kind, joint = spots.T
-        outputs = _outputs(trajectory, np.repeat(k, SAMPLES), around.ravel())
-        values = outputs.reshape(len(spots), SAMPLES, 4, -1)[np.arange(len(spots)), :, kind, joint]
-        outside = sign * (values - bound[kind, joint][:, None])
-        outside /= limits.ranges[kind, joint][:, None]
-        best = np.argmax(outside, axis=1)
-        rows = np.arange(len(spots))
-        largest[near] = outside[rows, best]
-        s[near] = around[rows, best]
-        width /= SAMPLES - 1
+        around = np.clip(at[:, None] + width * np.linspace(-1, 1, SAMPLES), 0.0, 1.0)
+        values = _outputs(trajectory, np.repeat(k, SAMPLES), around.ravel())
+        values = values.reshape(len(k), SAMPLES, 4, -1)[rows, :, kind, joint]
+        beyond = sign * (values - bound[kind, joint][:, None])
+        beyond /= limits.ranges[kind, joint][:, None]
+        best = np.argmax(beyond, axis=1)
+        at, width = around[rows, best], width / (SAMPLES - 1)
+    found = beyond[rows, best]
+    for row in np.argsort(found):  # the highest of each interval and output comes last
+        place = k[row], kind[row], joint[row]
+        if found[row] >= largest[place]:
+            largest[place], s[place] = found[row], at[row]
     return largest, s
+
+
+def _near_extremes(outside: Array, largest: Array) -> npt.NDArray[np.bool_]:
+    """Samples that are local extremes, and the highest of their output or next to its bound."""
+    padded = np.pad(outside, ((0, 0), (1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
+    with np.errstate(invalid="ignore"):
+        peak = (outside >= padded[:, :-2]) & (outside >= padded[:, 2:])
+    highest = (outside == largest[:, None]) & (outside > -REFINEMENT_SHARE)
+    return np.asarray(peak & np.isfinite(outside) & (highest | (outside > -PEAK_SHARE)))
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:

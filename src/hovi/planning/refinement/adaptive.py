@@ -19,8 +19,9 @@ from hovi.planning.refinement.error_estimate import FinerSolution, estimate_agai
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import interpolated_to, next_grid
+from hovi.planning.refinement.whirling import HOPELESS_RATIO, whirl
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline
@@ -45,18 +46,18 @@ MAX_POINTS = 400_000
 
 
 def first_grid(duration: float, intervals: int, smooth: bool = True) -> Grid:
-    """The first grid: galerkin-2 on the intervals, or galerkin-4 on two thirds of them.
+    """The first grid: galerkin-2x8 on the intervals, or galerkin-4x10 on two thirds of them.
 
-    Both have as many quadrature points. With more modes the errors of smooth motions are smaller,
-    and the decay of the modes can be estimated.
+    With more points than modes the torque cannot hide between the points. With more modes the
+    errors of smooth motions are smaller, and the decay of the modes can be estimated.
     duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
         motion has no kinks, which limits and via points cause.
     Raises InputError as Grid.uniform does.
     """
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
-        return Grid.uniform(duration, number, galerkin(2))
-    return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4))
+        return Grid.uniform(duration, number, galerkin(2, points=8))
+    return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4, points=10))
 
 
 @interruptible
@@ -76,7 +77,7 @@ def solve_to_tolerance(
     The solution's `accuracy` reports the estimated error, and why the tolerance was not reached.
     """
     deadline = Deadline(time_limit)
-    first = solve(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
+    first = solve_on_grid(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
     return refine_to_tolerance(
         first,
         tolerance,
@@ -131,6 +132,8 @@ class _Search:
             previous, candidate = candidate, self._next(candidate)
             if self.best is previous and candidate.contradicts(previous):
                 self.best = previous.corrected(candidate)
+            else:
+                self.best = self.best.compared_with(candidate)
             smaller = candidate.error < 0.5 * self.best.error
             stalled = 0 if smaller or np.isnan(self.best.error) else stalled + 1
             if candidate.better_than(self.best):
@@ -161,12 +164,14 @@ class _Search:
             return f"the last solve ended in {solution.status}"
         if self.deadline.passed:
             return "the time limit was reached"
-        cost = self.tolerance.quantity is Quantity.COST
         assert solution.problem is not None
-        if cost and candidate.error <= least_error(solution.problem):
-            limited = solution.problem.limited
-            bound = "the tolerance of limits" if limited else "rounding"
+        if self._at_floor(candidate):
+            bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
+        if not (candidate.is_nearly_resolved or solution.problem.limited):
+            whirling = whirl(solution)
+            if whirling is not None and whirling.ratio > HOPELESS_RATIO:
+                return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
         if len(self.rounds) >= MAX_ROUNDS:
@@ -174,6 +179,11 @@ class _Search:
         if self.rounds[-1].points > MAX_POINTS:
             return f"a grid has {self.rounds[-1].points:,} points"
         return ""
+
+    def _at_floor(self, candidate: Candidate) -> bool:
+        """Whether most of the cost's error is one that no grid reduces."""
+        cost = self.tolerance.quantity is Quantity.COST
+        return cost and bool(candidate.error <= 2 * least_error(candidate.solution))
 
     def _next(self, candidate: Candidate) -> Candidate:
         """The solution on the next grid, which may be that of the finer solution."""
@@ -194,7 +204,7 @@ class _Search:
         """Solve with the remaining time."""
         steps = self.max_iterations
         left = self.deadline.seconds_left
-        return solve(problem, guess, max_iterations=steps, time_limit=left)
+        return solve_on_grid(problem, guess, max_iterations=steps, time_limit=left)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
         """The chosen solution with its accuracy."""

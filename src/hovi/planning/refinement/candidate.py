@@ -9,19 +9,23 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.motion_error import relative_difference
 from hovi.errors import InputError
-from hovi.planning.problem.limits import TOLERANCE
-from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against, finer_than
+from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.solver.solver import Solution
+from hovi.schemes import is_galerkin
 
 Array = npt.NDArray[np.float64]
 
 ACCEPTED_SHARE = 0.8
 """Largest accepted estimate, as a share of the tolerance."""
+CURVE_TOLERANCE = 1e-3
+"""Relative error of the integral along the curve that no tolerance of another kind, and no smaller
+one of the cost, asks to improve."""
 CANCELLATION_LIMIT = 20.0
 """Largest accepted sum of the intervals' |contributions| to the cost's error, in tolerances."""
 HAMILTONIAN_ERROR_SHARE = 0.1
@@ -30,9 +34,6 @@ ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
 LIMITED_SAFETY_FACTOR = 1.5
 """Factor on estimates under limits, where the finer solution is not better by orders."""
-LIMIT_COST_FLOOR = 10.0
-"""Smallest estimate of the relative error of the cost under limits, in their tolerance: bounds
-are tightened by several tolerances and may be exceeded by one."""
 CONTRADICTION_RATIO = 10.0
 """Ratio of the difference of costs on two grids to their estimated errors above which the solver
 is taken to have reached another minimum."""
@@ -42,12 +43,14 @@ is taken to have reached another minimum."""
 class Candidate:
     """A solution with its estimated error.
 
-    finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit;
-        NaN if unknown.
+    finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit, of
+        the cost and of the integral along the curve; NaN if unknown.
+    along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
         estimates, else 0.
+    later: relative difference from the most accurate cost of a later grid.
     """
 
     solution: Solution
@@ -55,7 +58,9 @@ class Candidate:
     finer: FinerSolution | None = None
     error: float = np.nan
     uncancelled: float = np.nan
+    along: float = np.nan
     contradicted: float = 0.0
+    later: float = 0.0
 
     @classmethod
     def of(cls, solution: Solution, tolerance: Tolerance) -> Self:
@@ -63,23 +68,44 @@ class Candidate:
         finer = finer_than(solution) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
+        along = error_along(solution, finer)
         if tolerance.quantity is Quantity.COST:
-            return cls(solution, tolerance, finer, *_errors_of_cost(solution, finer, tolerance))
+            errors = _errors_of_cost(solution, finer, tolerance, along)
+            return cls(solution, tolerance, finer, *errors, along)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
         error *= LIMITED_SAFETY_FACTOR if finer.problem.limited else 1.0
-        return cls(solution, tolerance, finer, error, error)
+        return cls(solution, tolerance, finer, error, error, along)
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether the estimated error is within the tolerance."""
-        return self.finer is not None and _accepted(self.error, self.uncancelled, self.tolerance)
+        """Whether the estimated error is within the tolerance, and the curve carries the motion."""
+        accepted = _accepted(self.error, self.uncancelled, self.tolerance)
+        return self.finer is not None and accepted and self.along <= self._largest_along
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether the cost and the integral along the curve are near that of the finer solution."""
+        known = self.error_of_cost
+        return known is not None and max(known, self.along) <= CURVE_TOLERANCE
+
+    @property
+    def is_nearly_resolved(self) -> bool:
+        """As is_resolved, ten times as far."""
+        known = self.error_of_cost
+        return known is not None and max(known, self.along) <= 10 * CURVE_TOLERANCE
+
+    @property
+    def _largest_along(self) -> float:
+        cost = self.tolerance.quantity is Quantity.COST
+        return max(self.tolerance.size, CURVE_TOLERANCE) if cost else CURVE_TOLERANCE
 
     @property
     def error_of_cost(self) -> float | None:
         """The relative error of the cost; None if unknown."""
         if self.finer is None:
             return None
-        return max(error_of_cost(self.solution, self.finer), self.contradicted)
+        own = error_of_cost(self.solution, self.finer)
+        return max(own, self.contradicted, self.later)
 
     def contradicts(self, earlier: Candidate) -> bool:
         """Whether the cost differs from that of an earlier grid by far more than both errors."""
@@ -99,6 +125,17 @@ class Candidate:
         error = difference if self.tolerance.quantity is Quantity.COST else np.nan
         return dataclasses.replace(self, error=error, contradicted=difference)
 
+    def compared_with(self, later_one: Candidate) -> Candidate:
+        """This candidate with an error that a later grid's most accurate cost does not refute."""
+        if not later_one.solution.success:
+            return self
+        finer = later_one.finer
+        cost = later_one.solution.cost if finer is None else finer.cost
+        later = relative_difference(self.solution.cost, cost)
+        in_cost = self.tolerance.quantity is Quantity.COST
+        error = max(self.error, later) if in_cost else self.error
+        return dataclasses.replace(self, error=error, later=max(self.later, later))
+
     def better_than(self, other: Candidate) -> bool:
         """Whether this one is preferred: minima first, then the smaller error."""
         if self.solution.success != other.solution.success:
@@ -107,10 +144,12 @@ class Candidate:
 
 
 def _errors_of_cost(
-    solution: Solution, finer: FinerSolution, tolerance: Tolerance
+    solution: Solution, finer: FinerSolution, tolerance: Tolerance, along: float
 ) -> tuple[float, float]:
     """The fields `error` and `uncancelled`."""
     error = error_of_cost(solution, finer)
+    if max(along, tolerance.size) >= CURVE_TOLERANCE:
+        error = max(error, along)
     uncancelled = max(error, float(contributions(finer).sum()))
     if _accepted(error, uncancelled, tolerance):  # else a finer grid is needed anyway
         uncancelled = max(uncancelled, _hamiltonian_error(solution))
@@ -125,21 +164,35 @@ def _accepted(error: float, uncancelled: float, tolerance: Tolerance) -> bool:
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
-    """Relative error of the cost, not below `least_error`; 0 for zero cost with zero error."""
+    """Relative error of the cost, with what the tolerance of limits adds to it.
+
+    Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
+    """
     error = relative_difference(finer.known, finer.cost)
     if finer.known == 0:
         return error
     problem = solution.problem
     assert problem is not None
     error *= LIMITED_SAFETY_FACTOR if problem.limited else 1.0
-    return max(error, least_error(problem))
+    return max(error + cost_of_tolerance(solution), ROUNDING_FLOOR)
 
 
-def least_error(problem: TrajectoryProblem) -> float:
+def error_along(solution: Solution, finer: FinerSolution) -> float:
+    """Relative difference of the integral of L~ along the curve and the finer solution's cost.
+
+    0 for schemes other than Galerkin tables, whose interpolant is not their own.
+    """
+    problem = solution.problem
+    assert problem is not None
+    if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
+        return 0.0
+    integral = integral_along(problem.ld.lagrangian, solution.trajectory)
+    return relative_difference(integral.value, finer.cost)
+
+
+def least_error(solution: Solution) -> float:
     """The smallest relative error of the cost that can be estimated."""
-    if not problem.limited:
-        return ROUNDING_FLOOR
-    return LIMIT_COST_FLOOR * (TOLERANCE if problem.limits is None else problem.limits.tolerance)
+    return max(ROUNDING_FLOOR, cost_of_tolerance(solution))
 
 
 def contributions(finer: FinerSolution) -> Array:

@@ -26,7 +26,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
     found = nearby_minimum(objective, start, model, known)
     if found is not None:
         return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
-    solution = solve(fine, start)
+    solution = solve_on_grid(fine, start)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
@@ -123,7 +123,7 @@ def _solved(
 
     Its gains are half the integral of the squared difference of the torques.
     """
-    solution = solve(fine, start)
+    solution = solve_on_grid(fine, start)
     if not solution.success or solution.problem is None:
         return None
     coarse, finer = problem.trajectory(path), solution.trajectory

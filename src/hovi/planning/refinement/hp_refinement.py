@@ -32,6 +32,10 @@ which the Hessians of all intervals are stored and factored."""
 SCHEME_COST = 900.0
 """Fixed cost of a second scheme, whose intervals are evaluated separately, in points for one joint.
 The cost of a point grows like the square of the number of joints; this one is constant."""
+UNRESOLVED_MODES = 6
+"""Largest number of inner modes while the motion is not resolved: its decay is not yet known."""
+MORE_POINTS = 4
+"""Quadrature points of an interval beyond r + 2 while the motion is not resolved."""
 INFEASIBLE_PIECES = 1000
 """Number of pieces that marks a number of modes with which the demands cannot be met."""
 SPLIT_COST = 900.0
@@ -79,21 +83,27 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
     return np.clip(rho, *DECAY_RANGE)
 
 
-def refined(grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6) -> Grid:
+def refined(
+    grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6, resolved: bool = True
+) -> Grid:
     """The cheapest grid that is predicted to meet every demand, with one scheme or two.
 
-    rho: decay of each interval. joints: degrees of freedom of the robot.
+    rho: decay of each interval. joints: degrees of freedom of the robot. resolved: whether r + 2
+        quadrature points and any number of modes are enough.
     An interval whose demands no choice meets is split into four.
     """
     current = np.array([scheme.inner_modes for scheme in grid.schemes])
-    more = np.maximum(MODES, current[:, None])  # (N, D)
+    known = MODES if resolved else MODES[MODES <= UNRESOLVED_MODES]
+    more = np.maximum(known, current[:, None])  # (N, D)
     pieces = _pieces(current, more, rho, demands)
     low, high = _cheapest(more, pieces, 1.0 / joints**2)
     kept, N = np.array([low, high]), np.arange(grid.intervals)
     choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
     cut, modes = pieces[N, choice], more[N, choice]
     steps = np.repeat(grid.steps / cut, cut)
-    return Grid(steps, tuple(galerkin(int(r)) for r in np.repeat(modes, cut)))
+    beyond = 0 if resolved else MORE_POINTS
+    tables = {int(r): galerkin(int(r), points=int(r) + 2 + beyond) for r in set(modes)}
+    return Grid(steps, tuple(tables[int(r)] for r in np.repeat(modes, cut)))
 
 
 def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:
@@ -119,7 +129,7 @@ def _cheapest(more: Index, pieces: Index, share: float) -> tuple[int, int]:
 
     share: fixed costs for this number of joints, relative to those for one joint.
     """
-    low, high = np.triu_indices(len(MODES))
+    low, high = np.triu_indices(more.shape[1])
     points = pieces * (more + 2)
     count = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
     work = np.minimum(points[:, low], points[:, high]).sum(axis=0)

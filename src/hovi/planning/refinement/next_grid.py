@@ -11,7 +11,7 @@ from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
-from hovi.planning.refinement.hp_refinement import Demand, decay, refined
+from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
 
 Array = npt.NDArray[np.float64]
 
@@ -31,12 +31,20 @@ def next_grid(candidate: Candidate) -> Grid:
     demands, rho = _demands(candidate, finer), _decay(candidate, finer)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
-    if same_steps and all(
-        demand.remaining(rho**MORE_MODES) <= FINER_GRID_RATIO for demand in demands
+    few = candidate.is_resolved or finer.problem.grid.inner_modes <= UNRESOLVED_MODES
+    if (
+        few
+        and same_steps
+        and all(demand.remaining(rho**MORE_MODES) <= FINER_GRID_RATIO for demand in demands)
     ):
         return finer.problem.grid
-    grid = refined(problem.grid, rho, demands, problem.robot.nv)
-    return grid.enriched(MORE_MODES) if _same_grid(grid, problem.grid) else grid
+    resolved = candidate.is_resolved
+    grid = refined(problem.grid, rho, demands, problem.robot.nv, resolved)
+    if not _same_grid(grid, problem.grid):
+        return grid
+    if resolved or grid.inner_modes < UNRESOLVED_MODES:
+        return grid.enriched(MORE_MODES)
+    return grid.halved(np.ones(grid.intervals, dtype=bool))
 
 
 def interpolated_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:
@@ -90,7 +98,8 @@ def _decay(candidate: Candidate, finer: FinerSolution) -> Array:
 
 
 def _same_grid(one: Grid, other: Grid) -> bool:
+    """Whether two grids have the same intervals with the same modes, so the same error."""
     same_steps = np.array_equal(one.steps, other.steps)
     return same_steps and all(
-        a.name == b.name for a, b in zip(one.schemes, other.schemes, strict=True)
+        a.inner_modes == b.inner_modes for a, b in zip(one.schemes, other.schemes, strict=True)
     )

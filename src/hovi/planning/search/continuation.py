@@ -17,7 +17,7 @@ from hovi.planning.search.homotopies import (
     other_durations,
 )
 from hovi.planning.search.job import Job, Progress
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
@@ -166,7 +166,7 @@ class _Continuation:
         left = self.deadline.seconds_left
         try:
             problem, most = stage.job.problem(), self.job.options.max_iterations
-            solution = solve(problem, guess, max_iterations=most, time_limit=left)
+            solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=left)
         except HoviError:
             return None
         self.steps += solution.nit

@@ -24,7 +24,7 @@ from hovi.planning.search.free_duration import FreeDuration, SolveFor, solve_dur
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
-from hovi.planning.solver.solver import Solution, guess_path, solve
+from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
@@ -140,7 +140,7 @@ class FinalStages:
 
     def _solve(self, job: Job, guess: Trajectory) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
-        return solve(job.problem(), guess, max_iterations=most, time_limit=left)
+        return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:

@@ -22,7 +22,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job, Progress
-from hovi.planning.solver.solver import Solution, solve
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
@@ -86,12 +86,12 @@ def _start_workers(count: int) -> None:
 def _solve_chunk(
     job: Job, guesses: Sequence[DiscretePath], time_limit: float | None
 ) -> list[Solution]:
-    problem = job.problem()
+    problem, most = job.problem(), job.options.max_iterations
     deadline = Deadline(time_limit)
     solutions = []
     for guess in guesses:
         left = deadline.seconds_left
-        solution = solve(problem, guess, max_iterations=job.options.max_iterations, time_limit=left)
+        solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=left)
         solutions.append(dataclasses.replace(solution, problem=None))
         if solution.status is Status.INTERRUPTED:
             break

@@ -29,6 +29,12 @@ from hovi.planning.search.option_fields import (
 from hovi.robot.robot import Robot
 from hovi.schemes import Scheme, by_name
 
+DEFAULT_TOLERANCE = 1e-3
+"""Relative tolerance of the cost if neither scheme, intervals nor tolerance are named."""
+DEFAULT_SCHEME = "galerkin-2"
+"""Scheme if only the intervals are named."""
+DEFAULT_INTERVALS = 16
+"""Number of intervals if only the scheme is named, and of the first grid of a refinement."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
@@ -57,11 +63,16 @@ class PlanOptions:
         least=0,
     )
     via: Sequence[Via] = option((), "goals that the motion meets at given times.")
-    scheme: str | Scheme = option(
-        "galerkin-2", "discretisation of the action: a name as for by_name, or a Scheme."
+    scheme: str | Scheme | None = option(
+        None,
+        "discretisation of the action: a name as for by_name, or a Scheme. Naming a scheme or a "
+        'number of intervals fixes the grid; "galerkin-2" if only `intervals` are named.',
     )
-    intervals: int = whole_number(
-        16, "number of equal intervals; limits may split them.", least=1, most=MAX_INTERVALS
+    intervals: int | None = whole_number(
+        None,
+        "number of equal intervals; limits may split them. 16 if only a scheme is named.",
+        least=1,
+        most=MAX_INTERVALS,
     )
     limits: str | Limits | Mapping[str, Any] = option(
         "urdf",
@@ -85,9 +96,9 @@ class PlanOptions:
         None,
         "the largest error over the whole motion, instead of a scheme: a number is relative to "
         'the cost, "0.1 mm" applies to the robot\'s tip_frames, "0.1 mm at tool0" to another '
-        'frame, "0.01 deg" or "1e-4 rad" to the joints. The first grid has the `intervals`, up to '
-        "60, or two thirds of them for smooth motions; the solution's `accuracy` reports the "
-        "estimated error.",
+        'frame, "0.01 deg" or "1e-4 rad" to the joints. 1e-3 if neither scheme, intervals nor '
+        "tolerance are named. The first grid has the `intervals`, up to 60, or two thirds of them "
+        "for smooth motions; the solution's `accuracy` reports the estimated error.",
     )
     obstacles: Sequence[Obstacle] = option(
         (),
@@ -146,14 +157,33 @@ class PlanOptions:
         return None if self.time_limit is None else seconds(self.time_limit, "time_limit")
 
     @property
+    def names_grid(self) -> bool:
+        """Whether a scheme or a number of intervals is named, and no tolerance."""
+        named = self.scheme is not None or self.intervals is not None
+        return named and self.tolerance is None
+
+    @property
     def table(self) -> Scheme:
-        """The scheme as a Scheme."""
-        return by_name(self.scheme) if isinstance(self.scheme, str) else self.scheme
+        """The scheme as a Scheme, the default one if none is named."""
+        scheme = DEFAULT_SCHEME if self.scheme is None else self.scheme
+        return by_name(scheme) if isinstance(scheme, str) else scheme
 
     @property
     def scheme_name(self) -> str:
-        """The name of the scheme."""
-        return self.scheme if isinstance(self.scheme, str) else self.scheme.name
+        """The name of the scheme, or of the default one."""
+        scheme = DEFAULT_SCHEME if self.scheme is None else self.scheme
+        return scheme if isinstance(scheme, str) else scheme.name
+
+    @property
+    def interval_count(self) -> int:
+        """The number of intervals, the default one if none is named."""
+        return DEFAULT_INTERVALS if self.intervals is None else self.intervals
+
+    @property
+    def effective_tolerance(self) -> float | str | Tolerance | None:
+        """The tolerance, named or by default; None for a named grid."""
+        by_default = self.tolerance is None and not self.names_grid
+        return DEFAULT_TOLERANCE if by_default else self.tolerance
 
     @cached_property
     def clearance(self) -> Clearance:
@@ -172,11 +202,12 @@ class PlanOptions:
         return options
 
     def on(self, robot: Robot) -> Self:
-        """These options with limits and tolerance resolved for a robot.
+        """These options with limits and tolerance resolved for a robot, defaults included.
 
         Raises InputError for values that do not fit the robot.
         """
-        wanted = None if self.tolerance is None else Tolerance.of(self.tolerance, robot)
+        wanted = self.effective_tolerance
+        wanted = None if wanted is None else Tolerance.of(wanted, robot)
         return self.with_changes(limits=as_limits(robot, self.limits), tolerance=wanted)
 
 

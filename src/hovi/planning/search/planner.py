@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State, as_state
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
@@ -25,10 +26,13 @@ from hovi.planning.search.search import Search
 from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.schemes import is_galerkin
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
 
+MAX_GUESS_INTERVALS = 400
+"""Largest number of intervals of a guess that a refinement begins with."""
 Start = State | npt.ArrayLike | str
 Goal = State | FrameGoal | npt.ArrayLike | str
 Keywords = ParamSpec("Keywords")
@@ -138,14 +142,28 @@ def _time(
 
 
 def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
-    """The requested grid, or the first grid of the refinement to a tolerance."""
+    """The requested grid, or the first grid of the refinement to a tolerance.
+
+    That is the guess's own if it is a motion on a finer grid, so that nothing of it is lost.
+    """
+    guess = options.guess
     if options.tolerance is None:
-        grid = Grid.uniform(T, options.intervals, options.table)
+        grid = Grid.uniform(T, options.interval_count, options.table)
+    elif isinstance(guess, Trajectory) and _begins(guess.grid, options):
+        grid = guess.grid.stretched(T)
     else:
         limited = as_limits(robot, options.limits).bounded.any()
         kinks = limited or options.clearance.wanted or options.via
-        grid = first_grid(T, options.intervals, smooth=not kinks)
+        grid = first_grid(T, options.interval_count, smooth=not kinks)
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
+
+
+def _begins(grid: Grid, options: PlanOptions) -> bool:
+    """Whether a refinement begins with a guess's grid: Galerkin tables, and none other named."""
+    if options.intervals is not None or options.via:
+        return False
+    usual = all(is_galerkin(scheme) for scheme, _ in grid.groups)
+    return usual and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
 
 
 def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:

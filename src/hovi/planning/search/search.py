@@ -7,9 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hovi.discrete.grid import Grid
+from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.refinement.resolution import resolved
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
-from hovi.planning.search.final_stages import FinalStages
+from hovi.planning.search.final_stages import MAX_REFINED, FinalStages, on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
@@ -86,15 +88,29 @@ class Search:
         except KeyboardInterrupt:
             record_interrupt()
             found = _interrupted(found[0])
+        found = self._resolved(found)
         best = self._with_ending(found[0], explored)
         return best, tuple(s.cost for s in found if s.success)
 
+    def _resolved(self, found: list[Solution]) -> list[Solution]:
+        """The minima from the cheapest resolved one on; the cheapest one if none is resolved."""
+        checked: list[Solution] = []
+        for i, solution in enumerate(found[:MAX_REFINED]):
+            problem = solution.problem or on_grid_of(self.fine.problem(), solution)
+            checked.append(resolved(dataclasses.replace(solution, problem=problem)))
+            if checked[-1].success:
+                return [_with_costlier(checked), *found[i + 1 :]]
+            if self.deadline.passed or interrupted():
+                break
+        return checked[:1]
+
     def _coarse(self) -> Job:
         """The job on the grid of the exploration."""
-        grid = self.fine.grid
-        if grid.intervals <= 2 * COARSE_INTERVALS:
+        grid, options = self.fine.grid, self.fine.options
+        continued = isinstance(options.guess, Trajectory) and options.starts == 1
+        if grid.intervals <= 2 * COARSE_INTERVALS or continued:
             return self.fine
-        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2))
+        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2, points=8))
         if self.fine.via:
             try:
                 coarse = coarse.with_nodes([each.time for each in self.fine.via])
@@ -155,6 +171,17 @@ def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
     if found.success or found.status not in UNUSABLE:
         return (0 if found.success else 1), 0.0
     return 2, -fine.grid.duration
+
+
+def _with_costlier(checked: list[Solution]) -> Solution:
+    """The last solution, with a note on the cheaper ones that are not resolved."""
+    *unresolved, best = checked
+    if not unresolved:
+        return best
+    cheaper = (
+        "A cheaper motion was" if len(unresolved) == 1 else f"{len(unresolved)} cheaper ones were"
+    )
+    return _with_note(best, f"{cheaper} not resolved.")
 
 
 def _with_note(best: Solution, sentence: str) -> Solution:

@@ -1,9 +1,10 @@
-"""solve: from a trajectory problem to a Solution."""
+"""solve_on_grid: from a trajectory problem to a Solution, at the points of its grid."""
 
 from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -39,8 +40,8 @@ STATIONARY_DECREASE = 1e-9
 class Solution:
     """The solution of a trajectory problem, or the best motion found.
 
-    success: whether a minimum was found. status, message: the outcome, as a word and in a
-        sentence.
+    success: whether a minimum was found that is one between the quadrature points, too.
+    status, message: the outcome, as a word and in a sentence.
     trajectory: the motion; the best one found if there is no minimum.
     cost: the discrete action of L~, by default 1/2 integral |tau|^2.
     error_estimate: of the cost, relative; None if there is none.
@@ -52,6 +53,7 @@ class Solution:
     setup_seconds, solve_seconds: wall time before and during the solve.
     problem: the trajectory problem; `replan` starts from it.
     forces: multipliers of limits and of passive joints' torques at the quadrature points.
+    check: what `replan` checks its motion with; None for none.
     """
 
     success: bool
@@ -69,6 +71,7 @@ class Solution:
     setup_seconds: float = 0.0
     solve_seconds: float = 0.0
     forces: list[PointTerms] | None = field(default=None, repr=False)
+    check: Callable[[Solution], Solution] | None = field(default=None, repr=False)
 
     @cached_property
     def duration_derivative(self) -> float:
@@ -110,9 +113,11 @@ class Solution:
         if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
             path = moved(path, problem.grid, problem.boundary, problem.robot)
         if problem.limited or not problem.plain:
-            return solve(problem, path, **options)
-        solution = solve(problem, follow(path, problem, MAX_CORRECTIONS), **options)
-        return dataclasses.replace(solution, nit=solution.nit + 1)
+            found = solve_on_grid(problem, path, **options)
+        else:
+            found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
+            found = dataclasses.replace(found, nit=found.nit + 1)
+        return found if self.check is None else self.check(found)
 
 
 def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> State | FrameGoal:
@@ -121,7 +126,7 @@ def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> Sta
 
 @one_blas_thread
 @interruptible
-def solve(
+def solve_on_grid(
     problem: TrajectoryProblem,
     guess: str | Trajectory | DiscretePath = "cubic",
     *,
@@ -131,7 +136,7 @@ def solve(
     report: Report | None = None,
     method: Method | None = None,
 ) -> Solution:
-    """A motion that makes the discrete action stationary, by a trust-region Newton method.
+    """A motion that makes the discrete action stationary, which may differ between the points.
 
     problem: the boundary data and the discrete Lagrangian.
     guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.

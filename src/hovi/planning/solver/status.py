@@ -16,11 +16,16 @@ Array = npt.NDArray[np.float64]
 
 
 class Status(StrEnum):
-    """Outcome of a solve."""
+    """Outcome of a solve.
+
+    UNRESOLVED: a minimum at the quadrature points, on a grid that cannot carry the motion between
+    them: see hovi.planning.refinement.resolution.
+    """
 
     MINIMUM = "minimum"
     SADDLE = "saddle"
     INFEASIBLE = "infeasible"
+    UNRESOLVED = "unresolved"
     ITERATION_LIMIT = "iteration_limit"
     TIME_LIMIT = "time_limit"
     INTERRUPTED = "interrupted"

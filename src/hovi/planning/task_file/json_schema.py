@@ -47,6 +47,8 @@ def _without_null(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     kept = {key: _without_null(each) for key, each in part.items() if (key, each) != _NO_DEFAULT}
+    if isinstance(kept.get("default"), dict):
+        kept["default"] = {k: v for k, v in kept["default"].items() if v is not None}
     only = kept.pop("anyOf", ())
     if len(only) == 1:
         return {**only[0], **kept}

@@ -132,6 +132,8 @@ def _syntax_sentence(toml: TomlText, reason: str) -> str:
 
 def _check_scheme(table: ShapedTable, toml: TomlText) -> None:
     """Check the name of the scheme, before the robot is loaded."""
+    if table.scheme.name is None:
+        return
     try:
         by_name(table.scheme.name)
     except SchemeError as unknown:

@@ -141,13 +141,11 @@ class ViaTable(GoalTable):
 
 
 class SchemeTable(Table):
-    """[scheme]."""
+    """[scheme]: either key fixes the grid."""
 
-    name: str = Field(
-        default=str(PlanOptions.scheme), description='the name of a scheme, such as "galerkin-2"'
-    )
-    intervals: int = Field(
-        default=PlanOptions.intervals,
+    name: str | None = Field(default=None, description='the name of a scheme, such as "galerkin-2"')
+    intervals: int | None = Field(
+        default=None,
         ge=1,
         le=MAX_INTERVALS,
         description=f"a whole number from 1 to {MAX_INTERVALS:,}",

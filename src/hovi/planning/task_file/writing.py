@@ -94,7 +94,7 @@ def _option_keys(task: Task) -> dict[str, Any]:
         "tolerance": as_number_or_text(options.tolerance),
         "via": [via_table(each, robot) for each in options.via],
         "obstacles": [each.to_dict() for each in options.obstacles],
-        "scheme": {"name": _scheme_name(options), "intervals": options.intervals},
+        "scheme": _scheme_table(options),
         "intervals": None,
     }
     keys = plain | shaped
@@ -119,8 +119,16 @@ def _is_default(name: str, options: PlanOptions) -> bool:
     return value is default or (isinstance(value, str | float | int) and value == default)
 
 
-def _scheme_name(options: PlanOptions) -> str:
-    """The name of the scheme. Raises SceneError for a custom scheme."""
+def _scheme_table(options: PlanOptions) -> dict[str, Any]:
+    """The table [scheme], with what is named. Raises SceneError for a custom scheme."""
+    table = {"name": _scheme_name(options), "intervals": options.intervals}
+    return {key: value for key, value in table.items() if value is not None}
+
+
+def _scheme_name(options: PlanOptions) -> str | None:
+    """The name of the scheme, if one is named. Raises SceneError for a custom scheme."""
+    if options.scheme is None:
+        return None
     name = options.scheme_name
     try:
         known = by_name(name).key == options.table.key

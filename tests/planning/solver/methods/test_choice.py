@@ -12,7 +12,7 @@ from hovi.planning.solver.methods.choice import METHODS, method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.methods.trust_region import TrustRegion
-from hovi.planning.solver.solver import solve
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
@@ -42,19 +42,19 @@ def test_methods_that_suit_the_same_problem_find_the_same_minimum() -> None:
     problem = problem_of("two_link_reach", limits="none")
     supporting = [method for method in METHODS if method.supports(problem)]
     assert [type(method) for method in supporting] == [TrustRegion, AugmentedLagrangian]
-    found = [solve(problem, method=method) for method in supporting]
+    found = [solve_on_grid(problem, method=method) for method in supporting]
     assert all(solution.success for solution in found)
     assert found[1].cost == pytest.approx(found[0].cost, rel=1e-11)
 
 
 def test_inactive_limits_change_nothing() -> None:
-    free = solve(problem_of("two_link_reach", limits="none"))
+    free = solve_on_grid(problem_of("two_link_reach", limits="none"))
     wide = {"base": "none", "v": 1e3 * float(np.abs(free.trajectory.v).max())}
-    between = solve(problem_of("two_link_reach", limits=wide))
+    between = solve_on_grid(problem_of("two_link_reach", limits=wide))
     assert between.success
     assert between.cost == pytest.approx(free.cost, rel=1e-6)
 
 
 def test_an_unsuitable_method_is_refused() -> None:
     with pytest.raises(InputError, match="method TrustRegion does not support this problem"):
-        solve(problem_of("ur5_reach", limits="urdf"), method=TrustRegion())
+        solve_on_grid(problem_of("ur5_reach", limits="urdf"), method=TrustRegion())

@@ -18,7 +18,7 @@ from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.solver import guess_path, solve
+from hovi.planning.solver.solver import guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 from oracles.ipopt_oracle import least_action
@@ -89,16 +89,16 @@ def test_limits_hold_at_ten_thousand_samples(models: Path, name: str) -> None:
 
 
 def test_inactive_limits_change_nothing(models: Path) -> None:
-    free = solve(reach(models, "two_link_reach", {"base": "none"}))
-    wide = solve(reach(models, "two_link_reach", {"base": "none", "q": 50.0, "tau": 1e4}))
+    free = solve_on_grid(reach(models, "two_link_reach", {"base": "none"}))
+    wide = solve_on_grid(reach(models, "two_link_reach", {"base": "none", "q": 50.0, "tau": 1e4}))
     assert wide.cost == pytest.approx(free.cost, rel=1e-9)
     np.testing.assert_allclose(wide.trajectory.q, free.trajectory.q, atol=1e-6)
 
 
 def test_active_limits_raise_the_cost_and_are_reached(models: Path) -> None:
-    free = solve(reach(models, "two_link_reach", {"base": "none"}))
+    free = solve_on_grid(reach(models, "two_link_reach", {"base": "none"}))
     limits = {"base": "none", "v": [3.0, 6.0]}
-    bound = solve(reach(models, "two_link_reach", limits))
+    bound = solve_on_grid(reach(models, "two_link_reach", limits))
     assert bound.success
     assert bound.cost > 1.1 * free.cost
     assert np.abs(bound.trajectory.v).max(axis=0) == pytest.approx([3.0, 6.0], rel=2e-2)
@@ -116,7 +116,7 @@ def test_a_hard_range_is_the_limit_of_a_steeper_potential(models: Path) -> None:
     def planned(effects: list[object], limits: Limits | None, guess: Trajectory | str) -> float:
         scene = hovi.Scene(robot, effects)
         ld = DiscreteLagrangian(scene.effort_lagrangian(), grid)
-        solution = solve(TrajectoryProblem(ld, *ends, limits), guess)
+        solution = solve_on_grid(TrajectoryProblem(ld, *ends, limits), guess)
         assert solution.success, solution.message
         found.append(solution.trajectory)
         return solution.cost
@@ -173,8 +173,8 @@ def test_a_motion_with_a_weak_motor_is_found_on_every_grid(
 
 def test_time_and_iteration_limits_have_their_own_statuses(models: Path) -> None:
     problem = reach(models, "ur5_reach", UR5)
-    assert solve(problem, max_iterations=3).status is Status.ITERATION_LIMIT
-    assert solve(problem, time_limit=1e-4).status is Status.TIME_LIMIT
+    assert solve_on_grid(problem, max_iterations=3).status is Status.ITERATION_LIMIT
+    assert solve_on_grid(problem, time_limit=1e-4).status is Status.TIME_LIMIT
 
 
 def test_light_wrists_hold_their_velocity_limits_at_the_ends() -> None:

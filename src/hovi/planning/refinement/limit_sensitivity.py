@@ -1,0 +1,51 @@
+"""How far the tolerance of limits moves the cost: the smallest error that can be estimated."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.problem.limits import TOLERANCE, Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import Solution
+
+Array = npt.NDArray[np.float64]
+
+SHIFT = 6.0
+"""Shift of a bound, in tolerances: it is tightened by five, and may be exceeded by one."""
+
+
+def cost_of_tolerance(solution: Solution) -> float:
+    """Relative change of the cost with a shift of all limits by SHIFT tolerances.
+
+    By the envelope theorem dJ = sum w_i |z_i| range_i shift over the active bounds, with their
+    multipliers z_i at the quadrature points. 0 without limits, or where none is active.
+    """
+    problem = solution.problem
+    assert problem is not None
+    if not problem.limited or solution.forces is None or solution.cost == 0:
+        return 0.0
+    tolerance = TOLERANCE if problem.limits is None else problem.limits.tolerance
+    jet_range, output_range = _ranges(problem)
+    change = 0.0
+    for weights, terms in zip(problem.ld.point_weights, solution.forces, strict=True):
+        per_point = np.abs(terms.jet_gradient) @ jet_range[: terms.jet_gradient.shape[1]]
+        per_point += np.abs(terms.output_gradient) @ output_range
+        change += float(weights @ per_point)
+    return SHIFT * tolerance * change / abs(solution.cost)
+
+
+def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:
+    """Ranges of (q, v, a) and of the outputs; 0 where a force is of no limit."""
+    outputs = len(problem.ld.lagrangian.output_weight)
+    limits, nv = problem.limits, problem.robot.nv
+    ranges = np.zeros((4, nv)) if limits is None else _bounded_ranges(limits)
+    if problem.distances is not None:
+        ranges[0] = np.maximum(ranges[0], DISTANCE_SCALE)
+    ranges[3, problem.passive] = 0.0
+    return ranges[:3].ravel(), ranges[3, :outputs]
+
+
+def _bounded_ranges(limits: Limits) -> Array:
+    return np.where(limits.bounded, limits.ranges, 0.0)

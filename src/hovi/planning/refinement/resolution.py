@@ -1,0 +1,198 @@
+"""Resolution: a motion that is called a minimum is one between the quadrature points, too.
+
+On a coarse grid the torque may vanish at the points and swing between them. Such a motion is a
+minimum of the discrete action, and of nothing else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hovi.discrete.curve_integral import integral_along
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.motion_error import sample_points
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import HoviError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.refinement.candidate import error_of_cost
+from hovi.planning.refinement.error_estimate import finer_than
+from hovi.planning.refinement.whirling import whirl
+from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.status import Status
+from hovi.schemes import is_galerkin
+from hovi.system.blas_threads import one_blas_thread
+from hovi.system.interruption import interruptible
+
+RESOLVED = 0.01
+"""Largest relative difference of costs, and of torques that should vanish, for a success."""
+NEARBY = 0.05
+"""Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
+compared with a finer one again."""
+NEGLIGIBLE = 1e-12
+"""Cost that counts as none, relative to that of torques of the size of the inertial torque."""
+
+
+def solve(
+    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath = "cubic", **options: Any
+) -> Solution:
+    """A motion that makes the discrete action stationary, checked between the points.
+
+    As `solve_on_grid`, whose options it takes. A minimum on the grid that is none along the whole
+    motion has the status UNRESOLVED: see `resolved`.
+    """
+    return resolved(solve_on_grid(problem, guess, **options))
+
+
+@one_blas_thread
+@interruptible
+def resolved(solution: Solution) -> Solution:
+    """A success with an error estimate, or the same motion with the status UNRESOLVED.
+
+    A minimum is resolved if
+    (a) with Galerkin tables, whose curve is their own, the action differs by at most 1 % from the
+        integral of L~ along the curve, and no torque of a passive joint exceeds 1 % of the largest
+        torque;
+    (b) the solution on a finer grid, reached from this one, is a minimum whose cost differs by at
+        most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
+        scheme; under limits every interval is halved instead;
+    (c) that solution was found.
+    Solutions of another status are returned unchanged.
+    """
+    if not solution.success or solution.problem is None:
+        return solution
+    reason = _difference_along(solution)
+    if not reason and solution.error_estimate is None:
+        solution, reason = _compared(solution)
+    elif not reason:
+        reason = _estimate_sentence(solution.error_estimate)
+    if reason:
+        return _unresolved(solution, reason)
+    assert solution.error_estimate is not None
+    passed = Resolution(solution.trajectory.path, solution.error_estimate)
+    return dataclasses.replace(solution, check=passed)
+
+
+@dataclass(frozen=True, eq=False)
+class Resolution:
+    """The check of motions that are replanned from one that passed.
+
+    path: that motion. estimate: of the relative error of its cost, which holds for motions nearby.
+    """
+
+    path: DiscretePath
+    estimate: float
+
+    def __call__(self, solution: Solution) -> Solution:
+        """The solution as `resolved` returns it, without (b) for a motion NEARBY."""
+        if not (solution.success and self._is_near(solution)):
+            return resolved(solution)
+        reason = _difference_along(solution)
+        if reason:
+            return _unresolved(solution, reason)
+        return dataclasses.replace(_with_estimate(solution, self.estimate), check=self)
+
+    def _is_near(self, solution: Solution) -> bool:
+        problem, path = solution.problem, solution.trajectory.path
+        assert problem is not None
+        if path.q.shape != self.path.q.shape:
+            return False
+        dq = problem.robot.difference(self.path.q, path.q)
+        dv = problem.grid.duration * (path.v - self.path.v)
+        return bool(max(np.abs(dq).max(), np.abs(dv).max()) <= NEARBY)
+
+
+def _difference_along(solution: Solution) -> str:
+    """(a): why the motion differs from its values at the points; "" if it does not."""
+    problem, trajectory = solution.problem, solution.trajectory
+    assert problem is not None
+    if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
+        return ""
+    action = problem.ld.action(trajectory.path)
+    integral = integral_along(problem.ld.lagrangian, trajectory).value
+    least = NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
+    if not abs(action - integral) <= RESOLVED * max(abs(integral), least):
+        return (
+            f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own "
+            "curve"
+        )
+    return _passive_torque(problem, trajectory)
+
+
+def _passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
+    """The torque of a passive joint between the points; "" if it is negligible."""
+    if len(problem.passive) == 0:
+        return ""
+    tau = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).tau)
+    largest = tau.max(axis=0)
+    worst = int(problem.passive[np.argmax(largest[problem.passive])])
+    if largest[worst] <= RESOLVED * largest.max():
+        return ""
+    return (
+        f"joint {trajectory.coordinate_names[worst]!r} is passive, but carries up to "
+        f"{largest[worst]:.3g} N m between the quadrature points, where other joints carry at most "
+        f"{np.delete(largest, problem.passive).max(initial=0.0):.3g}"
+    )
+
+
+def _compared(solution: Solution) -> tuple[Solution, str]:
+    """(b) and (c): the solution with the estimate, and why it is no minimum, or ""."""
+    try:
+        finer = finer_than(solution)
+    except HoviError as refused:
+        return solution, f"it could not be compared with a finer one: {str(refused).rstrip('.')}"
+    if finer is None:
+        return solution, "from it no minimum was found on a finer grid"
+    estimate = error_of_cost(solution, finer)
+    return _with_estimate(solution, estimate), _estimate_sentence(estimate)
+
+
+def _estimate_sentence(estimate: float | None) -> str:
+    if estimate is None:
+        return "from it no minimum was found on a finer grid"
+    if estimate <= RESOLVED:
+        return ""
+    return f"a finer grid changes its cost by {100 * estimate:.2g} %"
+
+
+def _with_estimate(solution: Solution, estimate: float) -> Solution:
+    metadata = {**solution.trajectory.metadata, "error_estimate": estimate}
+    trajectory = dataclasses.replace(solution.trajectory, metadata=metadata)
+    return dataclasses.replace(solution, trajectory=trajectory, error_estimate=estimate)
+
+
+def _unresolved(solution: Solution, reason: str) -> Solution:
+    """The solution with the status, and a message with the figures and what to do."""
+    problem, status = solution.problem, Status.UNRESOLVED
+    assert problem is not None
+    message = (
+        f"the motion is a minimum on {problem.grid.intervals} intervals, but not along its whole "
+        f"way: {reason}; {_remedy(solution)}."
+    )
+    metadata = {**solution.trajectory.metadata, "status": str(status)}
+    trajectory = dataclasses.replace(solution.trajectory, metadata=metadata)
+    return dataclasses.replace(
+        solution,
+        success=False,
+        status=status,
+        message=message,
+        trajectory=trajectory,
+        minima=(),
+        check=None,
+    )
+
+
+def _remedy(solution: Solution) -> str:
+    """What to do, by what the motion looks like."""
+    whirling = whirl(solution)
+    if whirling is not None:
+        return str(whirling)
+    if solution.accuracy is None:
+        return (
+            "use more intervals or a scheme with more points, such as 'galerkin-2x8', or name "
+            "neither, so that plan chooses"
+        )
+    return "set limits or another initial guess, or try more starts"

@@ -1,0 +1,75 @@
+"""Whirling joints: without limits and rotors a light joint spins, faster on every finer grid.
+
+Spinning a link of inertia I costs a torque of the order of I, and what it does to the other joints
+grows with the square of its velocity. For small I the least torque is found at velocities that no
+joint of a robot reaches, if it is attained at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.motion_error import sample_points
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.solver import Solution
+from hovi.robot.mass_matrix import MassMatrix
+
+WHIRLING_RATIO = 10.0
+"""Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
+2 for a smooth motion from rest to rest."""
+LIGHT_SHARE = 0.03
+"""Inertia of a joint that may whirl, relative to that of the heaviest."""
+HOPELESS_RATIO = 40.0
+"""That ratio above which finer grids are not tried for a motion that its grid does not resolve."""
+
+
+@dataclass(frozen=True)
+class Whirl:
+    """The joint that whirls most.
+
+    speed: its largest, in [rad/s]. ratio: see WHIRLING_RATIO. inertia: about its axis with all
+    other joints held, the least along the motion, in [kg m^2].
+    """
+
+    joint: str
+    speed: float
+    ratio: float
+    inertia: float
+
+    def __str__(self) -> str:
+        """What it does, and what helps."""
+        return (
+            f"joint {self.joint!r} whirls at up to {self.speed:.3g} rad/s with an inertia of "
+            f"{self.inertia:.2g} kg m^2, and without limits faster on finer grids: set limits, or "
+            "add the effect armature or acceleration_cost to the scene"
+        )
+
+
+def whirl(solution: Solution) -> Whirl | None:
+    """The light joint without a velocity limit that whirls most; None if none does."""
+    problem, trajectory = solution.problem, solution.trajectory
+    assert problem is not None
+    joints = np.flatnonzero(_unlimited_angles(problem))
+    if len(joints) == 0:
+        return None
+    q, v = trajectory.q, np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
+    distance = np.abs(problem.robot.difference(q[:1], q[-1:])[0])
+    ratio = v.max(axis=0) * trajectory.duration / (np.pi + distance)
+    worst = int(joints[np.argmax(ratio[joints])])
+    if ratio[worst] <= WHIRLING_RATIO:
+        return None
+    diagonal = np.diagonal(MassMatrix(problem.scene.model)(q), axis1=1, axis2=2)
+    inertia = float(diagonal[:, worst].min())
+    if inertia > LIGHT_SHARE * diagonal[:, joints].max():
+        return None
+    name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
+    return Whirl(name, speed, float(ratio[worst]), inertia)
+
+
+def _unlimited_angles(problem: TrajectoryProblem) -> npt.NDArray[np.bool_]:
+    """Which coordinates are angles without a bound on their velocity, (nv,)."""
+    limits, sliding = problem.limits, problem.robot.sliding
+    return ~sliding if limits is None else ~sliding & ~limits.bounded[1]
