@@ -86,6 +86,13 @@ def random_terms(space: ConfigurationSpace, scheme: Scheme) -> tuple[Array, Arra
     return random.normal(size=(P, 3 * n)), H + H.transpose(0, 2, 1)
 
 
+def random_jacobian(space: ConfigurationSpace) -> tuple[Array, Array]:
+    """Four test functions (K, Q), and the Jacobian (P, p, 3 n) of two outputs at the points."""
+    random = np.random.default_rng(8)
+    Q = len(GALERKIN.weights)
+    return random.normal(size=(4, Q)), random.normal(size=(len(STEPS) * Q, 2, 3 * space.nv))
+
+
 def actions(there: Intervals, here: Intervals, g: Array, H: Array) -> Array:
     """h sum w L with L = g . d + d^T H d / 2 and d the jet's difference from that here, (B,)."""
     (q, v, a), (r, w, b) = there.jets, here.jets
@@ -166,6 +173,22 @@ def test_gradients_are_pulled_back_as_steps_are_pushed_forward(
     np.testing.assert_allclose(np.einsum("bia,bia->b", gradient, step), pushed, rtol=1e-12)
 
 
+@each_size
+@each_space
+def test_moments_of_outputs_are_gradients_of_weighted_sums(
+    space: ConfigurationSpace, size: float
+) -> None:
+    charts = random_intervals(space, size, GALERKIN).charts
+    tests, J = random_jacobian(space)
+    moments = charts.nodal_moments(tests, J)
+    for k, test in enumerate(tests):
+        for i in range(J.shape[1]):
+            gradient = charts.nodal_gradient(np.tile(test, len(STEPS))[:, None] * J[:, i])
+            np.testing.assert_allclose(
+                moments[:, k, i], gradient, rtol=0, atol=1e-13 * np.abs(gradient).max()
+            )
+
+
 @each_space
 def test_an_interval_has_the_same_bytes_in_every_batch(space: ConfigurationSpace) -> None:
     charts = random_intervals(space, 1.0, GALERKIN).charts
@@ -197,6 +220,12 @@ def pushed(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
     return (charts.push_steps(np.random.default_rng(3).normal(size=(B, m, n))),)
 
 
+def moments_pulled(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
+    random, Q = np.random.default_rng(8), len(charts.weights)
+    J = random.normal(size=(len(g), 2, g.shape[1]))
+    return (charts.pull_moments(random.normal(size=(4, Q)), J),)
+
+
 def rated(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ...]:
     carried = np.random.default_rng(4).normal(size=charts.x[:2].shape)
     layout, portable = charts.layout, charts.portable
@@ -208,7 +237,7 @@ def rated_locally(charts: CompiledCharts, g: Array, _: Array) -> tuple[Array, ..
     return local_rates(charts.layout, *charts.x, portable=charts.portable)
 
 
-DOORS = [expanded, pulled, pulled_regularly, pushed, rated, rated_locally]
+DOORS = [expanded, pulled, pulled_regularly, moments_pulled, pushed, rated, rated_locally]
 
 
 @pytest.mark.parametrize("door", DOORS)

@@ -19,7 +19,7 @@ def least_action(
     """The cost and the nodes (q, v), shape (N - 1, 2 n), that Ipopt finds near a path.
 
     Each unknown of the guess is first moved at random, by `move` or so. The problem's limits hold
-    at the quadrature points.
+    at the quadrature points, and r + 2 moments of every passive joint's torque vanish per interval.
     """
     grid, n = problem.grid, problem.robot.nv
     N, r = grid.intervals, grid.inner_modes
@@ -28,17 +28,17 @@ def least_action(
     ends = [np.concatenate(end)[:, None] for end in ((q0, v0), (q1, v1))]
     all_nodes = ca.horzcat(ends[0], nodes, ends[1])
     left, right = all_nodes[:, :-1], all_nodes[:, 1:]
-    actions, outputs = _interval_action(problem).map(N)(left, right, modes)
+    actions, outputs, moments = _interval_action(problem).map(N)(left, right, modes)
     action = ca.sum2(actions)
     x = ca.vertcat(ca.vec(nodes), ca.vec(modes))
     quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-8}
-    program = {"x": x, "f": action}
-    bounds = {}
+    program = {"x": x, "f": action, "g": ca.vec(moments)}
+    bounds = {name: np.zeros(moments.numel()) for name in ("lbg", "ubg")}
     if problem.limits is not None:
-        program["g"] = ca.vec(outputs)
+        program["g"] = ca.vertcat(program["g"], ca.vec(outputs))
         rows = outputs.shape[0] * N // problem.limits.lower.size
         for name, bound in (("lbg", problem.limits.lower), ("ubg", problem.limits.upper)):
-            bounds[name] = np.tile(bound.ravel(), rows)
+            bounds[name] = np.append(bounds[name], np.tile(bound.ravel(), rows))
     solver = ca.nlpsol("least_action", "ipopt", program, quiet)
     inner = np.concatenate([np.hstack([guess.q, guess.v])[1:-1].ravel(), guess.inner.ravel()])
     start = inner + move * np.random.default_rng(seed).standard_normal(inner.shape)
@@ -51,7 +51,8 @@ def least_action(
 def _interval_action(problem: TrajectoryProblem) -> ca.Function:
     """L_d(q0 v0, q1 v1, c) of an interval: h sum_j w_j 1/2 |tau_j|^2 by the scheme's numbers.
 
-    And (q, v, a, tau) at its quadrature points, one after the other.
+    And (q, v, a, tau) at its quadrature points, one after the other, and the moments of the passive
+    torques against P_0 .. P_{r+1}. Without passive joints there are no moments.
     """
     scheme, h, n = problem.grid.schemes[0], float(problem.grid.steps[0]), problem.robot.nv
     tau = casadi_functions(problem.scene.model).inverse_dynamics
@@ -59,10 +60,14 @@ def _interval_action(problem: TrajectoryProblem) -> ca.Function:
     c = ca.SX.sym("c", n, scheme.inner_modes)
     q0, v0, q1, v1 = left[:n], left[n:], right[:n], right[n:]
     columns = ca.horzcat(h * v0, q1 - q0 - h * v0, h * (v1 - v0), h**2 * c)
-    action, outputs = 0, []
-    for weight, rows in zip(scheme.weights, scheme.table, strict=True):
+    passive = [int(i) for i in problem.passive]
+    active = [i for i in range(n) if i not in passive]
+    polynomials = np.polynomial.legendre.legvander(2 * scheme.points - 1, scheme.inner_modes + 1)
+    action, outputs, moments = 0, [], 0
+    for weight, rows, P in zip(scheme.weights, scheme.table, polynomials, strict=True):
         x, hv, hha = ca.horzsplit(columns @ rows.T)
         effort = tau(q0 + x, hv / h, hha / h**2)
-        action += h * weight * ca.sumsqr(effort) / 2
+        action += h * weight * ca.sumsqr(effort[active]) / 2
         outputs += [q0 + x, hv / h, hha / h**2, effort]
-    return ca.Function("L_d", [left, right, c], [action, ca.vertcat(*outputs)])
+        moments += weight * effort[passive] @ P[None]
+    return ca.Function("L_d", [left, right, c], [action, ca.vertcat(*outputs), ca.vec(moments)])

@@ -143,6 +143,39 @@ def test_names_say_modes_points_and_order(name: str, r: int, k: int, Q: int) -> 
     assert scheme.key == galerkin(r, k, points=Q).key
 
 
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("galerkin-0x3", 2), ("galerkin-2x6", 4), ("galerkin-4x10", 6), ("galerkin-2x7-k3", 5)],
+)
+def test_moments_are_against_an_orthonormal_basis_of_as_many_as_coefficients(
+    name: str, count: int
+) -> None:
+    scheme = by_name(name)
+    assert scheme.moments is not None
+    products = (scheme.moments * scheme.weights) @ scheme.moments.T
+    np.testing.assert_allclose(products, np.eye(count), rtol=0, atol=1e-13)
+    powers = scheme.points ** np.arange(count)[:, None]
+    rest = np.linalg.lstsq(scheme.moments.T, powers.T, rcond=None)[1]
+    np.testing.assert_allclose(rest, 0.0, rtol=0, atol=1e-25)
+
+
+def test_simpsons_rule_has_two_moments() -> None:
+    moments = by_name("hermite-simpson").moments
+    np.testing.assert_allclose(moments, [[1, 1, 1], [-np.sqrt(3), 0, np.sqrt(3)]], atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["galerkin-0", "galerkin-2", "galerkin-1-k3", "mean-difference"])
+def test_there_are_no_moments_where_there_are_no_more_points_than_coefficients(name: str) -> None:
+    assert by_name(name).moments is None
+
+
+def test_points_that_are_not_on_the_curve_have_no_moments() -> None:
+    midpoint = by_name("taylor-midpoint")
+    twice = (np.concatenate([x, x]) for x in (midpoint.points, midpoint.weights / 2))
+    table = np.concatenate([midpoint.table, midpoint.table])
+    assert Scheme("four midpoints", 2, *twice, table).moments is None
+
+
 def test_as_many_points_as_modes_and_ends_are_the_table_of_always() -> None:
     assert galerkin(2, points=4) is galerkin(2)
 

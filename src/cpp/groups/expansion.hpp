@@ -56,6 +56,53 @@ void pull_gradient(const Charts& charts, const double* at_points, bool regular, 
   }
 }
 
+std::size_t moments_workspace_size(const Charts& charts, std::size_t tests_count) {
+  const std::size_t n = charts.space.nv, m = charts.columns;
+  return (IntervalCharts::size(charts) + 3 * n + tests_count * m * n) * lanes;
+}
+
+// sums (K, m, n): the gradients of one output's moments in the charts' columns.
+inline void sum_moments(const IntervalCharts& intervals, std::size_t tests_count,
+                        const double* tests, const double* jacobian, std::size_t outputs,
+                        Pack* sums) {
+  const std::size_t n = intervals.dof(), Q = intervals.charts.points;
+  const std::size_t size = intervals.charts.columns * n, row = 3 * n;
+  std::fill(sums, sums + tests_count * size, Pack{});
+  for (std::size_t q = 0; q < Q; ++q) {
+    const double* const at_point = jacobian + q * outputs * row;
+    std::fill(intervals.gradient, intervals.gradient + size, Pack{});
+    intervals.lift_point(q, intervals.weighted(q, at_point, Q * outputs * row));
+    intervals.contract(q);
+    for (std::size_t k = 0; k < tests_count; ++k) {
+      const Pack test = broadcast(tests[k * Q + q]);
+      for (std::size_t i = 0; i < size; ++i) sums[k * size + i] += test * intervals.gradient[i];
+    }
+  }
+}
+
+void pull_moments(const Charts& charts, std::size_t tests_count, const double* tests,
+                  std::size_t outputs, const double* jacobian, double* workspace,
+                  double* columns_gradients) {
+  const std::size_t n = charts.space.nv, size = charts.columns * n;
+  const std::size_t stride = tests_count * outputs * size;
+  for (std::size_t first = 0; first < charts.intervals; first += lanes) {
+    const IntervalCharts intervals(charts, first, workspace);
+    for (std::size_t q = 0; q < charts.points; ++q)
+      for (std::size_t f = 0; f < charts.space.parts; ++f)
+        intervals.find_point(q, f, nullptr, false);
+    intervals.find_ends(false);
+    Pack* const sums = intervals.rest + 3 * n;
+    for (std::size_t i = 0; i < outputs; ++i) {
+      sum_moments(intervals, tests_count, tests, jacobian + 3 * i * n, outputs, sums);
+      for (std::size_t k = 0; k < tests_count; ++k) {
+        intervals.pull_ends(0, sums + k * size, n, 1);
+        write(sums + k * size, size, intervals.rows, stride,
+              columns_gradients + (k * outputs + i) * size);
+      }
+    }
+  }
+}
+
 inline void push_ends(const IntervalCharts& intervals, Pack* step) {
   const std::size_t n = intervals.dof();
   for (std::size_t f = 0; f < intervals.charts.space.parts; ++f) {
@@ -113,8 +160,8 @@ void push_steps(const Charts& charts, const double* step, double* workspace, dou
   }
 }
 
-constexpr Kernels kernels{rates,  local_rates,   workspace_size,
-                          expand, pull_gradient, push_steps};
+constexpr Kernels kernels{rates,         local_rates,  workspace_size,         expand,
+                          pull_gradient, pull_moments, moments_workspace_size, push_steps};
 
 }  // namespace
 }  // namespace hovi::groups

@@ -93,30 +93,51 @@ struct IntervalCharts {
     const std::size_t n = dof(), m = charts.columns;
     std::fill(gradient, gradient + m * n, Pack{});
     for (std::size_t q = 0; q < charts.points; ++q) {
-      Pack weight[3];
-      weigh(q, weight);
-      Pack* const covector = rest;  // (3, n)
-      read(at_points + 3 * q * n, 3 * charts.points * n, rows, 3 * n, covector);
-      for (std::size_t i = 0; i < 3 * n; ++i) covector[i] *= weight[i / n];
-      for (std::size_t f = 0; f < charts.space.parts; ++f) lift_part(q, f, covector, bends);
+      const Pack* const covector = weighted(q, at_points + 3 * q * n, 3 * charts.points * n);
+      for (std::size_t f = 0; f < charts.space.parts; ++f) find_point(q, f, covector, bends);
+      lift_point(q, covector);
       contract(q);
     }
   }
 
-  void lift_part(std::size_t q, std::size_t f, const Pack* covector, bool bends) const {
+  // A covector of (q, v, a) at a point, weighted, (3, n). stride: from one interval to the next.
+  const Pack* weighted(std::size_t q, const double* at_point, std::size_t stride) const {
+    const std::size_t n = dof();
+    Pack weight[3];
+    weigh(q, weight);
+    Pack* const covector = rest;
+    read(at_point, stride, rows, 3 * n, covector);
+    for (std::size_t i = 0; i < 3 * n; ++i) covector[i] *= weight[i / n];
+    return covector;
+  }
+
+  // lifted, of a covector at a point whose Jacobians are known.
+  void lift_point(std::size_t q, const Pack* covector) const {
+    const std::size_t n = dof();
+    for (std::size_t f = 0; f < charts.space.parts; ++f) {
+      const std::size_t first = part(f).v;
+      const Pack* const own = covector + first;
+      if (!curved(part(f)))
+        for (std::int64_t i = 0; i < part(f).size; ++i)
+          for (std::size_t s = 0; s < 4; ++s)
+            lifted[s * n + first + i] = own[(s > 0 ? s - 1 : 0) * n + i];
+      on_group(part(f).kind, [&](auto group) {
+        using Group = decltype(group);
+        pull<Group>(at_point<Group>(q, f).jacobian, own, n, 1, lifted + first);
+      });
+    }
+  }
+
+  // The Jacobian of a part at a point, and its Hessians weighted by a covector.
+  void find_point(std::size_t q, std::size_t f, const Pack* covector, bool bends) const {
     const std::size_t n = dof(), first = part(f).v;
-    const Pack* const own = covector + first;
-    if (!curved(part(f)))
-      for (std::int64_t i = 0; i < part(f).size; ++i)
-        for (std::size_t s = 0; s < 4; ++s)
-          lifted[s * n + first + i] = own[(s > 0 ? s - 1 : 0) * n + i];
     on_group(part(f).kind, [&](auto group) {
       using Group = decltype(group);
       const Variation by = variation<Group>(q, first);
       PointMaps<Group>& maps = at_point<Group>(q, f);
       maps.jacobian = PointJacobian<Group>(by);
-      pull<Group>(maps.jacobian, own, n, 1, lifted + first);
       if (!bends) return;
+      const Pack* const own = covector + first;
       const PointBend bend(by, force<Group>(own), force<Group>(own + n), force<Group>(own + 2 * n));
       maps.base_x = form<Group>(bend.base_x);
       maps.x_x = form<Group>(bend.x_x), maps.x_dx = form<Group>(bend.x_dx);

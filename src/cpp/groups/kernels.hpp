@@ -55,6 +55,16 @@ struct Kernels {
   void (*pull_gradient)(const Charts& charts, const double* gradient, bool regular,
                         double* workspace, double* columns_gradient);
 
+  // Gradients of the moments h sum_q w_q t_q y of some outputs y against test functions t.
+  // tests: (K, Q). jacobian: of the outputs in (q, v, a) at the points, (B, Q, outputs, 3, n).
+  // columns_gradients: (B, K, outputs, m, n).
+  void (*pull_moments)(const Charts& charts, std::size_t tests_count, const double* tests,
+                       std::size_t outputs, const double* jacobian, double* workspace,
+                       double* columns_gradients);
+
+  // Doubles that pull_moments works in.
+  std::size_t (*moments_workspace_size)(const Charts& charts, std::size_t tests_count);
+
   // Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n).
   void (*push_steps)(const Charts& charts, const double* step, double* workspace, double* change);
 

@@ -116,6 +116,18 @@ void pull_gradient(const Layout& layout, const Input<3>& table, const Input<1>& 
                                   columns_gradient.data());
 }
 
+void pull_moments(const Layout& layout, const Input<3>& table, const Input<1>& weights,
+                  const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
+                  const Input<2>& tests, const Input<3>& jacobian,
+                  const Output<5>& columns_gradients, bool portable) {
+  const auto parts = parts_of(layout);
+  const Charts charts = charts_of(parts, table, weights, steps, x, ends);
+  const nb::gil_scoped_release released;
+  const auto work = allocate(kernels(portable).moments_workspace_size(charts, tests.shape(0)));
+  kernels(portable).pull_moments(charts, tests.shape(0), tests.data(), jacobian.shape(1),
+                                 jacobian.data(), work.get(), columns_gradients.data());
+}
+
 void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& weights,
                 const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
                 const Input<3>& step, const Output<4>& change, bool portable) {
@@ -138,6 +150,8 @@ NB_MODULE(groups, m) {
         "gradient"_a, "hessian"_a, "columns_gradient"_a, "columns_hessian"_a, "portable"_a = false);
   m.def("pull_gradient", &pull_gradient, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a,
         "ends"_a, "gradient"_a, "regular"_a, "columns_gradient"_a, "portable"_a = false);
+  m.def("pull_moments", &pull_moments, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a,
+        "ends"_a, "tests"_a, "jacobian"_a, "columns_gradients"_a, "portable"_a = false);
   m.def("push_steps", &push_steps, "layout"_a, "table"_a, "weights"_a, "steps"_a, "x"_a, "ends"_a,
         "step"_a, "change"_a, "portable"_a = false);
 }

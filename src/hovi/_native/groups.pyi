@@ -39,6 +39,18 @@ def pull_gradient(
     columns_gradient: Array,
     portable: bool = False,
 ) -> None: ...
+def pull_moments(
+    layout: Layout,
+    table: Array,
+    weights: Array,
+    steps: Array,
+    x: Array,
+    ends: Array,
+    tests: Array,
+    jacobian: Array,
+    columns_gradients: Array,
+    portable: bool = False,
+) -> None: ...
 def push_steps(
     layout: Layout,
     table: Array,

@@ -76,13 +76,13 @@ class DiscreteLagrangian:
         jets: the result of `jets` for this path, if it is known.
         """
         values = np.empty(self.grid.intervals)
-        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
+        for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
             values[batch.index] = batch.sums(self.lagrangian.value(*jet, t=batch.t))
         return values
 
     def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
-        triples = zip(self._batches, jets or self.jets(path), self.point_weights, strict=True)
+        triples = zip(self.batches, jets or self.jets(path), self.point_weights, strict=True)
         value = self.lagrangian.value
         return sum(float(weights @ value(*jet, t=batch.t)) for batch, jet, weights in triples)
 
@@ -104,7 +104,7 @@ class DiscreteLagrangian:
         parts = []
         known = jets or self.jets(path)
         charts = self._charts(path)
-        for i, batch in enumerate(self._batches):
+        for i, batch in enumerate(self.batches):
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
             point = self.lagrangian.expand(*known[i], t=batch.t, multiplier=multiplier, terms=term)
@@ -132,7 +132,7 @@ class DiscreteLagrangian:
         """
         m = 4 + self.grid.inner_modes
         gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
-        for batch, jet in zip(self._batches, jets or self.jets(path), strict=True):
+        for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
             point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
             if self.chart is None:
                 part = batch.contracted(point_gradient, coordinates)
@@ -147,7 +147,7 @@ class DiscreteLagrangian:
         values = np.empty(N)
         gradient = np.zeros((N, m, n))
         hessian = np.zeros((N, m, m, n, n))
-        for batch, part in zip(self._batches, parts, strict=True):
+        for batch, part in zip(self.batches, parts, strict=True):
             k = part.gradient.shape[1]
             values[batch.index] = part.values
             gradient[batch.index, :k] = part.gradient
@@ -165,6 +165,14 @@ class DiscreteLagrangian:
         pairs = zip(expansion.outputs, steps, strict=True)
         return [self.lagrangian.predicted_slope(y, J, dx) for (y, J), dx in pairs]
 
+    def predicted_outputs(
+        self, expansion: Expansion, step: Array, coordinates: Coordinates
+    ) -> list[Array]:
+        """y + J dx at the quadrature points after a step, (P, m) per batch; step as above."""
+        steps = self.point_steps(step, coordinates, expansion)
+        pairs = zip(expansion.outputs, steps, strict=True)
+        return [y + np.matmul(J, dx[:, :, None])[:, :, 0] for (y, J), dx in pairs]
+
     def point_steps(
         self, step: Array, coordinates: Coordinates, expansion: Expansion
     ) -> list[Array]:
@@ -173,7 +181,7 @@ class DiscreteLagrangian:
         expansion: at the path from which the step is taken.
         """
         steps = []
-        for i, batch in enumerate(self._batches):
+        for i, batch in enumerate(self.batches):
             columns = step[batch.index, : 4 + batch.scheme.inner_modes]
             if expansion.charts is not None:
                 moved = expansion.charts[i].point_steps(columns)
@@ -184,7 +192,7 @@ class DiscreteLagrangian:
 
     def jets(self, path: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
-        return [self._jet(batch, path) for batch in self._batches]
+        return [self._jet(batch, path) for batch in self.batches]
 
     def turns(self, path: DiscretePath) -> Array:
         """The largest rotation angle in the chart of every interval, shape (N,), in [rad].
@@ -192,25 +200,25 @@ class DiscreteLagrangian:
         At its quadrature points and its end; zero without charts.
         """
         turns = np.zeros(self.grid.intervals)
-        for batch, charts in zip(self._batches, self._charts(path) or (), strict=False):
+        for batch, charts in zip(self.batches, self._charts(path) or (), strict=False):
             turns[batch.index] = charts.turns
         return turns
 
     @cached_property
     def point_weights(self) -> list[Array]:
         """h w_j of every quadrature point, shape (P,), per batch."""
-        return [batch.weights.ravel() for batch in self._batches]
+        return [batch.weights.ravel() for batch in self.batches]
 
     @cached_property
     def point_times(self) -> list[Array]:
         """Time of every quadrature point, shape (P,), per batch."""
-        return [batch.t for batch in self._batches]
+        return [batch.t for batch in self.batches]
 
     @cached_property
     def point_intervals(self) -> list[Index]:
         """Number of the interval of every quadrature point, shape (P,), per batch."""
         numbers = np.arange(self.grid.intervals)
-        return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self._batches]
+        return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self.batches]
 
     def momenta(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
         """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
@@ -238,7 +246,7 @@ class DiscreteLagrangian:
         N, n = self.grid.intervals, self.lagrangian.nv
         g = np.empty((N, 4, n))
         gradients = self.point_gradients(path, forces, jets)
-        for batch, gradient in zip(self._batches, gradients, strict=True):
+        for batch, gradient in zip(self.batches, gradients, strict=True):
             if self.chart is not None:
                 g[batch.index] = _charts_on(self.chart, batch, path).end_gradient(gradient)
                 continue
@@ -262,7 +270,7 @@ class DiscreteLagrangian:
         """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
         known = jets or self.jets(path)
         terms: Sequence[PointTerms | None] = forces or [None] * len(known)
-        triples = zip(self._batches, known, terms, strict=True)
+        triples = zip(self.batches, known, terms, strict=True)
         return [self.lagrangian.gradient(*jet, t=b.t, terms=term) for b, jet, term in triples]
 
     def duration_derivative(
@@ -289,10 +297,11 @@ class DiscreteLagrangian:
     def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
         if self.chart is None:
             return None
-        return [_charts_on(self.chart, batch, path) for batch in self._batches]
+        return [_charts_on(self.chart, batch, path) for batch in self.batches]
 
     @cached_property
-    def _batches(self) -> list[IntervalBatch]:
+    def batches(self) -> list[IntervalBatch]:
+        """The intervals by their schemes, as they are evaluated."""
         return list(interval_batches(self.grid))
 
 

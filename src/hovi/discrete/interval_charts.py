@@ -60,6 +60,14 @@ class IntervalCharts:
         """As `nodal_gradient`, in (q0, h v0, q1, h v1) only and without cancellation."""
         return self.compiled(self.scheme.regular_table).pull_gradient(gradient, True)[:, :4]
 
+    def nodal_moments(self, tests: Array, jacobian: Array) -> Array:
+        """The gradients (B, K, p, m, n) of h sum_q w_q t_q y in nodal columns.
+
+        tests: test functions t at the points, shape (K, Q). jacobian: of the outputs y in
+        (q, v, a) at the points, shape (P, p, 3 n).
+        """
+        return self.compiled(self.scheme.nodal_table).pull_moments(tests, jacobian)
+
     def point_steps(self, step: Array) -> Array:
         """Change of (q, v, a) at the points in a nodal step (B, m, n), (B, Q, 3, n)."""
         return self.compiled(self.scheme.nodal_table).push_steps(step)

@@ -85,6 +85,21 @@ class Scheme:
         """
         return np.asarray(np.linalg.pinv(legendre(2 * self.points - 1, len(self.points) - 1).T))
 
+    @cached_property
+    def moments(self) -> Array | None:
+        """Test functions of equations along the motion: r + k moments hold in every interval.
+
+        A curve with r inner modes has r + k coefficients in an interval, and at more points than
+        that equations would lock it. P_0 .. P_{r+k-1}, orthonormal shifted Legendre polynomials, at
+        the points, shape (r + k, Q). None where equations hold at every point: where there are at
+        most r + k, or they are not on the curve of the interval (Taylor schemes).
+        """
+        count = self.inner_modes + self.derivatives
+        if len(self.points) <= count or not np.array_equal(self.table, self.rows(self.points)):
+            return None
+        degrees = np.arange(count)[:, None]
+        return np.sqrt(2 * degrees + 1) * legendre(2 * self.points - 1, count - 1)
+
     def rows(self, s: Array) -> Array:
         """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).
 

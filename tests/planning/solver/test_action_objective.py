@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,8 +15,13 @@ from hovi.discrete.state import State
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.solver import guess_path
+from hovi.planning.task_file.reading import load_task
+from hovi.robot.bundled_models import example
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from oracles.finite_differences import derivative
 from samples.random_paths import random_path
 
 Array = npt.NDArray[np.float64]
@@ -174,6 +181,79 @@ def test_multipliers_of_the_last_step_keep_value_and_gradient(
     np.testing.assert_allclose(lifted.gradient, fresh.gradient, rtol=1e-12, atol=1e-12)
     difference = np.abs(lifted.intervals.hessian - fresh.intervals.hessian).max()
     assert 0 < difference < 1e-2 * np.abs(fresh.intervals.hessian).max()
+
+
+# With equality constraints: passive joints, at points and as moments
+
+
+PASSIVE = {
+    "arm": ("pendubot_swing_up", ("galerkin-1x5",) * 4),
+    "arm, at points": ("pendubot_swing_up", ("galerkin-1",) * 4),
+    "floating base": ("spacecraft_reorients", ("galerkin-1x5",) * 4),
+    "several schemes": (
+        "spacecraft_reorients",
+        ("galerkin-2x6", "hermite-simpson", "galerkin-1", "galerkin-0x4"),
+    ),
+}
+
+
+@pytest.fixture(params=PASSIVE)
+def penalized(request: pytest.FixtureRequest) -> tuple[ActionObjective, DiscretePath]:
+    """An augmented Lagrangian with random multipliers, and a random path."""
+    name, schemes = PASSIVE[request.param]
+    task, random = load_task(example(name)), np.random.default_rng(9)
+    grid = Grid(np.array([0.2, 0.3, 0.25, 0.15]), tuple(by_name(each) for each in schemes))
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    problem = TrajectoryProblem(ld, task.start, task.goal)
+    known = Multipliers.zero(problem, 7.0, 1.0)
+    forces = []
+    for zero in known.torque:
+        force = zero.copy()
+        force[:, problem.passive] = random.normal(size=(len(zero), len(problem.passive)))
+        forces.append(force)
+    action = ActionObjective(problem, multipliers=dataclasses.replace(known, torque=forces))
+    path = guess_path(problem, "cubic")
+    model = action.model(path, None, None)
+    return action, action.retract(path, 0.05 * model.random_vector(0), model)
+
+
+def test_derivatives_of_the_augmented_lagrangian_are_exact(
+    penalized: tuple[ActionObjective, DiscretePath],
+) -> None:
+    action, path = penalized
+    model = action.model(path, None, None)
+    for seed in range(3):
+        s = model.random_vector(seed)
+        s /= np.sqrt(np.vdot(s, model.metric_product(s)))
+
+        def along(e: Array, s: Array = s) -> Array:
+            return np.array(action.value(action.retract(path, e[0] * s, model)))
+
+        slope = derivative(along, np.zeros(1), 1e-3)
+        bend = derivative(lambda x, f=along: derivative(f, x, 1e-2), np.zeros(1), 1e-2)
+        local = model.gather(s)
+        exact = np.einsum("kia,kijab,kjb->", local, model.intervals.hessian, local)
+        size = abs(action.value(path))
+        assert np.vdot(model.gradient, s) == pytest.approx(
+            float(slope[0]), rel=1e-6, abs=1e-9 * size
+        )
+        assert exact == pytest.approx(float(bend[0, 0]), rel=1e-5, abs=1e-6 * size)
+
+
+def test_predicted_torques_keep_value_and_gradient_of_the_augmented_lagrangian(
+    penalized: tuple[ActionObjective, DiscretePath],
+) -> None:
+    action, path = penalized
+    model = action.model(path, None, None)
+    step = 1e-3 * model.random_vector(0)
+    moved = action.retract(path, step, model)
+    lifted = action.model(moved, model, step)
+    fresh = ActionObjective(action.problem, multipliers=action.multipliers)
+    exact = fresh.model(moved, None, None)
+    scale = np.abs(exact.gradient).max()
+    np.testing.assert_allclose(lifted.gradient, exact.gradient, rtol=0, atol=1e-12 * scale)
+    difference = np.abs(lifted.intervals.hessian - exact.intervals.hessian).max()
+    assert 0 < difference < 1e-2 * np.abs(exact.intervals.hessian).max()
 
 
 def test_relative_size_is_the_largest_change_of_all_that_moves(

@@ -24,6 +24,7 @@ from hovi.planning.problem.goals import Via, goal_state, via_conditions
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import NodeCondition
+from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene, require_known_joints
@@ -121,7 +122,7 @@ class TrajectoryProblem:
             require_regular(scheme)
         problem = copy.copy(self)  # nothing else depends on the grid
         object.__setattr__(problem, "ld", ld)
-        for name in ("structure", "finer"):
+        for name in ("structure", "torque_moments", "finer"):
             problem.__dict__.pop(name, None)
         return problem
 
@@ -172,6 +173,11 @@ class TrajectoryProblem:
     def passive(self) -> npt.NDArray[np.intp]:
         """Indices in v of the passive joints."""
         return self.scene.passive_coordinates
+
+    @cached_property
+    def torque_moments(self) -> TorqueMoments | None:
+        """How passive torques vanish in an interval: as moments; None if at all points."""
+        return TorqueMoments.of(self.ld, self.passive)
 
     @property
     def constrained(self) -> bool:

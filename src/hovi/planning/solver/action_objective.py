@@ -5,6 +5,7 @@ With equality constraints it is their augmented Lagrangian, see hovi.planning.so
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Literal
 
 import numpy as np
@@ -56,6 +57,7 @@ class ActionObjective(Objective[DiscretePath]):
     ) -> None:
         self.problem = problem
         self.multipliers = multipliers
+        self.moments = problem.torque_moments
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= MAX_BAND_INTERVALS
@@ -106,6 +108,9 @@ class ActionObjective(Objective[DiscretePath]):
             value += self.lagrangian.integral(outputs[i], jet, t, weights)
             if self.multipliers is not None:
                 value += float(weights @ np.vecdot(self.multipliers.torque[i], outputs[i]))
+                if self.moments is not None:
+                    rho = self.multipliers.torque_penalty
+                    value += 0.5 * rho * self.moments.squares(outputs[i], i)
         if self.multipliers is not None:
             rho = self.multipliers.node_penalty
             residuals = node_residuals(self.problem, x)
@@ -116,14 +121,26 @@ class ActionObjective(Objective[DiscretePath]):
     def output_slope(self, outputs: Array, batch: int) -> Array:
         """d value / dy at the points of a batch: R y plus the multipliers."""
         slope = self.lagrangian.output_slope(outputs)
-        return slope if self.multipliers is None else slope + self.multipliers.torque[batch]
+        return slope if self.multipliers is None else slope + self._force(outputs, batch)
+
+    def _force(self, outputs: Array, batch: int) -> Array:
+        """The multipliers at the points of a batch, plus the penalty of moments."""
+        assert self.multipliers is not None
+        force = self.multipliers.torque[batch]
+        if self.moments is None:
+            return force
+        projected = self.moments.projected(outputs, batch)
+        return self.multipliers.plus_penalty(force, projected, self.problem.passive)
 
     def residuals(self, x: DiscretePath) -> Residuals:
         """Residuals of the equality constraints."""
         torques = self.outputs(x)
         largest = max(float(np.max(np.abs(tau))) for tau in torques)
         largest = max(largest, TORQUE_FLOOR * self.problem.inertial_torque)
-        passive = [tau[:, self.problem.passive] for tau in torques]
+        if self.moments is None:
+            passive = [tau[:, self.problem.passive] for tau in torques]
+        else:
+            passive = [self.moments.projected(tau, i) for i, tau in enumerate(torques)]
         return Residuals(passive, node_residuals(self.problem, x), largest)
 
     @property
@@ -141,16 +158,21 @@ class ActionObjective(Objective[DiscretePath]):
         self, x: DiscretePath, previous: QuadraticModel | None, step: Array | None
     ) -> QuadraticModel:
         """The quadratic model at x, its curvature weighted by the predicted outputs."""
-        curvatures = None
         if previous is not None and step is not None and self._expansion is not None:
-            local = previous.gather(step)
-            curvatures = self.ld.predict(self._expansion, local, self.coordinates)
-        if curvatures is None:
+            curvatures = self._predicted_slopes(self._expansion, previous.gather(step))
+        else:
             curvatures = [self.output_slope(y, i) for i, y in enumerate(self.outputs(x))]
-        elif self.multipliers is not None:
-            pairs = zip(curvatures, self.multipliers.torque, strict=True)
-            curvatures = [slope + more for slope, more in pairs]
         return self.model_with(x, curvatures, None)
+
+    def _predicted_slopes(self, expansion: Expansion, step: Array) -> list[Array]:
+        """`output_slope` of the outputs that a step of an expansion predicts, per batch."""
+        if self.moments is not None:
+            outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
+            return [self.output_slope(y, i) for i, y in enumerate(outputs)]
+        slopes = self.ld.predict(expansion, step, self.coordinates)
+        if self.multipliers is None:
+            return slopes
+        return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
 
     def model_with(
         self,
@@ -162,11 +184,14 @@ class ActionObjective(Objective[DiscretePath]):
 
         curvatures: weights per batch, multipliers of constraints included. terms: at the points.
         """
-        if self.multipliers is not None:
-            terms = self.multipliers.added_to(terms)
+        known = self.multipliers
+        if known is not None:
+            terms = self._at_points(x, known).added_to(terms)
         self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
-        if self.multipliers is not None:
-            self._add_conditions(x, self._expansion, self.multipliers)
+        if known is not None:
+            self._add_conditions(x, self._expansion, known)
+        if known is not None and self.moments is not None:
+            self.moments.add_squares(self._expansion, known.torque_penalty)
         intervals = IntervalSum(
             self._expansion.gradient,
             self._expansion.hessian,
@@ -190,6 +215,13 @@ class ActionObjective(Objective[DiscretePath]):
         metric = self.structure.metric["regular"]
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
+
+    def _at_points(self, x: DiscretePath, known: Multipliers) -> Multipliers:
+        """The multipliers with the penalty of moments at x, which is no weight of torques."""
+        if self.moments is None:
+            return known
+        forces = [self._force(y, i) for i, y in enumerate(self.outputs(x))]
+        return dataclasses.replace(known, torque=forces)
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """Add the terms of the conditions to the intervals that contain their nodes."""
@@ -225,8 +257,11 @@ class ActionObjective(Objective[DiscretePath]):
 
 
 def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
-    """The discrete Lagrangian with the penalty as the weight of the passive joints' torques."""
-    if len(problem.passive) == 0:
+    """The discrete Lagrangian with the penalty as the weight of the passive joints' torques.
+
+    That of their moments couples the points of an interval, and is no weight.
+    """
+    if len(problem.passive) == 0 or problem.torque_moments is not None:
         return problem.ld
     weight = problem.ld.lagrangian.output_weight.copy()
     weight[problem.passive] = multipliers.torque_penalty

@@ -79,14 +79,17 @@ class Multipliers:
 
     def updated(self, residuals: Residuals, passive: npt.NDArray[np.intp]) -> Multipliers:
         """lambda + rho c, the first-order estimate of the multipliers."""
-        torque = []
-        for old, tau in zip(self.torque, residuals.torque, strict=True):
-            new = old.copy()
-            new[:, passive] += self.torque_penalty * tau
-            torque.append(new)
+        torques = zip(self.torque, residuals.torque, strict=True)
+        torque = [self.plus_penalty(force, tau, passive) for force, tau in torques]
         pairs = zip(self.nodes, residuals.nodes, strict=True)
         nodes = [mu + self.node_penalty * c for mu, c in pairs]
         return dataclasses.replace(self, torque=torque, nodes=nodes)
+
+    def plus_penalty(self, force: Array, tau: Array, passive: npt.NDArray[np.intp]) -> Array:
+        """A force at points (P, nv) plus rho tau of the passive joints (P, passive)."""
+        force = force.copy()
+        force[:, passive] += self.torque_penalty * tau
+        return force
 
     @property
     def forces(self) -> list[PointTerms]:

@@ -75,6 +75,17 @@ class CompiledCharts:
         native.pull_gradient(*self._arrays, g, regular, pulled, self.portable)
         return pulled
 
+    def pull_moments(self, tests: Array, jacobian: Array) -> Array:
+        """Gradients of h sum_q w_q t_q y, (B, K, p, m, n), of outputs y and test functions t.
+
+        tests: t at the points, shape (K, Q). jacobian: of the outputs in (q, v, a), (P, p, 3 n).
+        """
+        B, m, n = self._size
+        pulled = np.empty((B, len(tests), jacobian.shape[1], m, n))
+        rows = np.ascontiguousarray(tests), np.ascontiguousarray(jacobian)
+        native.pull_moments(*self._arrays, *rows, pulled, self.portable)
+        return pulled
+
     def push_steps(self, step: Array) -> Array:
         """Change of (q, v, a) at the points, (B, Q, 3, n), in a step of the columns (B, m, n)."""
         B, _, n = self._size

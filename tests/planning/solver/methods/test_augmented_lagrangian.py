@@ -1,4 +1,4 @@
-"""Passive joints: zero torque at the points, orders of convergence, forward simulation."""
+"""Passive joints: zero torque at points or as moments, orders of convergence, simulation."""
 
 from __future__ import annotations
 
@@ -14,18 +14,53 @@ from hovi.errors import SceneError
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import unmet_sentence
 from hovi.planning.solver.multipliers import Residuals
+from oracles.ipopt_oracle import least_action
+from oracles.pontryagin_oracle import Extremal, extremal
 
 ACROBOT, CART_POLE, PENDUBOT = "acrobot_swing_up", "cart_pole_swing_up", "pendubot_swing_up"
+SPACECRAFT = "spacecraft_reorients"
+MORE_POINTS = [(1, 5), (1, 6), (1, 8), (2, 6), (2, 8)]
+"""Inner modes, and points of which there are more than modes and ends."""
 
 
 @cache
-def swing_up(scene: str, intervals: int, modes: int, near: int | None = None) -> hovi.Solution:
-    """The swing-up without limits, from the cubic guess or the motion on `near` intervals."""
+def problem_on(
+    scene: str, intervals: int, scheme: str, duration: float | None = None
+) -> hovi.TrajectoryProblem:
+    """The problem of a scene without its limits."""
     task = hovi.load_task(hovi.example(scene))
-    grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.galerkin(modes))
+    grid = hovi.Grid.uniform(duration or task.duration, intervals, hovi.schemes.by_name(scheme))
     ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    return hovi.TrajectoryProblem(ld, task.start, task.goal)
+
+
+@cache
+def swing_up(
+    scene: str, intervals: int, modes: int, near: int | None = None, points: int | None = None
+) -> hovi.Solution:
+    """The motion without limits, from the cubic guess or the motion on `near` intervals."""
+    scheme = hovi.schemes.galerkin(modes, points=points).name
     guess = "cubic" if near is None else swing_up(scene, near, 2).trajectory
-    return hovi.solve(hovi.TrajectoryProblem(ld, task.start, task.goal), guess)
+    return hovi.solve(problem_on(scene, intervals, scheme), guess)
+
+
+@cache
+def continuous_optimum(scene: str) -> Extremal:
+    """The motion by Pontryagin's equations, which know no grid, no moments and no multipliers."""
+    near = swing_up(scene, 80, 3, near=40)
+    motion, problem = near.trajectory, near.problem
+    p, p_tilde = motion.momenta.transpose(1, 2, 0)
+    guess = np.concatenate([motion.q.T, motion.v.T, p, p_tilde])
+    model, passive = problem.scene.model, problem.passive
+    return extremal(model, problem.boundary, motion.t, guess, 1e-8, passive)
+
+
+def samples(solution: hovi.Solution, per_interval: int = 9) -> tuple[np.ndarray, np.ndarray]:
+    """Times along the curve, both limits at nodes among them, and the torques there."""
+    motion = solution.trajectory
+    k = np.repeat(np.arange(motion.grid.intervals), per_interval)
+    s = np.tile(np.linspace(0.0, 1.0, per_interval), motion.grid.intervals)
+    return motion.t[k] + s * motion.grid.steps[k], motion.sample_intervals(k, s).tau
 
 
 def miss(solution: hovi.Solution) -> float:
@@ -51,15 +86,37 @@ def miss(solution: hovi.Solution) -> float:
     return largest
 
 
+@pytest.mark.parametrize("points", [4, 8])
 @pytest.mark.parametrize("scene", [ACROBOT, CART_POLE, PENDUBOT])
-def test_a_passive_joint_takes_no_torque_at_the_quadrature_points(scene: str) -> None:
-    solution = swing_up(scene, 40, 2)
+def test_a_passive_joint_takes_no_torque_at_points_or_in_moments(scene: str, points: int) -> None:
+    solution = swing_up(scene, 40, 2, points=points)
     assert solution.status is hovi.Status.MINIMUM
     assert solution.n_neg == 0
     problem = solution.problem
     residuals = ActionObjective(problem).residuals(solution.trajectory.path)
     assert residuals.torque_share < 1e-9
     assert max(np.max(np.abs(tau)) for tau in residuals.torque) > 0.0  # measured, not masked
+    (x,) = problem.ld.jets(solution.trajectory.path)
+    tau = problem.ld.lagrangian.output(*x)[:, problem.passive].reshape(-1, points)
+    scheme = problem.grid.schemes[0]
+    P = np.polynomial.legendre.legvander(2 * scheme.points - 1, 3)
+    largest = residuals.largest_torque
+    np.testing.assert_allclose(tau * scheme.weights @ P, 0.0, rtol=0, atol=1e-9 * largest)
+    assert (np.abs(tau).max() < 1e-9 * largest) == (points == 4)
+
+
+@pytest.mark.parametrize(
+    ("scene", "modes", "points"),
+    [(CART_POLE, 1, 5), (CART_POLE, 2, 8), (PENDUBOT, 1, 8), (PENDUBOT, 2, 6)],
+)
+def test_on_a_coarse_grid_ipopt_finds_the_same_minimum(scene: str, modes: int, points: int) -> None:
+    """Ipopt has the moments of the passive torque as equations, formed in CasADi."""
+    solution = swing_up(scene, 10, modes, 40, points)
+    cost, nodes = least_action(solution.problem, solution.trajectory.path, move=1e-4)
+    motion = solution.trajectory
+    assert solution.cost == pytest.approx(cost, rel=1e-8)
+    ours = np.hstack([motion.q, motion.v])[1:-1]
+    np.testing.assert_allclose(ours, nodes, rtol=0, atol=1e-5 * np.abs(nodes).max())
 
 
 @pytest.mark.parametrize("modes", [0, 1, 2])
@@ -77,17 +134,71 @@ def test_cost_and_nodes_of_a_cart_pole_converge_at_the_order_of_the_scheme(modes
     assert slopes[1] > order - 0.3
 
 
-def test_the_simulated_cart_pole_deviates_by_the_order_of_the_scheme() -> None:
+@pytest.mark.parametrize(("modes", "points"), MORE_POINTS)
+@pytest.mark.parametrize("scene", [CART_POLE, PENDUBOT])
+def test_with_more_points_the_cost_converges_to_the_continuous_optimum(
+    scene: str, modes: int, points: int
+) -> None:
+    """Zero torque at all of these points would lock the motion, with a cost up to 65 % too high."""
+    optimum, order = continuous_optimum(scene).cost, 2 * (modes + 2)
+    coarse, *counts = (10, 80, 160) if modes == 1 else (10, 40, 80)
+    errors = [
+        abs(swing_up(scene, N, modes, 40, points).cost / optimum - 1) for N in (coarse, *counts)
+    ]
+    assert errors[0] < (0.015 if modes == 1 else 0.003)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.3)
+
+
+@pytest.mark.parametrize(("modes", "points"), MORE_POINTS)
+def test_with_more_points_the_cost_of_a_floating_robot_keeps_its_order(
+    modes: int, points: int
+) -> None:
+    fine = swing_up(SPACECRAFT, 32, 3)
+    costs = [swing_up(SPACECRAFT, N, modes, 16, points).cost for N in (8, 32)]
+    errors = np.abs(np.array(costs) / fine.cost - 1)
+    assert 0.5 * np.log2(errors[0] / errors[1]) == pytest.approx(2 * (modes + 2), abs=0.3)
+
+
+@pytest.mark.parametrize(("modes", "points"), [(1, 3), (1, 5), (1, 8), (2, 4), (2, 6), (2, 8)])
+def test_the_torques_between_the_points_converge_with_the_acceleration(
+    modes: int, points: int
+) -> None:
+    """To those of Pontryagin's equations, and at the passive joint to zero."""
+    optimum = continuous_optimum(CART_POLE)
+    errors, passive = [], []
+    for N in (40, 80, 160):
+        solution = swing_up(CART_POLE, N, modes, 40, points)
+        t, tau = samples(solution)
+        errors.append(np.max(np.abs(tau - optimum.tau(t))))
+        passive.append(np.max(np.abs(tau[:, solution.problem.passive])))
+    for sizes in (errors, passive):
+        order = 0.5 * np.log2(sizes[0] / sizes[-1])
+        assert order == pytest.approx(modes + 2, abs=0.3)
+
+
+def test_a_cubic_by_simpsons_rule_does_not_lock() -> None:
+    """Three points an interval, and two coefficients."""
+    optimum = continuous_optimum(CART_POLE).cost
+    problems = [problem_on(CART_POLE, N, "hermite-simpson") for N in (40, 80, 160)]
+    near = swing_up(CART_POLE, 40, 2).trajectory
+    errors = [hovi.solve(problem, near).cost / optimum - 1 for problem in problems]
+    slopes = np.log2(np.divide(errors[:-1], errors[1:]))
+    np.testing.assert_allclose(slopes, 4.0, rtol=0, atol=0.3)
+
+
+@pytest.mark.parametrize("points", [3, 5])
+def test_the_simulated_cart_pole_deviates_by_the_order_of_the_scheme(points: int) -> None:
     """Collocation at s Gauss points has a local error of h^(2 s + 1)."""
-    misses = [miss(swing_up(CART_POLE, N, 1, near=40)) for N in (20, 40, 80)]
+    misses = [miss(swing_up(CART_POLE, N, 1, 40, points)) for N in (20, 40, 80)]
     slopes = np.log2(np.divide(misses[:-1], misses[1:]))
     assert np.all(slopes > 5.7)
     assert misses[-1] < 1e-8
 
 
-def test_the_momenta_of_a_passive_motion_agree_on_both_sides_of_a_node() -> None:
+@pytest.mark.parametrize("points", [4, 8])
+def test_the_momenta_of_a_passive_motion_agree_on_both_sides_of_a_node(points: int) -> None:
     """The discrete Euler-Lagrange equations hold with the multipliers' terms in L_d."""
-    solution = swing_up(CART_POLE, 40, 2)
+    solution = swing_up(CART_POLE, 40, 2, points=points)
     problem = solution.problem
     d = problem.ld.derivatives(solution.trajectory.path, solution.forces)
     jump = d[1:, :2] + d[:-1, 2:]
@@ -96,9 +207,22 @@ def test_the_momenta_of_a_passive_motion_agree_on_both_sides_of_a_node() -> None
     assert np.max(np.abs(without[1:, :2] + without[:-1, 2:])) > 1e-2 * np.max(np.abs(d))
 
 
-def test_the_hamiltonian_of_a_passive_motion_is_constant_at_its_nodes() -> None:
+@pytest.mark.parametrize("points", [4, 8])
+def test_the_cost_changes_with_the_duration_as_the_hamiltonian_says(points: int) -> None:
+    solution = swing_up(CART_POLE, 40, 2, points=points)
+    scheme, T, step = solution.problem.grid.schemes[0].name, solution.trajectory.duration, 1e-3
+    costs = [
+        hovi.solve(problem_on(CART_POLE, 40, scheme, T + change), solution.trajectory).cost
+        for change in (-step, step)
+    ]
+    slope = (costs[1] - costs[0]) / (2 * step)
+    assert solution.duration_derivative == pytest.approx(slope, rel=1e-4)
+
+
+@pytest.mark.parametrize("points", [4, 8])
+def test_the_hamiltonian_of_a_passive_motion_is_constant_at_its_nodes(points: int) -> None:
     """With p~ = M (R tau + lambda), the torque and the multiplier at a node are M^-1 p~."""
-    solution = swing_up(CART_POLE, 80, 2, near=40)
+    solution = swing_up(CART_POLE, 80, 2, 40, points)
     motion, scene = solution.trajectory, solution.problem.scene
     data, (passive,) = scene.model.createData(), scene.passive_coordinates
     H, size = [], 0.0
@@ -113,11 +237,18 @@ def test_the_hamiltonian_of_a_passive_motion_is_constant_at_its_nodes() -> None:
     assert np.ptp(H) < 1e-6 * size
 
 
-def test_an_underactuated_motion_keeps_its_limits() -> None:
+@pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-2x8"])
+def test_an_underactuated_motion_keeps_its_limits(scheme: str) -> None:
     task = hovi.load_task(hovi.example(CART_POLE))
     limits = {"q": {"slide": [-0.1, 1.1]}}
     solution = hovi.plan(
-        task.scene, task.start, task.goal, task.duration, intervals=40, limits=limits
+        task.scene,
+        task.start,
+        task.goal,
+        task.duration,
+        intervals=40,
+        scheme=hovi.schemes.by_name(scheme),
+        limits=limits,
     )
     assert solution.success, solution.message
     slide = solution.trajectory.sample(np.linspace(0, task.duration, 2000)).q[:, 0]
