@@ -33,6 +33,9 @@ MAX_CHART_TURN = 1.4 * np.pi
 """Turn of an orientation within an interval, in [rad], above which the value is infinite."""
 TORQUE_FLOOR = 1e-4
 """Lower bound of the torque scale for residuals, as a share of the inertial torque M / T^2."""
+CHART_TORQUE_FLOOR = 2e-5
+"""The same with charts, as a share of M |q| / h^2: rounding of the nodes moves torques by 5e-16 of
+it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
 
@@ -135,13 +138,21 @@ class ActionObjective(Objective[DiscretePath]):
     def residuals(self, x: DiscretePath) -> Residuals:
         """Residuals of the equality constraints."""
         torques = self.outputs(x)
-        largest = max(float(np.max(np.abs(tau))) for tau in torques)
-        largest = max(largest, TORQUE_FLOOR * self.problem.inertial_torque)
+        largest = max(self._least_torque(x), *(float(np.max(np.abs(tau))) for tau in torques))
         if self.moments is None:
             passive = [tau[:, self.problem.passive] for tau in torques]
         else:
             passive = [self.moments.projected(tau, i) for i, tau in enumerate(torques)]
         return Residuals(passive, node_residuals(self.problem, x), largest)
+
+    def _least_torque(self, x: DiscretePath) -> float:
+        """Lower bound of the torque scale for residuals, in [N m]."""
+        inertial, grid = self.problem.inertial_torque, self.problem.grid
+        if self.ld.chart is None:  # z is stored, and rounding in it is one of accelerations
+            return TORQUE_FLOOR * inertial
+        size = max(1.0, float(np.abs(x.q).max()))
+        shortest = float(grid.steps.min()) / grid.duration
+        return max(TORQUE_FLOOR, CHART_TORQUE_FLOOR * size / shortest**2) * inertial
 
     @property
     def lagrangian(self) -> Lagrangian:

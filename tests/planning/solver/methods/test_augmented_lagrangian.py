@@ -195,6 +195,18 @@ def test_the_simulated_cart_pole_deviates_by_the_order_of_the_scheme(points: int
     assert misses[-1] < 1e-8
 
 
+@pytest.mark.parametrize(("intervals", "points"), [(32, 4), (48, 8)])
+def test_a_quadruped_in_free_fall_is_solved_on_fine_grids(intervals: int, points: int) -> None:
+    """Rounding moves the torques of its base by more than 1e-10 of those of its legs."""
+    solution = swing_up("solo_in_flight", intervals, 2, points=points)
+    assert solution.success, solution.message
+    assert solution.cost == pytest.approx(swing_up("solo_in_flight", 16, 3).cost, rel=1e-10)
+    residuals = ActionObjective(solution.problem).residuals(solution.trajectory.path)
+    passive = max(np.max(np.abs(tau)) for tau in residuals.torque)
+    _, tau = samples(solution)
+    assert passive < 1e-8 * np.max(np.abs(tau))
+
+
 @pytest.mark.parametrize("points", [4, 8])
 def test_the_momenta_of_a_passive_motion_agree_on_both_sides_of_a_node(points: int) -> None:
     """The discrete Euler-Lagrange equations hold with the multipliers' terms in L_d."""
