@@ -2,8 +2,8 @@
 A joint without a motor
 =======================
 
-A cart swings up a pole on a passive hinge. The torque of the hinge vanishes at every quadrature
-point of the discrete motion, and an independent integrator arrives at the same nodes.
+A cart swings up a pole on a passive hinge. The torque of the hinge vanishes in every interval of
+the discrete motion, and an independent integrator arrives at the same nodes.
 """
 
 from __future__ import annotations

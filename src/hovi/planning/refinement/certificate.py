@@ -128,7 +128,7 @@ def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: Curve
     if not solution.success:
         raise InputError(f"the motion is no minimum but ended in {solution.status}")
     if problem.constrained:
-        raise InputError("passive joints and conditions are met at points only")
+        raise InputError("equations hold at points, or in moments, only")
     if problem.distances is not None:
         raise InputError("the distances along the curve are known to a tolerance only")
     if problem.limits is not None and problem.limited:
