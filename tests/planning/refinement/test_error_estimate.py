@@ -204,6 +204,27 @@ def test_the_distance_of_a_motion_from_itself_is_zero(reach_reference: Solution)
     assert none.cost == none.angle == none.slide == none.largest_tip == none.largest_tau == 0.0
 
 
+@pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-1x5", "galerkin-2x8"])
+def test_the_error_of_an_underactuated_motion_is_estimated(two_link: Robot, scheme: str) -> None:
+    """The finer motion has its own moments of the passive torque."""
+    acrobot = Scene(two_link, effects=[Gravity(9.8)], passive=["shoulder"])
+    goal = State(np.add(HANG, [0.6, -1.0]))
+
+    def on(intervals: int, name: str) -> TrajectoryProblem:
+        grid = Grid.uniform(1.5, intervals, by_name(name))
+        ld = DiscreteLagrangian(acrobot.effort_lagrangian(), grid)
+        return TrajectoryProblem(ld, State(HANG), goal)
+
+    fine = solve(on(64, "galerkin-3"))
+    coarse = solve(on(16, scheme), fine.trajectory)
+    found = estimate_error(coarse)
+    assert found is not None
+    true = true_error(coarse, fine)
+    assert found.cost == pytest.approx(true.cost, rel=0.1)
+    assert found.angle == pytest.approx(true.angle, rel=0.2)
+    assert 1e-9 < true.cost < 1e-3
+
+
 def test_an_unknown_frame_and_another_duration_are_refused(
     arm_scene: Scene, reach_reference: Solution
 ) -> None:

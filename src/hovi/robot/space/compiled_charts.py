@@ -81,9 +81,10 @@ class CompiledCharts:
         tests: t at the points, shape (K, Q). jacobian: of the outputs in (q, v, a), (P, p, 3 n).
         """
         B, m, n = self._size
-        pulled = np.empty((B, len(tests), jacobian.shape[1], m, n))
-        rows = np.ascontiguousarray(tests), np.ascontiguousarray(jacobian)
-        native.pull_moments(*self._arrays, *rows, pulled, self.portable)
+        tests = np.ascontiguousarray(tests.reshape(-1, len(self.weights)))
+        rows = np.ascontiguousarray(jacobian.reshape(self.x.shape[1], -1, 3 * n))
+        pulled = np.empty((B, len(tests), rows.shape[1], m, n))
+        native.pull_moments(*self._arrays, tests, rows, pulled, self.portable)
         return pulled
 
     def push_steps(self, step: Array) -> Array:
