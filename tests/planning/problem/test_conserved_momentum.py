@@ -38,7 +38,7 @@ def momentum_map(solution: hovi.Solution) -> np.ndarray:
 
 
 def test_the_spacecraft_ends_turned_and_its_place_follows() -> None:
-    solution = reorientation(16)
+    solution = reorientation(16, modes=3)
     assert solution.success, solution.message
     motion = solution.trajectory
     goal = np.array(spacecraft().goal.q)
@@ -118,7 +118,7 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
 
 def test_a_redundant_goal_is_met() -> None:
     """All components are prescribed, consistently with free fall."""
-    free = reorientation(16)
+    free = reorientation(16, modes=3)
     end, problem = free.trajectory.q[-1], free.problem
     again = hovi.solve(problem.between(problem.start, hovi.State(end)), free.trajectory)
     assert again.success, again.message

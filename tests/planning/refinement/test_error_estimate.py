@@ -215,8 +215,8 @@ def test_the_error_of_an_underactuated_motion_is_estimated(two_link: Robot, sche
         ld = DiscreteLagrangian(acrobot.effort_lagrangian(), grid)
         return TrajectoryProblem(ld, State(HANG), goal)
 
-    fine = solve(on(64, "galerkin-3"))
-    coarse = solve(on(16, scheme), fine.trajectory)
+    fine = solve_on_grid(on(64, "galerkin-3"))
+    coarse = solve_on_grid(on(16, scheme), fine.trajectory)
     found = estimate_error(coarse)
     assert found is not None
     true = true_error(coarse, fine)

@@ -16,6 +16,11 @@ from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against, finer_than
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
+from hovi.planning.refinement.passive_torque import (
+    NEGLIGIBLE_SHARE,
+    PassiveTorque,
+    passive_torque,
+)
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
 
@@ -46,6 +51,7 @@ class Candidate:
     finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit, of
         the cost and of the integral along the curve; NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
+    passive: torques of passive joints along the curve; None without such joints.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
@@ -59,6 +65,7 @@ class Candidate:
     error: float = np.nan
     uncancelled: float = np.nan
     along: float = np.nan
+    passive: PassiveTorque | None = None
     contradicted: float = 0.0
     later: float = 0.0
 
@@ -68,19 +75,27 @@ class Candidate:
         finer = finer_than(solution) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
+        assert solution.problem is not None
         along = error_along(solution, finer)
+        passive = passive_torque(solution.problem, solution.trajectory)
         if tolerance.quantity is Quantity.COST:
             errors = _errors_of_cost(solution, finer, tolerance, along)
-            return cls(solution, tolerance, finer, *errors, along)
+            return cls(solution, tolerance, finer, *errors, along, passive)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
         error *= LIMITED_SAFETY_FACTOR if finer.problem.limited else 1.0
-        return cls(solution, tolerance, finer, error, error, along)
+        return cls(solution, tolerance, finer, error, error, along, passive)
 
     @property
     def within_tolerance(self) -> bool:
         """Whether the estimated error is within the tolerance, and the curve carries the motion."""
         accepted = _accepted(self.error, self.uncancelled, self.tolerance)
-        return self.finer is not None and accepted and self.along <= self._largest_along
+        carried = self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
+        return self.finer is not None and accepted and carried
+
+    @property
+    def passive_share(self) -> float:
+        """Largest relative torque of a passive joint along the motion."""
+        return 0.0 if self.passive is None else self.passive.share
 
     @property
     def is_resolved(self) -> bool:

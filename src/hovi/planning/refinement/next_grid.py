@@ -12,6 +12,7 @@ from hovi.planning.problem.tolerance import Quantity
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
+from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +29,8 @@ def next_grid(candidate: Candidate) -> Grid:
     assert problem is not None
     if finer is None:
         return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
-    demands, rho = _demands(candidate, finer), _decay(candidate, finer)
+    demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
+    rho = _decay(candidate, finer)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
     few = candidate.is_resolved or finer.problem.grid.inner_modes <= UNRESOLVED_MODES
@@ -68,6 +70,14 @@ def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
         scale = max(1.0, candidate.error / max(known.sum(), 1e-300))
         return [Demand(target / (N * np.maximum(scale * known, 1e-300)), 2)]
     return _demands_on_curve(candidate, finer, known)
+
+
+def _passive_demands(candidate: Candidate) -> list[Demand]:
+    """The reduction of passive torques that each interval needs."""
+    if candidate.passive is None:
+        return []
+    target = TARGET_SHARE * NEGLIGIBLE_SHARE
+    return [Demand(target / np.maximum(candidate.passive.by_interval, 1e-300), 1)]
 
 
 def _demands_on_curve(candidate: Candidate, finer: FinerSolution, known: Array) -> list[Demand]:

@@ -14,12 +14,12 @@ import numpy as np
 
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.motion_error import sample_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
 from hovi.planning.refinement.error_estimate import finer_than
+from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
 from hovi.planning.refinement.whirling import whirl
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -28,7 +28,7 @@ from hovi.system.blas_threads import one_blas_thread
 from hovi.system.interruption import interruptible
 
 RESOLVED = 0.01
-"""Largest relative difference of costs, and of torques that should vanish, for a success."""
+"""Largest relative difference of costs for a success."""
 NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
@@ -119,22 +119,17 @@ def _difference_along(solution: Solution) -> str:
             f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own "
             "curve"
         )
-    return _passive_torque(problem, trajectory)
+    return _passive_sentence(problem, trajectory)
 
 
-def _passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
+def _passive_sentence(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
     """The torque of a passive joint between the points; "" if it is negligible."""
-    if len(problem.passive) == 0:
-        return ""
-    tau = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).tau)
-    largest = tau.max(axis=0)
-    worst = int(problem.passive[np.argmax(largest[problem.passive])])
-    if largest[worst] <= RESOLVED * largest.max():
+    found = passive_torque(problem, trajectory)
+    if found is None or found.share <= NEGLIGIBLE_SHARE:
         return ""
     return (
-        f"joint {trajectory.coordinate_names[worst]!r} is passive, but carries up to "
-        f"{largest[worst]:.3g} N m between the quadrature points, where other joints carry at most "
-        f"{np.delete(largest, problem.passive).max(initial=0.0):.3g}"
+        f"joint {found.joint!r} is passive, but carries up to {found.torque:.3g} N m between the "
+        f"quadrature points, where other joints carry at most {found.largest:.3g}"
     )
 
 

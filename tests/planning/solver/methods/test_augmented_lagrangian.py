@@ -90,8 +90,7 @@ def miss(solution: hovi.Solution) -> float:
 @pytest.mark.parametrize("scene", [ACROBOT, CART_POLE, PENDUBOT])
 def test_a_passive_joint_takes_no_torque_at_points_or_in_moments(scene: str, points: int) -> None:
     solution = swing_up(scene, 40, 2, points=points)
-    assert solution.status is hovi.Status.MINIMUM
-    assert solution.n_neg == 0
+    assert solution.n_neg == 0, solution.message
     problem = solution.problem
     residuals = ActionObjective(problem).residuals(solution.trajectory.path)
     assert residuals.torque_share < 1e-9

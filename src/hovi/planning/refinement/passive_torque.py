@@ -1,0 +1,50 @@
+"""Torque of passive joints between the points at which, or the moments in which, it vanishes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.motion_error import sample_points
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.problem import TrajectoryProblem
+
+Array = npt.NDArray[np.float64]
+
+NEGLIGIBLE_SHARE = 0.01
+"""Largest torque of a passive joint along a motion, relative to that of the other joints."""
+
+
+class PassiveTorque(NamedTuple):
+    """Torques that should vanish.
+
+    by_interval: the largest of each interval, relative to the largest torque of the other joints,
+    (N,). joint: the one that carries most. torque, largest: of that joint, and of the others, in
+    the unit of each.
+    """
+
+    by_interval: Array
+    joint: str
+    torque: float
+    largest: float
+
+    @property
+    def share(self) -> float:
+        """The largest of by_interval."""
+        return float(self.by_interval.max())
+
+
+def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> PassiveTorque | None:
+    """The torques of passive joints along a motion; None without such joints, or others."""
+    passive, nv = problem.passive, trajectory.v.shape[1]
+    active = np.setdiff1d(np.arange(nv), passive)
+    if len(passive) == 0 or len(active) == 0:
+        return None
+    tau = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).tau)
+    largest = max(float(tau[:, active].max()), problem.inertial_torque * np.finfo(float).eps)
+    by_interval = tau[:, passive].max(axis=1).reshape(trajectory.grid.intervals, -1).max(axis=1)
+    worst = int(passive[np.argmax(tau[:, passive].max(axis=0))])
+    name = trajectory.coordinate_names[worst]
+    return PassiveTorque(by_interval / largest, name, float(tau[:, worst].max()), largest)
