@@ -392,6 +392,23 @@ def test_the_power_cost_is_the_energy_of_drives_without_recovery(two_link: Robot
     assert np.trapezoid(power, t) < 0.9 * np.trapezoid(spent, t)
 
 
+def test_a_joint_without_a_motor_has_no_power_to_pay_for(two_link: Robot) -> None:
+    """Its torque is zero on average only: at single points some of it may be left."""
+    random = np.random.default_rng(4)
+    q, v, a = random.normal(size=(3, 5, 2))
+    scenes = [
+        Scene(two_link, [Gravity(), PowerCost(weight)], passive=["elbow"])
+        for weight in ((2.0, 7.0), (2.0, 0.0))
+    ]
+    one, other = (scene.effort_lagrangian().evaluate(q, v, a) for scene in scenes)
+    for charged, free in zip(one, other, strict=True):
+        np.testing.assert_array_equal(charged, free)
+    t = np.zeros(5)
+    costs = [scene.graph()(q.T, v.T, a.T, t[None])[1].full() for scene in scenes]
+    np.testing.assert_allclose(costs[0].ravel(), one[0], rtol=1e-12)
+    np.testing.assert_array_equal(*costs)
+
+
 def test_effort_weights_match_those_of_the_planner(two_link: Robot) -> None:
     ends: tuple[Array, Array] = np.zeros(2), np.array([1.0, 0.5])
     plain, weighted = (

@@ -143,7 +143,7 @@ class Scene:
         tau = tau if added is None else tau + added
         weight = np.where(self._is_passive, 0.0, self.terms.effort_weight)
         cost = ca.dot(ca.DM(weight), tau**2) / 2
-        for more in (self.terms.potential, self.terms.effort_cost(tau, symbols.v)):
+        for more in (self.terms.potential, self._drive_cost(tau, symbols.v)):
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
@@ -211,8 +211,12 @@ class Scene:
     @cached_property
     def _torque_velocity_cost(self) -> TorqueVelocityCost | None:
         tau, v = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.v
-        phi = self.terms.effort_cost(tau, v)
+        phi = self._drive_cost(tau, v)
         return None if phi is None else TorqueVelocityCost(tau, v, phi, self.compile)
+
+    def _drive_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
+        """phi(tau, v) of the drives: what is left of a passive joint's torque costs nothing."""
+        return self.terms.effort_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau, v)
 
     def _derivatives(self) -> str:
         if self.analytic:
