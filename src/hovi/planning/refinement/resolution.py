@@ -142,6 +142,8 @@ def _compared(solution: Solution) -> tuple[Solution, str]:
     if finer is None:
         return solution, "from it no minimum was found on a finer grid"
     estimate = error_of_cost(solution, finer)
+    if solution.cost > finer.known:  # the cost of a free duration includes w T
+        estimate *= finer.known / solution.cost
     return _with_estimate(solution, estimate), _estimate_sentence(estimate)
 
 
