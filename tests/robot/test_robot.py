@@ -484,3 +484,16 @@ def test_the_description_says_if_planning_is_not_possible(tmp_path: Path, models
 def test_every_robot_can_be_described(two_link: Robot) -> None:
     for robot in (two_link, load_robot(pin.Model()), load_robot("tiago_dual")):
         assert robot.name in robot.describe()
+
+
+def test_a_joint_whose_link_has_its_name_can_be_locked() -> None:
+    """SO-100: joint and link 'gripper'; Pinocchio's own reduction refuses the name."""
+    free, locked = load_robot("so100"), load_robot("so100", locked=["gripper"])
+    assert locked.nv == free.nv - 1
+    assert sorted(locked.frame_names) == sorted(free.frame_names)
+    q = free.neutral()
+    reduced = np.delete(q, free.model.joints[free.model.getJointId("gripper")].idx_q)
+    mass = pin.crba(free.model, free.model.createData(), q)
+    kept = np.delete(np.arange(free.nv), free.model.joints[free.model.getJointId("gripper")].idx_v)
+    found = pin.crba(locked.model, locked.model.createData(), reduced)
+    np.testing.assert_allclose(np.triu(found), np.triu(mass)[np.ix_(kept, kept)], atol=1e-12)

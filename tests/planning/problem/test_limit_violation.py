@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.guess import path_on_grid
+from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.limit_violation import closeness, excess_along, worst_sentence
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +69,28 @@ def test_sliding_joints_are_measured_in_metres(panda: Robot) -> None:
     assert hand.coordinate_units[8].v == "m/s"
     assert hand.coordinate_units[8].tau == "N"
     assert panda.coordinate_units[0].tau == "N m"
+
+
+@pytest.mark.parametrize("tilt", [-2e-4, 2e-4])
+def test_the_highest_of_several_extremes_along_a_bound_is_found(
+    arm_scene: Scene, two_link: Robot, tilt: float
+) -> None:
+    """v = 0.9 + 0.1 T_9 + tilt: extremes of nearly one height, the highest between samples."""
+    T9 = np.polynomial.Chebyshev.basis(9, domain=[0, 1])
+    v = 0.9 + 0.1 * T9 + tilt * np.polynomial.Chebyshev.basis(1, domain=[0, 1])
+    q, a = v.integ(), v.deriv()
+
+    def curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return tuple(np.stack([f(t), 0 * t], axis=1) for f in (q, v, a))  # type: ignore[return-value]
+
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 1, galerkin(9)))
+    problem = TrajectoryProblem(ld, State([q(0.0), 0.0]), State([q(1.0), 0.0]))
+    ends = curve(np.array([0.0, 1.0]))
+    boundary = ends[0][0], ends[1][0], ends[0][1], ends[1][1]
+    path = path_on_grid(curve, ld.grid, boundary, two_link)
+    motion = problem.trajectory(path)
+    s = np.linspace(0.0, 1.0, 100_001)
+    np.testing.assert_allclose(motion.sample(s).v[:, 0], v(s), atol=1e-10)
+    limits = as_limits(two_link, {"base": "none", "v": [1.0, 1.0]})
+    excess = excess_along(motion, limits)
+    assert 2 * excess.upper[0, 1, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)

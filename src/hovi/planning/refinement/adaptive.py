@@ -19,7 +19,7 @@ from hovi.planning.refinement.error_estimate import FinerSolution, estimate_agai
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import interpolated_to, next_grid
-from hovi.planning.refinement.whirling import HOPELESS_RATIO, whirl
+from hovi.planning.refinement.whirling import whirl
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -168,10 +168,11 @@ class _Search:
         if self._at_floor(candidate):
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
-        if not (candidate.is_nearly_resolved or solution.problem.limited):
-            whirling = whirl(solution)
-            if whirling is not None and whirling.ratio > HOPELESS_RATIO:
-                return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
+        whirling = None if solution.problem.limited else whirl(solution)
+        if whirling is not None and whirling.is_hopeless(
+            candidate.is_nearly_resolved, len(self.rounds)
+        ):
+            return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
         if len(self.rounds) >= MAX_ROUNDS:

@@ -30,6 +30,9 @@ from hovi.planning.solver.solver import Solution, solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
+MAX_FINER_STEPS = 80
+"""Maximum number of steps to a finer solution: one that takes more is not near."""
+
 
 def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
     """The estimated error of a solution, over the whole motion.
@@ -109,7 +112,7 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
     found = nearby_minimum(objective, start, model, known)
     if found is not None:
         return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
-    solution = solve_on_grid(fine, start)
+    solution = solve_on_grid(fine, start, max_iterations=MAX_FINER_STEPS)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost

@@ -20,7 +20,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import whirl
+from hovi.planning.refinement.whirling import UNUSABLE_RATIO, whirl
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
@@ -59,7 +59,8 @@ def resolved(solution: Solution) -> Solution:
     (b) the solution on a finer grid, reached from this one, is a minimum whose cost differs by at
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved instead;
-    (c) that solution was found.
+    (c) that solution was found;
+    and if no light joint without limits whirls so fast that no grid can be trusted.
     Solutions of another status are returned unchanged.
     """
     if not solution.success or solution.problem is None:
@@ -69,6 +70,7 @@ def resolved(solution: Solution) -> Solution:
         solution, reason = _compared(solution)
     elif not reason:
         reason = _estimate_sentence(solution.error_estimate)
+    reason = reason or _whirling_sentence(solution)
     if reason:
         return _unresolved(solution, reason)
     assert solution.error_estimate is not None
@@ -145,6 +147,15 @@ def _compared(solution: Solution) -> tuple[Solution, str]:
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost
     return _with_estimate(solution, estimate), _estimate_sentence(estimate)
+
+
+def _whirling_sentence(solution: Solution) -> str:
+    """The speed of a joint that whirls beyond UNUSABLE_RATIO; "" if none does."""
+    assert solution.problem is not None
+    whirling = None if solution.problem.limited else whirl(solution)
+    if whirling is None or whirling.ratio <= UNUSABLE_RATIO:
+        return ""
+    return f"at {whirling.speed:.3g} rad/s a finer grid may find another motion"
 
 
 def _estimate_sentence(estimate: float | None) -> str:

@@ -20,10 +20,14 @@ from hovi.robot.mass_matrix import MassMatrix
 WHIRLING_RATIO = 10.0
 """Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
 2 for a smooth motion from rest to rest."""
+MAX_GRIDS = 5
+"""Number of grids that are tried for a whirling motion that none of them resolves."""
 LIGHT_SHARE = 0.03
 """Inertia of a joint that may whirl, relative to that of the heaviest."""
 HOPELESS_RATIO = 40.0
 """That ratio above which finer grids are not tried for a motion that its grid does not resolve."""
+UNUSABLE_RATIO = 80.0
+"""That ratio above which no grid is trusted: what one finds to be a minimum a finer one leaves."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,12 @@ class Whirl:
     speed: float
     ratio: float
     inertia: float
+
+    def is_hopeless(self, resolved: bool, grids: int) -> bool:
+        """Whether no finer grid is tried. resolved: whether the last of the grids nearly was."""
+        if resolved:
+            return self.ratio > UNUSABLE_RATIO
+        return self.ratio > HOPELESS_RATIO or grids >= MAX_GRIDS
 
     def __str__(self) -> str:
         """What it does, and what helps."""
@@ -56,7 +66,7 @@ def whirl(solution: Solution) -> Whirl | None:
     if len(joints) == 0:
         return None
     q, v = trajectory.q, np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
-    distance = np.abs(problem.robot.difference(q[:1], q[-1:])[0])
+    distance = np.abs(problem.robot.difference(q[:-1], q[1:]).sum(axis=0))  # with full turns
     ratio = v.max(axis=0) * trajectory.duration / (np.pi + distance)
     worst = int(joints[np.argmax(ratio[joints])])
     if ratio[worst] <= WHIRLING_RATIO:

@@ -1,0 +1,53 @@
+"""What the tolerance of limits adds to the cost's error, against solves with shifted limits."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hovi
+from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance
+from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.scene.scene import Scene
+
+HANG, GOAL = [-np.pi / 2, 0.0], [0.3, 0.7]
+
+
+def limited(scene: Scene, limits: dict[str, object]) -> Solution:
+    return hovi.plan(scene, HANG, GOAL, 1.0, limits=limits, intervals=24)
+
+
+@pytest.mark.parametrize(
+    "bounds", [{"v": 3.0}, {"tau": 8.0}, {"q": [[-1.6, 0.31], [-0.4, 0.71]]}, {"a": 20.0}]
+)
+def test_it_is_the_change_of_the_cost_with_a_shift_of_all_limits(
+    arm_scene: Scene, bounds: dict[str, object]
+) -> None:
+    found = limited(arm_scene, {"base": "none", **bounds})
+    problem = found.problem
+    assert problem is not None
+    assert problem.limits is not None
+    shift = 100 * SHIFT * problem.limits.tolerance
+    costs = []
+    for margin in (shift, 2 * shift):
+        tighter = dataclasses.replace(problem, limits=problem.limits.with_margin(margin))
+        costs.append(solve_on_grid(tighter, found.trajectory).cost)
+    change = (costs[1] - costs[0]) / found.cost
+    assert change > 1e-5
+    assert 100 * cost_of_tolerance(found) == pytest.approx(change, rel=0.2)
+
+
+def test_limits_that_are_not_reached_add_nothing(arm_scene: Scene) -> None:
+    found = limited(arm_scene, {"base": "none", "v": 50.0})
+    assert cost_of_tolerance(found) < 1e-9
+
+
+def test_a_tolerance_below_it_is_not_reached(arm_scene: Scene) -> None:
+    limits = {"base": "none", "v": 3.0}
+    found = hovi.plan(arm_scene, HANG, GOAL, 1.0, limits=limits, tolerance=1e-6)
+    assert found.accuracy is not None
+    assert not found.accuracy.reached
+    assert found.accuracy.error >= cost_of_tolerance(found) > 1e-6
+    assert "the tolerance of limits allows no smaller error" in found.message

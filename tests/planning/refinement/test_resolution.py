@@ -1,0 +1,175 @@
+"""Success means a minimum along the whole motion: judged by pin.rnea and finer grids."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.discrete.curve_integral import integral_along
+from hovi.discrete.grid import Grid
+from hovi.planning.refinement.resolution import NEARBY, RESOLVED
+from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.status import Status
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name
+
+FAST: dict[str, Any] = {"limits": "none", "processes": 1}
+PANDA_START = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7]
+PANDA_GOAL = [0.9, 0.3, -0.4, -1.2, 0.5, 2.2, -0.3]
+
+
+@pytest.fixture(scope="module")
+def panda() -> Scene:
+    fingers = ["panda_finger_joint1", "panda_finger_joint2"]
+    robot = hovi.load_robot("panda", locked=fingers)
+    return Scene(robot, [hovi.effects.Gravity()])
+
+
+def ur5() -> Scene:
+    return Scene(hovi.load_robot("ur5"), [hovi.effects.Gravity()])
+
+
+def integral(scene: Scene, trajectory: hovi.Trajectory) -> float:
+    """1/2 integral |tau|^2 along the interpolant, by pin.rnea and 24 Gauss points per interval."""
+    model = scene.robot.model.copy()
+    model.gravity.linear = np.array([0.0, 0.0, -9.81])
+    model.armature = np.zeros(model.nv)
+    data = model.createData()
+    x, w = np.polynomial.legendre.leggauss(24)
+    h = np.diff(trajectory.t)[:, None]
+    motion = trajectory.sample((trajectory.t[:-1, None] + h * (x + 1) / 2).ravel())
+    tau = [pin.rnea(model, data, *row) for row in zip(*motion[:3], strict=True)]
+    return float(np.sum((h * w / 2).ravel() * 0.5 * np.sum(np.square(tau), axis=1)))
+
+
+def reach(scene: Scene, **options: Any) -> Solution:
+    return hovi.plan(scene, PANDA_START, PANDA_GOAL, 1.5, **FAST, **options)
+
+
+def test_torque_that_hides_between_the_points_is_no_success(panda: Scene) -> None:
+    found = reach(panda, scheme="galerkin-2", intervals=16)
+    assert (found.success, found.status, found.n_neg) == (False, Status.UNRESOLVED, 0)
+    hidden = integral(panda, found.trajectory)
+    assert hidden > 1.5 * found.cost
+    assert f"{found.cost:.6g}" in found.message
+    assert f"{hidden:.5g}" in found.message
+    assert found.minima == ()
+    assert found.trajectory.metadata["status"] == "unresolved"
+
+
+def test_solve_and_plan_agree_on_it(panda: Scene) -> None:
+    def solved(N: int) -> Solution:
+        grid = Grid.uniform(1.5, N, by_name("galerkin-2"))
+        ld = hovi.DiscreteLagrangian(panda.effort_lagrangian(), grid)
+        ends = hovi.State(PANDA_START), hovi.State(PANDA_GOAL)
+        return hovi.solve(hovi.TrajectoryProblem(ld, *ends))
+
+    assert solved(16).status is Status.UNRESOLVED
+    carried = solved(80)
+    assert carried.status is Status.MINIMUM
+    assert integral(panda, carried.trajectory) == pytest.approx(carried.cost, rel=RESOLVED)
+
+
+def test_the_default_is_a_thousandth_in_cost_and_along_the_curve(
+    panda: Scene, arm_scene: Scene
+) -> None:
+    hang, up = [-np.pi / 2, 0.0], [0.3, 0.7]
+    ends = [0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [1.2, -0.6, 0.4, 0.7, -0.8, 1.0]
+    cases = (
+        (panda, PANDA_START, PANDA_GOAL, 1.5),
+        (arm_scene, hang, up, 1.0),
+        (ur5(), *ends, 1.5),
+    )
+    for scene, start, goal, T in cases:
+        found = hovi.plan(scene, start, goal, T, **FAST)
+        assert found.success, found.message
+        assert found.accuracy is not None
+        assert found.accuracy.reached
+        assert found.problem is not None
+        fine = found.problem.on(Grid.uniform(T, 128, by_name("galerkin-4x10")))
+        best = solve_on_grid(fine, found.trajectory)
+        assert best.status is Status.MINIMUM
+        lagrangian = found.problem.ld.lagrangian
+        along = integral_along(lagrangian, found.trajectory).value
+        assert found.cost == pytest.approx(best.cost, rel=1e-3)
+        assert along == pytest.approx(best.cost, rel=1e-3)
+
+
+@pytest.mark.parametrize("scheme", ["taylor-midpoint", "hermite-simpson", "galerkin-0"])
+def test_a_cost_more_than_a_hundredth_off_is_no_success(arm_scene: Scene, scheme: str) -> None:
+    """Each scheme on ever finer grids: unresolved while its cost is off, with honest estimates."""
+    ends = [-np.pi / 2, 0.0], [np.pi / 2, 0.0], 2.0
+    outcomes = []
+    for N in (8, 12, 16, 24, 32, 64, 128):
+        found = hovi.plan(arm_scene, *ends, scheme=scheme, intervals=N, **FAST)
+        assert found.problem is not None
+        fine = found.problem.on(Grid.uniform(2.0, 64, by_name("galerkin-4")))
+        best = solve_on_grid(fine, found.trajectory)
+        off = abs(found.cost / best.cost - 1)
+        if found.success:
+            assert found.error_estimate is not None
+            assert off <= 1.2 * RESOLVED
+            assert found.error_estimate / 3 <= off <= 3 * found.error_estimate
+        outcomes.append(found.status)
+    assert outcomes[0] is Status.UNRESOLVED
+    assert outcomes[-1] is Status.MINIMUM
+    assert set(outcomes) == {Status.UNRESOLVED, Status.MINIMUM}
+
+
+def test_a_resolved_minimum_is_preferred_to_a_cheaper_unresolved_motion(arm_scene: Scene) -> None:
+    found = hovi.plan(
+        arm_scene, [-np.pi / 2, 0.0], [np.pi / 2, 0.0], 5.0, intervals=20, starts=16, **FAST
+    )
+    assert found.success
+    assert "cheaper motion" in found.message
+    assert found.cost == min(found.minima)
+
+
+def test_replanning_near_a_motion_that_passed_keeps_its_estimate(arm_scene: Scene) -> None:
+    first = hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.0, intervals=16, **FAST)
+    near = first.replan(goal=[0.3 + 0.2 * NEARBY, 0.7])
+    far = first.replan(goal=[0.9, 0.2])
+    assert near.success
+    assert near.error_estimate == first.error_estimate
+    assert far.success
+    assert far.error_estimate != first.error_estimate
+    true = solve_on_grid(far.problem.finer.finer, far.trajectory)  # type: ignore[union-attr]
+    assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
+
+
+def test_replanning_to_where_the_grid_no_longer_carries_the_motion_is_told(
+    arm_scene: Scene,
+) -> None:
+    hang = np.array([-np.pi / 2, 0.0])
+    first = hovi.plan(arm_scene, hang, hang + 0.02, 10.0, intervals=16, **FAST)
+    assert first.success, first.message
+    again = first.replan(goal=-hang)
+    assert (again.success, again.status) == (False, Status.UNRESOLVED)
+
+
+def test_the_torque_of_a_passive_joint_between_the_points_counts(two_link: Robot) -> None:
+    acrobot = Scene(two_link, [hovi.effects.Gravity()], passive=["shoulder"])
+    ends = [-np.pi / 2, 0.0], [np.pi / 2, 0.0], 4.0
+    coarse = hovi.plan(acrobot, *ends, intervals=40, **FAST)
+    assert coarse.status is Status.UNRESOLVED
+    assert "joint 'shoulder' is passive" in coarse.message
+    fine = hovi.plan(acrobot, *ends, intervals=160, guess=coarse.trajectory, **FAST)
+    assert fine.status is Status.MINIMUM
+    model = two_link.model
+    motion = fine.trajectory.sample(np.linspace(0.0, 4.0, 4001))
+    data = model.createData()
+    tau = np.array([pin.rnea(model, data, *row) for row in zip(*motion[:3], strict=True)])
+    assert np.abs(tau[:, 0]).max() <= RESOLVED * np.abs(tau[:, 1]).max()
+
+
+def test_every_success_has_an_error_estimate() -> None:
+    for name in ("two_link_reach", "ur5_reach", "ur5_reach_limited", "cart_pole_swing_up"):
+        found = hovi.plan_task(hovi.load_task(hovi.example(name)), starts=1)
+        assert found.success, found.message
+        assert found.error_estimate is not None
+        assert 0 < found.error_estimate <= RESOLVED
