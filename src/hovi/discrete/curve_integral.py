@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -42,18 +43,19 @@ def integral_along(lagrangian: Lagrangian, trajectory: Trajectory) -> CurveInteg
     lagrangian: L on T^(2)Q.
     """
     grid = trajectory.grid
-    most = max(len(scheme.points) for scheme, _ in grid.groups)
-    fewer = _gauss(lagrangian, trajectory, most + MORE_POINTS)
-    value = _gauss(lagrangian, trajectory, most + MORE_POINTS + STEP)
-    rounding = 1e-14 * abs(value)
-    return CurveIntegral(value, abs(value - fewer) + rounding)
-
-
-def _gauss(lagrangian: Lagrangian, trajectory: Trajectory, points: int) -> float:
-    grid = trajectory.grid
-    x, w = np.polynomial.legendre.leggauss(points)
-    k = np.repeat(np.arange(grid.intervals), points)
-    s = np.tile((x + 1) / 2, grid.intervals)
+    x, weights = _rules(max(len(scheme.points) for scheme, _ in grid.groups) + MORE_POINTS)
+    k, s = np.repeat(np.arange(grid.intervals), len(x)), np.tile(x, grid.intervals)
     q, v, a = trajectory.jet_intervals(k, s)
     values = lagrangian.value(q, v, a, t=trajectory.t[k] + s * grid.steps[k])
-    return float(grid.steps @ (values.reshape(grid.intervals, -1) @ (w / 2)))
+    fewer, value = grid.steps @ (values.reshape(grid.intervals, -1) @ weights.T)
+    return CurveIntegral(float(value), float(abs(value - fewer) + 1e-14 * abs(value)))
+
+
+@cache
+def _rules(fewer: int) -> tuple[Array, Array]:
+    """Points of both rules in [0, 1], and the weights of each, (2, points)."""
+    rules = [np.polynomial.legendre.leggauss(points) for points in (fewer, fewer + STEP)]
+    x = np.concatenate([(x + 1) / 2 for x, _ in rules])
+    weights = np.zeros((2, len(x)))
+    weights[0, :fewer], weights[1, fewer:] = rules[0][1] / 2, rules[1][1] / 2
+    return x, weights

@@ -159,6 +159,7 @@ class Accuracy:
         there is none.
     reached: whether error <= tolerance. reason: why the refinement ended early; "" if it did not.
     rounds: the grids that were solved on. compare: computes `estimate`.
+    along: relative error of the integral of L~ along the curve; NaN if unknown.
     """
 
     tolerance: Tolerance
@@ -167,6 +168,7 @@ class Accuracy:
     reason: str
     rounds: tuple[Round, ...] = ()
     compare: Callable[[], MotionError] | None = field(default=None, repr=False)
+    along: float = np.nan
 
     @cached_property
     def estimate(self) -> MotionError | None:

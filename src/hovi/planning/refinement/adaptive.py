@@ -223,6 +223,7 @@ class _Search:
             "" if reached else reason,
             tuple(self.rounds),
             None if finer is None else partial(estimate_against, solution, finer, self._frame),
+            chosen.along,
         )
         steps = sum(done.nit for done in self.rounds) or solution.nit
         message = solution.message

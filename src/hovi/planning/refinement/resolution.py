@@ -113,6 +113,9 @@ def _difference_along(solution: Solution) -> str:
     assert problem is not None
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return ""
+    known = solution.accuracy, solution.error_estimate
+    if known[0] is not None and known[1] is not None and known[0].along + known[1] <= RESOLVED:
+        return _passive_sentence(problem, trajectory)  # both are that close to the same cost
     action = problem.ld.action(trajectory.path)
     integral = integral_along(problem.ld.lagrangian, trajectory).value
     least = NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
