@@ -80,13 +80,13 @@ def test_a_large_weight_ends_at_the_bound() -> None:
 def test_limits_hold_while_the_duration_is_found() -> None:
     task, weight = hovi.load_task(hovi.example("ur5_reach_limited")), 60.0
     ends = task.scene, task.start, task.goal
-    solution = hovi.plan(*ends, (1.5, 2.5), time_weight=weight, limits=task.options.limits)
+    options = {"limits": task.options.limits, "intervals": 24}
+    solution = hovi.plan(*ends, (1.5, 2.5), time_weight=weight, **options)
     assert solution.success, solution.message
     T, guess = solution.trajectory.duration, solution.trajectory
     assert 1.5 < T < 2.5
     costs = [
-        hovi.plan(*ends, T * f, limits=task.options.limits, guess=guess).cost + weight * T * f
-        for f in (0.9, 1.1)
+        hovi.plan(*ends, T * f, guess=guess, **options).cost + weight * T * f for f in (0.9, 1.1)
     ]
     assert solution.cost < min(costs)
 

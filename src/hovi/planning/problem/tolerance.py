@@ -182,6 +182,8 @@ class Accuracy:
             return f"{self.reason}; no error was estimated (tolerance {wanted})."
         error = self.tolerance.in_words(self.error, self._frame)
         found = f"estimated error {error}, tolerance {wanted}"
+        if not self.reached and self.along > 1e-3:
+            found = f"the integral along the curve is off by {self.along:.1e}; {found}"
         return f"{found}." if self.reached else f"stopped early: {self.reason}; {found}."
 
     @property

@@ -18,7 +18,7 @@ from hovi.planning.refinement.candidate import Candidate, least_error
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
-from hovi.planning.refinement.next_grid import interpolated_to, next_grid
+from hovi.planning.refinement.next_grid import KNOWN_DECAY, interpolated_to, next_grid
 from hovi.planning.refinement.whirling import whirl
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -37,6 +37,8 @@ OnRound = Callable[[Round], None]
 
 MAX_FIRST_INTERVALS = 60
 """Maximum number of intervals of the first grid."""
+RESTART_ERROR = 0.05
+"""Relative error of the first cost above which the refinement begins again with more points."""
 MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
@@ -45,19 +47,23 @@ MAX_POINTS = 400_000
 """Number of quadrature points of a grid above which no finer one is tried."""
 
 
-def first_grid(duration: float, intervals: int, smooth: bool = True) -> Grid:
+def first_grid(
+    duration: float, intervals: int, smooth: bool = True, more_points: bool = True
+) -> Grid:
     """The first grid: galerkin-2x8 on the intervals, or galerkin-4x10 on two thirds of them.
 
     With more points than modes the torque cannot hide between the points. With more modes the
     errors of smooth motions are smaller, and the decay of the modes can be estimated.
     duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
-        motion has no kinks, which limits and via points cause.
+        motion has no kinks, which limits and via points cause. more_points: False for as many as a
+        smooth motion needs.
     Raises InputError as Grid.uniform does.
     """
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
         return Grid.uniform(duration, number, galerkin(2, points=8))
-    return Grid.uniform(duration, max(2 * number // 3, 1), galerkin(4, points=10))
+    scheme = galerkin(4, points=10 if more_points else 6)
+    return Grid.uniform(duration, max(2 * number // 3, 1), scheme)
 
 
 @interruptible
@@ -95,9 +101,14 @@ def refine_to_tolerance(
     max_iterations: int = 500,
     time_limit: float | None = None,
     on_round: OnRound | None = None,
+    restart: Callable[[], Solution] | None = None,
 ) -> Solution:
-    """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`."""
-    return _Search(tolerance, max_iterations, Deadline(time_limit), on_round).run(solution)
+    """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`.
+
+    restart: returns the solution to begin with if the given one is not near a finer one.
+    """
+    deadline = Deadline(time_limit)
+    return _Search(tolerance, max_iterations, deadline, on_round, restart).run(solution)
 
 
 @dataclass(eq=False)
@@ -108,6 +119,7 @@ class _Search:
     max_iterations: int
     deadline: Deadline
     on_round: OnRound | None
+    restart: Callable[[], Solution] | None
     rounds: list[Round] = field(default_factory=list)
     best: Candidate = field(init=False)
 
@@ -124,6 +136,9 @@ class _Search:
     def _refine(self, solution: Solution) -> str:
         """Run the rounds; returns why they ended early, or ""."""
         candidate = self.best = self._evaluated(solution)
+        known = candidate.error_of_cost
+        if self.restart is not None and (known is None or known > RESTART_ERROR):
+            candidate = self.best = self._evaluated(self.restart())
         stalled = 0
         while not candidate.within_tolerance:
             reason = self._stop_reason(candidate, stalled)
@@ -134,7 +149,7 @@ class _Search:
                 self.best = previous.corrected(candidate)
             else:
                 self.best = self.best.compared_with(candidate)
-            smaller = candidate.error < 0.5 * self.best.error
+            smaller = candidate.larger_error < 0.5 * self.best.larger_error
             stalled = 0 if smaller or np.isnan(self.best.error) else stalled + 1
             if candidate.better_than(self.best):
                 self.best = candidate
@@ -169,9 +184,8 @@ class _Search:
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
         whirling = None if solution.problem.limited else whirl(solution)
-        if whirling is not None and whirling.is_hopeless(
-            candidate.is_nearly_resolved, len(self.rounds)
-        ):
+        nearly = candidate.difference <= KNOWN_DECAY
+        if whirling is not None and whirling.is_hopeless(nearly, len(self.rounds)):
             return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"
@@ -183,7 +197,7 @@ class _Search:
 
     def _at_floor(self, candidate: Candidate) -> bool:
         """Whether most of the cost's error is one that no grid reduces."""
-        cost = self.tolerance.quantity is Quantity.COST
+        cost = self.tolerance.quantity is Quantity.COST and candidate.is_carried
         return cost and bool(candidate.error <= 2 * least_error(candidate.solution))
 
     def _next(self, candidate: Candidate) -> Candidate:
@@ -215,7 +229,7 @@ class _Search:
         if chosen.contradicted > 0:
             finer = None
             reason = f"{reason}, and on a finer grid the solver reached another minimum"
-        reached = bool(chosen.error <= self.tolerance.size)
+        reached = bool(chosen.error <= self.tolerance.size) and chosen.is_carried
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,

@@ -48,8 +48,8 @@ is taken to have reached another minimum."""
 class Candidate:
     """A solution with its estimated error.
 
-    finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit, of
-        the cost and of the integral along the curve; NaN if unknown.
+    finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit;
+        NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
     passive: torques of passive joints along the curve; None without such joints.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
@@ -79,7 +79,7 @@ class Candidate:
         along = error_along(solution, finer)
         passive = passive_torque(solution.problem, solution.trajectory)
         if tolerance.quantity is Quantity.COST:
-            errors = _errors_of_cost(solution, finer, tolerance, along)
+            errors = _errors_of_cost(solution, finer, tolerance)
             return cls(solution, tolerance, finer, *errors, along, passive)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
         error *= LIMITED_SAFETY_FACTOR if finer.problem.limited else 1.0
@@ -89,8 +89,12 @@ class Candidate:
     def within_tolerance(self) -> bool:
         """Whether the estimated error is within the tolerance, and the curve carries the motion."""
         accepted = _accepted(self.error, self.uncancelled, self.tolerance)
-        carried = self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
-        return self.finer is not None and accepted and carried
+        return self.finer is not None and accepted and self.is_carried
+
+    @property
+    def is_carried(self) -> bool:
+        """Whether the integral along the curve and passive torques are as small as they should."""
+        return self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
 
     @property
     def passive_share(self) -> float:
@@ -98,16 +102,16 @@ class Candidate:
         return 0.0 if self.passive is None else self.passive.share
 
     @property
-    def is_resolved(self) -> bool:
-        """Whether the cost and the integral along the curve are near that of the finer solution."""
+    def difference(self) -> float:
+        """The relative error of the cost or the integral along the curve; inf if unknown."""
         known = self.error_of_cost
-        return known is not None and max(known, self.along) <= CURVE_TOLERANCE
+        return np.inf if known is None else max(known, self.along)
 
     @property
-    def is_nearly_resolved(self) -> bool:
-        """As is_resolved, ten times as far."""
-        known = self.error_of_cost
-        return known is not None and max(known, self.along) <= 10 * CURVE_TOLERANCE
+    def larger_error(self) -> float:
+        """The error, or that of the integral along the curve if it is larger."""
+        in_cost = self.tolerance.quantity is Quantity.COST
+        return max(self.error, self.along) if in_cost else self.error
 
     @property
     def _largest_along(self) -> float:
@@ -155,16 +159,14 @@ class Candidate:
         """Whether this one is preferred: minima first, then the smaller error."""
         if self.solution.success != other.solution.success:
             return self.solution.success
-        return bool(np.isnan(other.error) or self.error < other.error)
+        return bool(np.isnan(other.error) or self.larger_error < other.larger_error)
 
 
 def _errors_of_cost(
-    solution: Solution, finer: FinerSolution, tolerance: Tolerance, along: float
+    solution: Solution, finer: FinerSolution, tolerance: Tolerance
 ) -> tuple[float, float]:
     """The fields `error` and `uncancelled`."""
     error = error_of_cost(solution, finer)
-    if max(along, tolerance.size) >= CURVE_TOLERANCE:
-        error = max(error, along)
     uncancelled = max(error, float(contributions(finer).sum()))
     if _accepted(error, uncancelled, tolerance):  # else a finer grid is needed anyway
         uncancelled = max(uncancelled, _hamiltonian_error(solution))

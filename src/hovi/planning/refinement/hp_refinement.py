@@ -84,24 +84,30 @@ def decay(grid: Grid, path: DiscretePath) -> Array:
 
 
 def refined(
-    grid: Grid, rho: Array, demands: Sequence[Demand], joints: int = 6, resolved: bool = True
+    grid: Grid,
+    rho: Array,
+    demands: Sequence[Demand],
+    joints: int = 6,
+    known: bool = True,
+    few_points: bool = True,
 ) -> Grid:
     """The cheapest grid that is predicted to meet every demand, with one scheme or two.
 
-    rho: decay of each interval. joints: degrees of freedom of the robot. resolved: whether r + 2
-        quadrature points and any number of modes are enough.
+    rho: decay of each interval. joints: degrees of freedom of the robot. known: whether the decay
+        is that of the motion, else modes are at most UNRESOLVED_MODES. few_points: whether an
+        interval has r + 2 quadrature points, else MORE_POINTS more.
     An interval whose demands no choice meets is split into four.
     """
     current = np.array([scheme.inner_modes for scheme in grid.schemes])
-    known = MODES if resolved else MODES[MODES <= UNRESOLVED_MODES]
-    more = np.maximum(known, current[:, None])  # (N, D)
+    allowed = MODES if known else MODES[MODES <= UNRESOLVED_MODES]
+    more = np.maximum(allowed, current[:, None])  # (N, D)
     pieces = _pieces(current, more, rho, demands)
     low, high = _cheapest(more, pieces, 1.0 / joints**2)
     kept, N = np.array([low, high]), np.arange(grid.intervals)
     choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
     cut, modes = pieces[N, choice], more[N, choice]
     steps = np.repeat(grid.steps / cut, cut)
-    beyond = 0 if resolved else MORE_POINTS
+    beyond = 0 if few_points else MORE_POINTS
     tables = {int(r): galerkin(int(r), points=int(r) + 2 + beyond) for r in set(modes)}
     return Grid(steps, tuple(tables[int(r)] for r in np.repeat(modes, cut)))
 

@@ -18,6 +18,10 @@ Array = npt.NDArray[np.float64]
 
 TARGET_SHARE = 0.3
 """Error for which a grid is refined, as a share of the tolerance."""
+KNOWN_DECAY = 1e-2
+"""Difference of costs up to which the decay of the modes is that of the motion."""
+FEW_POINTS = 0.05
+"""Difference of costs up to which tables with r + 2 points finish what more points began."""
 FINER_GRID_RATIO = 2.5
 """Ratio of the finer solution's predicted error to that target up to which its grid is the next:
 the solution is known already, and estimating its error is cheap."""
@@ -31,20 +35,18 @@ def next_grid(candidate: Candidate) -> Grid:
         return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
     demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
     rho = _decay(candidate, finer)
+    error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
+    known, few_points = error <= KNOWN_DECAY, error <= FEW_POINTS
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
-    few = candidate.is_resolved or finer.problem.grid.inner_modes <= UNRESOLVED_MODES
-    if (
-        few
-        and same_steps
-        and all(demand.remaining(rho**MORE_MODES) <= FINER_GRID_RATIO for demand in demands)
-    ):
+    usable = same_steps and (known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)
+    change = rho**MORE_MODES
+    if usable and all(demand.remaining(change) <= FINER_GRID_RATIO for demand in demands):
         return finer.problem.grid
-    resolved = candidate.is_resolved
-    grid = refined(problem.grid, rho, demands, problem.robot.nv, resolved)
+    grid = refined(problem.grid, rho, demands, problem.robot.nv, known, few_points)
     if not _same_grid(grid, problem.grid):
         return grid
-    if resolved or grid.inner_modes < UNRESOLVED_MODES:
+    if known or grid.inner_modes < UNRESOLVED_MODES:
         return grid.enriched(MORE_MODES)
     return grid.halved(np.ones(grid.intervals, dtype=bool))
 
@@ -67,7 +69,10 @@ def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
     known = contributions(finer)
     N, target = len(known), TARGET_SHARE * candidate.tolerance.size
     if candidate.tolerance.quantity is Quantity.COST:
-        scale = max(1.0, candidate.error / max(known.sum(), 1e-300))
+        error = candidate.error
+        if error <= target:  # the curve has to become better
+            error = candidate.along
+        scale = max(1.0, error / max(known.sum(), 1e-300))
         return [Demand(target / (N * np.maximum(scale * known, 1e-300)), 2)]
     return _demands_on_curve(candidate, finer, known)
 

@@ -14,7 +14,7 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Round, Tolerance
-from hovi.planning.refinement.adaptive import refine_to_tolerance
+from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance
 from hovi.planning.refinement.inactive_limits import (
     far_from_limits,
     with_limits_again,
@@ -26,9 +26,11 @@ from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
+from hovi.schemes import is_galerkin
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
 
+NAMED_GUESSES = ("cubic", "minimum-jerk")
 MAX_CHART_ROUNDS = 4
 """Maximum number of rounds that halve intervals in which an orientation turns too far."""
 MAX_REFINED = 6
@@ -108,12 +110,20 @@ class FinalStages:
             tolerance=tolerance,
             max_iterations=self.fine.options.max_iterations,
             on_round=partial(self._report_round, which),
+            restart=self._from_guess if has_few_points(self.fine) else None,
         )
         better = None
         if far_from_limits(known):
             free = refine(without_limits(known), time_limit=self.deadline.seconds_left)
             better = with_limits_again(free, known)
         return refine(known, time_limit=self.deadline.seconds_left) if better is None else better
+
+    def _from_guess(self) -> Solution:
+        """A solve from the guess on the first grid with more quadrature points."""
+        job = with_more_points(self.fine)
+        left, most = self.deadline.seconds_left, job.options.max_iterations
+        guess = job.options.guess
+        return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
 
     def _report_round(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
@@ -141,6 +151,20 @@ class FinalStages:
     def _solve(self, job: Job, guess: Trajectory) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
         return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
+
+
+def has_few_points(job: Job) -> bool:
+    """Whether a refinement to a tolerance begins with as many points as a smooth motion needs."""
+    scheme = job.grid.schemes[0]
+    few = is_galerkin(scheme) and len(scheme.points) == scheme.inner_modes + 2
+    kept = job.problem().limited or job.options.guess not in NAMED_GUESSES
+    return job.tolerance is not None and few and not kept
+
+
+def with_more_points(job: Job) -> Job:
+    """The job on the first grid with more quadrature points."""
+    grid = first_grid(job.grid.duration, job.options.interval_count)
+    return split_for_charts(job.on(grid), job.options.guess)
 
 
 def on_grid_of(problem: TrajectoryProblem, solution: Solution) -> TrajectoryProblem:

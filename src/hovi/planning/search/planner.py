@@ -154,7 +154,8 @@ def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
     else:
         limited = as_limits(robot, options.limits).bounded.any()
         kinks = limited or options.clearance.wanted or options.via
-        grid = first_grid(T, options.interval_count, smooth=not kinks)
+        few = options.starts == 1 and not isinstance(guess, Trajectory)
+        grid = first_grid(T, options.interval_count, not kinks, more_points=not few)
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
 
 

@@ -11,7 +11,13 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.refinement.resolution import resolved
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
-from hovi.planning.search.final_stages import MAX_REFINED, FinalStages, on_grid_of
+from hovi.planning.search.final_stages import (
+    MAX_REFINED,
+    FinalStages,
+    has_few_points,
+    on_grid_of,
+    with_more_points,
+)
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
@@ -44,9 +50,17 @@ class Search:
         """The best solution, and the costs of all minima on the requested grid."""
         job = self._coarse()
         explored = self._explored(job)
+        if self._needs_more_points(explored):
+            return dataclasses.replace(self, fine=with_more_points(self.fine)).run()
         if self.free is None or explored.minima[0].success:
             return self._finished(job, explored)
         return self._from_another_duration(self.free, explored)
+
+    def _needs_more_points(self, explored: Exploration) -> bool:
+        """Whether a refinement found no minimum on the first grid, of tables with few points."""
+        found = explored.minima[0]
+        ended = found.success or found.status in STOPPED or interrupted()
+        return has_few_points(self.fine) and not ended
 
     def _from_another_duration(
         self, free: FreeDuration, explored: Exploration
