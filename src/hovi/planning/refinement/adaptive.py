@@ -19,7 +19,6 @@ from hovi.planning.refinement.error_estimate import FinerSolution, estimate_agai
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import KNOWN_DECAY, interpolated_to, next_grid
-from hovi.planning.refinement.whirling import whirl
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -136,8 +135,7 @@ class _Search:
     def _refine(self, solution: Solution) -> str:
         """Run the rounds; returns why they ended early, or ""."""
         candidate = self.best = self._evaluated(solution)
-        known = candidate.error_of_cost
-        if self.restart is not None and (known is None or known > RESTART_ERROR):
+        if self.restart is not None and _hides(candidate):
             candidate = self.best = self._evaluated(self.restart())
         stalled = 0
         while not candidate.within_tolerance:
@@ -183,8 +181,7 @@ class _Search:
         if self._at_floor(candidate):
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
-        whirling = None if solution.problem.limited else whirl(solution)
-        nearly = candidate.difference <= KNOWN_DECAY
+        whirling, nearly = candidate.whirl, candidate.difference <= KNOWN_DECAY
         if whirling is not None and whirling.is_hopeless(nearly, len(self.rounds)):
             return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
@@ -263,6 +260,12 @@ class _Search:
     @property
     def _frame(self) -> str | None:
         return self.tolerance.frame
+
+
+def _hides(candidate: Candidate) -> bool:
+    """Whether a motion on few points is not near a finer one, or whirls, so that it may hide."""
+    known = candidate.error_of_cost
+    return known is None or known > RESTART_ERROR or candidate.whirl is not None
 
 
 def _solved_nearby(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:

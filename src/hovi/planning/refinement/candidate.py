@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -21,6 +22,7 @@ from hovi.planning.refinement.passive_torque import (
     PassiveTorque,
     passive_torque,
 )
+from hovi.planning.refinement.whirling import Whirl, whirl
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
 
@@ -106,6 +108,12 @@ class Candidate:
         """The relative error of the cost or the integral along the curve; inf if unknown."""
         known = self.error_of_cost
         return np.inf if known is None else max(known, self.along)
+
+    @cached_property
+    def whirl(self) -> Whirl | None:
+        """The joint that whirls; None if none does, and for limited problems."""
+        problem = self.solution.problem
+        return None if problem is None or problem.limited else whirl(self.solution)
 
     @property
     def larger_error(self) -> float:

@@ -9,7 +9,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.problem.tolerance import Quantity
-from hovi.planning.refinement.candidate import Candidate, contributions
+from hovi.planning.refinement.candidate import CURVE_TOLERANCE, Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE
@@ -36,7 +36,8 @@ def next_grid(candidate: Candidate) -> Grid:
     demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
-    known, few_points = error <= KNOWN_DECAY, error <= FEW_POINTS
+    known = error <= KNOWN_DECAY
+    few_points = error <= (FEW_POINTS if candidate.whirl is None else CURVE_TOLERANCE)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
     usable = same_steps and (known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)

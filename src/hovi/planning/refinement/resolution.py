@@ -41,8 +41,8 @@ def solve(
 ) -> Solution:
     """A motion that makes the discrete action stationary, checked between the points.
 
-    As `hovi.planning.solver.solver.solve_on_grid`, whose options it takes. A minimum on the grid that is none along the whole
-    motion has the status UNRESOLVED: see `resolved`.
+    As `hovi.planning.solver.solver.solve_on_grid`, whose options it takes. A minimum on the grid
+    that is none along the whole motion has the status UNRESOLVED: see `resolved`.
     """
     return resolved(solve_on_grid(problem, guess, **options))
 

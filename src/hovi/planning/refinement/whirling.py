@@ -20,8 +20,8 @@ from hovi.robot.mass_matrix import MassMatrix
 WHIRLING_RATIO = 10.0
 """Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
 2 for a smooth motion from rest to rest."""
-MAX_GRIDS = 5
-"""Number of grids that are tried for a whirling motion that none of them resolves."""
+MAX_GRIDS = 6
+"""Number of grids that are tried for a whirling motion."""
 LIGHT_SHARE = 0.03
 """Inertia of a joint that may whirl, relative to that of the heaviest."""
 HOPELESS_RATIO = 40.0
@@ -45,9 +45,8 @@ class Whirl:
 
     def is_hopeless(self, resolved: bool, grids: int) -> bool:
         """Whether no finer grid is tried. resolved: whether the last of the grids nearly was."""
-        if resolved:
-            return self.ratio > UNUSABLE_RATIO
-        return self.ratio > HOPELESS_RATIO or grids >= MAX_GRIDS
+        most = UNUSABLE_RATIO if resolved else HOPELESS_RATIO
+        return self.ratio > most or grids >= MAX_GRIDS
 
     def __str__(self) -> str:
         """What it does, and what helps."""

@@ -1,0 +1,120 @@
+"""Do plans keep what their accuracy says? Tolerances from 1e-2 to 1e-6 on arms of no other table.
+
+Four random reaches of six arms, drawn as in resolved_reaches.py, within the limits of the URDF and
+half as far without limits, each to five tolerances. The true error of the cost is its distance from
+a solve on a finer grid from the same motion: every interval halved with four more modes, or, with
+limits, cut into four.
+
+    python tolerance_claims.py [ARM ...] [--count 4] [--seed 0]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from measuring import print_machine, print_table
+from resolved_reaches import load, reaches
+
+import hovi
+from hovi.planning.solver.solver import solve_on_grid
+
+ARMS = ("so100", "bravo7_no_ee", "tiago", "baxter", "alex_nub_hands", "kinova")
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+TIME_LIMIT, FACTOR = 300.0, 3.0
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What a plan claims, and its true error; NaN without a reference."""
+
+    arm: str
+    limits: str
+    tolerance: float
+    status: str
+    reached: bool
+    estimate: float
+    true: float
+
+    @property
+    def is_false(self) -> bool:
+        """Whether a reached tolerance is missed."""
+        return self.reached and self.true > self.tolerance
+
+    @property
+    def is_near(self) -> bool:
+        """Whether estimate and true error agree within a factor; tiny ones do."""
+        low, high = sorted((max(self.estimate, 1e-13), max(self.true, 1e-13)))
+        return high <= FACTOR * low
+
+
+def measure(arm: str, limits: str, count: int, seed: int) -> list[Claim]:
+    """The claims of an arm."""
+    scene, claims = load(arm), []
+    for start, goal, T in reaches(scene, count, seed):
+        if limits == "none":
+            goal = scene.robot.integrate(start, 0.5 * scene.robot.difference(start, goal))
+        for tolerance in TOLERANCES:
+            plan = hovi.plan(
+                scene, start, goal, T, limits=limits, tolerance=tolerance, time_limit=TIME_LIMIT
+            )
+            reached = plan.accuracy is not None and plan.accuracy.reached
+            true = _true_error(plan) if plan.success else np.nan
+            estimate = np.nan if plan.error_estimate is None else plan.error_estimate
+            row = Claim(arm, limits, tolerance, str(plan.status), reached, estimate, true)
+            claims.append(row)
+            print(row, file=sys.stderr, flush=True)
+    return claims
+
+
+def _true_error(plan: hovi.Solution) -> float:
+    """The relative distance of the cost from that of a finer solution near the plan."""
+    problem = plan.problem
+    grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
+    more = grid.halved(np.ones(grid.intervals, dtype=bool))
+    grid = more if problem.limited else grid.enriched(4)
+    finer = solve_on_grid(problem.on(grid), plan.trajectory, max_iterations=2000)
+    return abs(plan.cost / finer.cost - 1) if finer.success else np.nan
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("arms", nargs="*")
+    parser.add_argument("--count", type=int, default=4)
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    claims = [
+        claim
+        for limits in ("none", "urdf")
+        for arm in args.arms or ARMS
+        for claim in measure(arm, limits, args.count, args.seed)
+    ]
+    rows = []
+    for limits in ("none", "urdf"):
+        for tolerance in TOLERANCES:
+            own = [c for c in claims if (c.limits, c.tolerance) == (limits, tolerance)]
+            known = [c for c in own if np.isfinite(c.true)]
+            rows.append(
+                [
+                    limits,
+                    f"{tolerance:.0e}",
+                    f"{sum(c.status == 'minimum' for c in own)} of {len(own)}",
+                    sum(c.reached for c in own),
+                    sum(c.is_false for c in own),
+                    f"{sum(c.is_near for c in known)} of {len(known)}",
+                ]
+            )
+    columns = ["limits", "tolerance", "minima", "reached", "missed", f"within {FACTOR:g}"]
+    print_table(columns, rows)
+    known = [c for c in claims if np.isfinite(c.true)]
+    near = sum(c.is_near for c in known)
+    print(f"{len(claims)} plans, {sum(c.is_false for c in claims)} of them miss what they claim;")
+    print(f"estimate and true error within {FACTOR:g}: {near} of {len(known)}.\n")
+    print_machine(threads=1)
+    raise SystemExit(any(c.is_false for c in claims))
+
+
+if __name__ == "__main__":
+    main()
