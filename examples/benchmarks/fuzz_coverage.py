@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
-    python fuzz_coverage.py urdf|scene|trajectory SECONDS
+    python fuzz_coverage.py urdf|scene|trajectory|compiled SECONDS
 
 It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
@@ -21,6 +21,7 @@ MODULES = {
     "urdf": "hard.mutated_urdf",
     "scene": "hard.mutated_scene",
     "trajectory": "hard.mutated_motion",
+    "compiled": "hard.compiled_calls",
 }
 CORPUS, LARGEST = 300, 60_000  # inputs to begin with; bytes of an input
 HANG = 10  # [s]

@@ -1,4 +1,4 @@
-"""Fuzzing: every mutated file is refused with one sentence or loads correctly."""
+"""Fuzzing: every mutated file or call is refused with one sentence, or right."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hard import mutated_motion, mutated_scene, mutated_urdf
+from hard import compiled_calls, mutated_motion, mutated_scene, mutated_urdf
 from hard.verdict import Verdict
 
-MUTATED = (mutated_urdf, mutated_scene, mutated_motion)
+MUTATED = (mutated_urdf, mutated_scene, mutated_motion, compiled_calls)
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 
 
 def fuzz(module: ModuleType, random: Random) -> None:
-    """Load one mutated file; fails with the reason if the verdict is a fault."""
+    """Load or call one mutated input; fails with the reason if the verdict is a fault."""
     mutant = module.mutate(random)
     with tempfile.TemporaryDirectory() as folder:
         verdict, reason = module.verdict(mutant, Path(folder))
@@ -37,7 +37,7 @@ SETTINGS = settings(
 @pytest.mark.parametrize("module", MUTATED, ids=lambda module: module.__name__)
 @settings(SETTINGS, max_examples=60)
 @given(random=st.randoms(use_true_random=False))
-def test_mutated_files_are_refused_or_load_correctly(module: ModuleType, random: Random) -> None:
+def test_mutated_inputs_are_refused_or_right(module: ModuleType, random: Random) -> None:
     fuzz(module, random)
 
 
@@ -45,7 +45,5 @@ def test_mutated_files_are_refused_or_load_correctly(module: ModuleType, random:
 @pytest.mark.parametrize("module", MUTATED, ids=lambda module: module.__name__)
 @settings(SETTINGS, max_examples=5_000)
 @given(random=st.randoms(use_true_random=False))
-def test_many_mutated_files_are_refused_or_load_correctly(
-    module: ModuleType, random: Random
-) -> None:
+def test_many_mutated_inputs_are_refused_or_right(module: ModuleType, random: Random) -> None:
     fuzz(module, random)

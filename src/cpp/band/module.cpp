@@ -1,10 +1,11 @@
-// The Python binding. Shapes and types are checked by the Python side that calls it.
+// The Python binding, which checks its arguments against each other.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
 #include <algorithm>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "dot.hpp"
@@ -21,18 +22,59 @@ using hovi::band::Kernels;
 
 namespace {
 
-using Index = Array<const std::int64_t, 1>;
-
 const Kernels& kernels(bool portable) { return hovi::choose_kernels<Kernels>(portable); }
+
+// A band of `size` columns. Throws unless rows and band fit it and each other: see Band.
+Band shape_of(const char* name, const Input<2>& band, const Index& rows, std::size_t size) {
+  constexpr std::size_t width = hovi::band::panel_columns;
+  band.require_kind(name);
+  rows.require_kind("rows");
+  const std::size_t panels = rows.shape(0), stride = band.shape(1);
+  band.require(name, {width * panels, stride});
+  if (size > width * panels || panels != (size + width - 1) / width)
+    refuse(std::to_string(panels) + " panels are not those of " + std::to_string(size) +
+           " unknowns.");
+  std::size_t last = 0;
+  for (std::size_t panel = 0; panel < panels; ++panel) {
+    const std::int64_t count = rows.data()[panel];
+    const bool whole = count > 0 && count % width == 0 && std::size_t(count) <= stride;
+    const std::size_t end = whole ? width * panel + count : 0;
+    if (!whole || end < last || end > width * panels)
+      refuse("rows: panel " + std::to_string(panel) + " of the band cannot have " +
+             std::to_string(count) + " rows.");
+    last = end;
+  }
+  return {size, panels, stride, rows.data()};
+}
+
+// Throws unless run `run` has `length` numbers of an array of `size`, from `first` on.
+void require_run(const char* name, std::size_t run, std::int64_t first, std::int64_t length,
+                 std::size_t size) {
+  const bool fits = first >= 0 && length >= 0 && std::size_t(length) <= size &&
+                    std::size_t(first) <= size - std::size_t(length);
+  if (!fits)
+    refuse("run " + std::to_string(run) + " of " + std::to_string(length) + " numbers from " +
+           std::to_string(first) + " on does not lie within the " + std::to_string(size) + " of " +
+           name + ".");
+}
 
 void assemble(const Input<5>& hessian, const Index& starts, const Index& positions,
               const Index& lengths, const std::optional<Input<1>>& scales, const Output<2>& band) {
-  const nb::gil_scoped_release released;
-  std::fill_n(band.data(), band.size(), 0.0);
+  hessian.require_kind("hessian");
+  band.require_kind("band");
+  starts.require_kind("starts");
   const std::size_t runs = starts.shape(0);
+  positions.require("positions", {runs});
+  lengths.require("lengths", {runs});
+  const double *const numbers = hessian.data(), *const scale = data_or_null("scales", scales, {runs});
   const std::int64_t *start = starts.data(), *position = positions.data(), *length = lengths.data();
-  const double *const numbers = hessian.data(), *const scale = scales ? scales->data() : nullptr;
+  for (std::size_t run = 0; run < runs; ++run) {
+    require_run("hessian", run, start[run], length[run], hessian.size());
+    require_run("band", run, position[run], length[run], band.size());
+  }
   double* const entries = band.data();
+  const nb::gil_scoped_release released;
+  std::fill_n(entries, band.size(), 0.0);
   for (std::size_t run = 0; run < runs; ++run) {
     const double factor = scale ? scale[run] : 1.0;
     const double* from = numbers + start[run];
@@ -43,15 +85,19 @@ void assemble(const Input<5>& hessian, const Index& starts, const Index& positio
 
 bool factor(const Input<2>& band, const Input<2>& metric, double shift, const Index& rows,
             std::size_t size, const Output<2>& out, bool portable) {
-  const Band shape{size, rows.shape(0), band.shape(1), rows.data()};
+  const Band shape = shape_of("band", band, rows, size);
+  metric.require("metric", {band.shape(0), band.shape(1)});
+  out.require("out", {band.shape(0), band.shape(1)});
   const nb::gil_scoped_release released;
   return kernels(portable).factor(shape, band.data(), metric.data(), shift, out.data());
 }
 
 void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const Output<1>& out,
            bool portable) {
+  rhs.require_kind("rhs");
   const std::size_t size = rhs.shape(0), columns = factor.shape(0);
-  const Band shape{size, rows.shape(0), factor.shape(1), rows.data()};
+  const Band shape = shape_of("factor", factor, rows, size);
+  out.require("out", {size});
   const nb::gil_scoped_release released;
   const auto x = allocate(columns);
   std::copy_n(rhs.data(), size, x.get());
@@ -61,7 +107,9 @@ void solve(const Input<2>& factor, const Index& rows, const Input<1>& rhs, const
 }
 
 void product(const Input<2>& band, const Index& rows, const Input<1>& x, const Output<1>& out) {
-  const Band shape{x.shape(0), rows.shape(0), band.shape(1), rows.data()};
+  x.require_kind("x");
+  const Band shape = shape_of("band", band, rows, x.shape(0));
+  out.require("out", {shape.size});
   const nb::gil_scoped_release released;
   hovi::band::product(shape, band.data(), x.data(), out.data());
 }
@@ -70,8 +118,11 @@ void product(const Input<2>& band, const Index& rows, const Input<1>& x, const O
 std::pair<double, double> descend(const Input<2>& factor, const Index& rows,
                                   const Input<1>& gradient, const Input<2>& metric,
                                   const Output<1>& out, bool portable) {
+  gradient.require_kind("gradient");
   const std::size_t size = gradient.shape(0), columns = factor.shape(0);
-  const Band shape{size, rows.shape(0), factor.shape(1), rows.data()};
+  const Band shape = shape_of("factor", factor, rows, size);
+  metric.require("metric", {columns, shape.stride});
+  out.require("out", {size});
   const nb::gil_scoped_release released;
   const auto x = allocate(columns), product = allocate(columns);
   for (std::size_t i = 0; i < size; ++i) x.get()[i] = -gradient.data()[i];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -58,8 +59,13 @@ void InverseDynamicsKernel::expand(Points points, Multipliers multipliers, Expan
                     std::min(last, points.count));
   };
   std::vector<std::thread> others;
-  for (std::size_t chunk = 1; chunk < chunks; ++chunk) others.emplace_back(run, chunk);
+  others.reserve(chunks);
+  try {
+    while (others.size() + 1 < chunks) others.emplace_back(run, others.size() + 1);
+  } catch (const std::system_error&) {  // a limit on threads: this one does the rest
+  }
   run(0);
+  for (std::size_t chunk = others.size() + 1; chunk < chunks; ++chunk) run(chunk);
   for (auto& other : others) other.join();
 }
 

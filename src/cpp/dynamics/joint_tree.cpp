@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t max_joints = 10000;  // so that the number of entries of J fits an int
 
 void require(bool holds, const std::string& expected) {
-  if (!holds) throw std::invalid_argument("joint tree: " + expected);
+  if (!holds) throw std::invalid_argument("joint tree: " + expected + ".");
 }
 
 std::string joint_name(std::size_t k) { return "joint " + std::to_string(k); }

@@ -1,8 +1,10 @@
-// The Python binding. Shapes and types are checked by the Python side that calls it.
+// The Python binding, which checks its arguments against each other.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 
+#include <algorithm>
 #include <optional>
+#include <string>
 
 #include "kernels.hpp"
 #include "paths.hpp"
@@ -20,24 +22,43 @@ using hovi::intervals::Residuals;
 
 namespace {
 
-using Index = Array<const std::int64_t, 1>;
-
 const Kernels& kernels(bool portable) { return hovi::choose_kernels<Kernels>(portable); }
 
+// N intervals, as many as z has. q has n numbers at a node; it is checked where it is used.
 IntervalPath path_of(const Input<2>& v, const Input<3>& z, const Input<3>& inner) {
-  return {z.shape(0), inner.shape(1), v.shape(1), v.data(), z.data(), inner.data()};
+  v.require_kind("v");
+  z.require_kind("z");
+  inner.require_kind("inner");
+  const std::size_t N = z.shape(0), r = inner.shape(1), n = v.shape(1);
+  v.require("v", {N + 1, n});
+  z.require("z", {N, 2, n});
+  inner.require("inner", {N, r, n});
+  return {N, r, n, v.data(), z.data(), inner.data()};
 }
 
 Residuals residuals_of(const Input<2>& values, const Input<1>& metric) {
+  values.require_kind("residuals");
+  metric.require("metric", {values.shape(1)});
   return {values.shape(0), values.shape(1), values.data(), metric.data()};
 }
 
 void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
               const Input<2>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
               const Output<5>& columns_hessian, bool portable) {
-  const hovi::intervals::Contraction shape{
-      steps.shape(0), table.shape(0), table.shape(2), columns_gradient.shape(2),
-      table.data(),   weights.data(), steps.data()};
+  table.require_kind("table");
+  steps.require_kind("steps");
+  columns_gradient.require_kind("columns_gradient");
+  const std::size_t Q = table.shape(0), m = table.shape(2), B = steps.shape(0);
+  const std::size_t n = columns_gradient.shape(2);
+  table.require("table", {Q, 3, m});
+  weights.require("weights", {Q});
+  gradient.require("gradient", {B * Q, 3 * n});
+  hessian.require("hessian", {B * Q, 3 * n, 3 * n});
+  columns_gradient.require("columns_gradient", {B, m, n});
+  columns_hessian.require("columns_hessian", {B, m, m, n, n});
+  if (B == 0 || n == 0) return;
+  const hovi::intervals::Contraction shape{B,           Q, m, n, table.data(), weights.data(),
+                                           steps.data()};
   const nb::gil_scoped_release released;
   const auto work = allocate(kernels(portable).workspace_size(shape));
   kernels(portable).contract(shape, gradient.data(), hessian.data(), work.get(),
@@ -48,14 +69,32 @@ void interpolate(const Input<3>& table, const Input<1>& steps, const Index& inte
                  const Input<2>& q, const Input<2>& v, const Input<3>& z, const Input<3>& inner,
                  const Output<3>& out) {
   const IntervalPath path = path_of(v, z, inner);
+  table.require_kind("table");
+  steps.require_kind("steps");
+  const std::size_t Q = table.shape(0), columns = table.shape(2), B = steps.shape(0);
+  table.require("table", {Q, 3, columns});
+  if (columns < 3 || columns > 3 + path.modes)
+    refuse("table must have 3 to " + std::to_string(3 + path.modes) + " columns for " +
+           std::to_string(path.modes) + " inner modes, got " + std::to_string(columns) + ".");
+  intervals.require("intervals", {B});
+  q.require("q", {path.intervals + 1, path.dof});
+  out.require("out", {3, B * Q, path.dof});
+  for (std::size_t b = 0; b < B; ++b) {
+    const std::int64_t k = intervals.data()[b];
+    if (k < 0 || std::size_t(k) >= path.intervals)
+      refuse("there is no interval " + std::to_string(k) + " of " +
+             std::to_string(path.intervals) + ".");
+  }
   const nb::gil_scoped_release released;
-  hovi::intervals::interpolate(path, q.data(), table.data(), table.shape(0), table.shape(2),
-                               steps.data(), intervals.data(), steps.shape(0), out.data());
+  hovi::intervals::interpolate(path, q.data(), table.data(), Q, columns, steps.data(),
+                               intervals.data(), B, out.data());
 }
 
 double misfit(const Input<1>& steps, const Input<2>& q, const Input<2>& v, const Input<3>& z,
               const Input<3>& inner) {
   const IntervalPath path = path_of(v, z, inner);
+  steps.require("steps", {path.intervals});
+  q.require("q", {path.intervals + 1, path.dof});
   const nb::gil_scoped_release released;
   return hovi::intervals::misfit(path, q.data(), steps.data());
 }
@@ -64,37 +103,60 @@ void move(const Input<3>& step, const Input<1>& steps, bool nodal, const Input<2
           const Input<3>& z, const Input<3>& inner, const Output<2>& dq, const Output<2>& new_v,
           const Output<3>& new_z, const Output<3>& new_inner) {
   const IntervalPath path = path_of(v, z, inner);
+  const std::size_t N = path.intervals, r = path.modes, n = path.dof;
+  step.require_kind("step");
+  const std::size_t columns = step.shape(1);
+  step.require("step", {N, std::min(std::max<std::size_t>(4, columns), 4 + r), n});
+  steps.require("steps", {N});
+  dq.require("dq", {N + 1, n});
+  new_v.require("new_v", {N + 1, n});
+  new_z.require("new_z", {N, 2, n});
+  new_inner.require("new_inner", {N, r, n});
   const nb::gil_scoped_release released;
-  hovi::intervals::move(path, step.data(), step.shape(1), steps.data(), nodal, dq.data(),
-                        new_v.data(), new_z.data(), new_inner.data());
+  hovi::intervals::move(path, step.data(), columns, steps.data(), nodal, dq.data(), new_v.data(),
+                        new_z.data(), new_inner.data());
 }
 
 void replace_by_prefix_sums(const Input<2>& increments, double share, const Output<3>& values) {
+  increments.require_kind("increments");
+  values.require_kind("values");
+  const std::size_t N = increments.shape(0), n = increments.shape(1), rows = values.shape(1);
+  values.require("values", {N + 1, std::max<std::size_t>(1, rows), n});
   const nb::gil_scoped_release released;
-  hovi::intervals::replace_by_prefix_sums(increments.shape(0), increments.shape(1),
-                                          increments.data(), share,
-                                          values.shape(1) * values.shape(2), values.data());
+  hovi::intervals::replace_by_prefix_sums(N, n, increments.data(), share, rows * n, values.data());
 }
 
 double weighted_square(const Input<2>& residuals, const Input<1>& metric, const Input<1>& weights) {
+  const Residuals r = residuals_of(residuals, metric);
+  weights.require("weights", {r.points});
   const nb::gil_scoped_release released;
-  return hovi::intervals::weighted_square(residuals_of(residuals, metric), weights.data());
+  return hovi::intervals::weighted_square(r, weights.data());
 }
 
 void expand_squares(const Input<2>& residuals, const Input<1>& metric, const Input<3>& jacobian,
                     const std::optional<Input<2>>& force, const Output<1>& values,
                     const Output<2>& gradient) {
+  const Residuals r = residuals_of(residuals, metric);
+  jacobian.require_kind("jacobian");
+  const std::size_t k = jacobian.shape(2);
+  jacobian.require("jacobian", {r.points, r.size, k});
+  const double* const added = data_or_null("force", force, {r.points, r.size});
+  values.require("values", {r.points});
+  gradient.require("gradient", {r.points, k});
   const nb::gil_scoped_release released;
-  hovi::intervals::expand_squares(residuals_of(residuals, metric), jacobian.data(),
-                                  jacobian.shape(2), force ? force->data() : nullptr, values.data(),
-                                  gradient.data());
+  hovi::intervals::expand_squares(r, jacobian.data(), k, added, values.data(), gradient.data());
 }
 
 void predict(const Input<2>& residuals, const Input<1>& metric, const Input<3>& jacobian,
              const Input<2>& change, const Output<2>& out) {
+  const Residuals r = residuals_of(residuals, metric);
+  jacobian.require_kind("jacobian");
+  const std::size_t k = jacobian.shape(2);
+  jacobian.require("jacobian", {r.points, r.size, k});
+  change.require("change", {r.points, k});
+  out.require("out", {r.points, r.size});
   const nb::gil_scoped_release released;
-  hovi::intervals::predict(residuals_of(residuals, metric), jacobian.data(), change.data(),
-                           change.shape(1), out.data());
+  hovi::intervals::predict(r, jacobian.data(), change.data(), k, out.data());
 }
 
 }  // namespace

@@ -29,7 +29,8 @@ def contract(
     H = np.ascontiguousarray(hessian.reshape(P, 3 * n, 3 * n))
     columns_gradient = np.empty((len(steps), m, n))
     columns_hessian = np.empty((len(steps), m, m, n, n))
+    h = np.ascontiguousarray(steps)
     native.contract(
-        np.ascontiguousarray(table), weights, steps, g, H, columns_gradient, columns_hessian
+        np.ascontiguousarray(table), weights, h, g, H, columns_gradient, columns_hessian
     )
     return columns_gradient, columns_hessian

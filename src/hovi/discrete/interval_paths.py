@@ -26,7 +26,8 @@ def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) 
     """
     q, v, z, inner = path
     out = np.empty((3, len(steps) * len(table), v.shape[1]))
-    native.interpolate(table, steps, intervals, q, v, z, inner, out)
+    table, h = np.ascontiguousarray(table), np.ascontiguousarray(steps)
+    native.interpolate(table, h, intervals, q, v, z, inner, out)
     return out
 
 
@@ -39,7 +40,7 @@ def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays
     """
     _, v, z, inner = path
     after = np.empty_like(v), np.empty_like(v), np.empty_like(z), np.empty_like(inner)
-    native.move(step, steps, nodal, v, z, inner, *after)
+    native.move(np.ascontiguousarray(step), steps, nodal, v, z, inner, *after)
     return after
 
 

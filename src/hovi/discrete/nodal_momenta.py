@@ -26,6 +26,7 @@ def accumulated_momenta(derivatives: Array) -> Array:
         stationary to rounding, the evaluated p is returned.
     """
     N = len(derivatives)
-    momenta = np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]])
-    native.replace_by_prefix_sums(derivatives[:, 0] + derivatives[:, 2], ROUNDING * N, momenta)
+    momenta = np.ascontiguousarray(np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]]))
+    increments = np.ascontiguousarray(derivatives[:, 0] + derivatives[:, 2])
+    native.replace_by_prefix_sums(increments, ROUNDING * N, momenta)
     return momenta

@@ -132,8 +132,8 @@ class BandFactor:
 
     def solve(self, rhs: Array) -> Array:
         """(H + shift D)^-1 rhs."""
-        solution = np.empty_like(rhs)
-        native.solve(self.factor, self.rows, rhs, solution)
+        solution = np.empty(rhs.shape)
+        native.solve(self.factor, self.rows, np.ascontiguousarray(rhs), solution)
         return solution
 
 
@@ -161,8 +161,8 @@ class BandModel(QuadraticModel):
 
     def metric_product(self, s: Array) -> Array:
         """D s."""
-        product = np.empty_like(s)
-        native.product(self._metric_band, self.layout.rows, s, product)
+        product = np.empty(s.shape)
+        native.product(self._metric_band, self.layout.rows, np.ascontiguousarray(s), product)
         return product
 
     def descend(self, factor: Factor) -> tuple[Array, float, float]:

@@ -15,7 +15,7 @@ def weighted_square(residuals: Array, metric: Array, weights: Array) -> float:
 
     residuals: r at the points, shape (P, n). metric: R, shape (n,). weights: w, shape (P,).
     """
-    return native.weighted_square(residuals, metric, weights)
+    return native.weighted_square(np.ascontiguousarray(residuals), metric, weights)
 
 
 def expand_squares(
@@ -28,7 +28,9 @@ def expand_squares(
     """
     points, _, k = jacobian.shape
     values, gradient = np.empty(points), np.empty((points, k))
-    native.expand_squares(residuals, metric, jacobian, force, values, gradient)
+    r, J = np.ascontiguousarray(residuals), np.ascontiguousarray(jacobian)
+    added = None if force is None else np.ascontiguousarray(force)
+    native.expand_squares(r, metric, J, added, values, gradient)
     return values, gradient
 
 
@@ -38,5 +40,6 @@ def predict(residuals: Array, metric: Array, jacobian: Array, change: Array) -> 
     change: dx, shape (P, k); the others as for `expand_squares`.
     """
     predicted = np.empty(residuals.shape)
-    native.predict(residuals, metric, jacobian, change, predicted)
+    r, J = np.ascontiguousarray(residuals), np.ascontiguousarray(jacobian)
+    native.predict(r, metric, J, np.ascontiguousarray(change), predicted)
     return predicted

@@ -25,7 +25,8 @@ def rates(
     the rates of q(t) (+) x(t).
     """
     out = np.empty((2, *x.shape[1:]))
-    native.rates(layout, np.ascontiguousarray(x), base_rates, out, portable)
+    moving = None if base_rates is None else np.ascontiguousarray(base_rates)
+    native.rates(layout, np.ascontiguousarray(x), moving, out, portable)
     return out[0], out[1]
 
 
@@ -104,5 +105,5 @@ class CompiledCharts:
 
     @property
     def _arrays(self) -> tuple[Layout, Array, Array, Array, Array, Array]:
-        scheme = np.ascontiguousarray(self.table), self.weights
-        return self.layout, *scheme, np.ascontiguousarray(self.h), self.x, self.ends
+        scheme = np.ascontiguousarray(self.table), self.weights, np.ascontiguousarray(self.h)
+        return self.layout, *scheme, np.ascontiguousarray(self.x), np.ascontiguousarray(self.ends)

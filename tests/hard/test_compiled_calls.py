@@ -1,0 +1,135 @@
+"""Compiled entries check their arguments against each other before they read or write a number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hard import compiled_calls
+from hard.compiled_calls import ENTRIES, changed, error_in, valid_call, verdict_on
+from hard.verdict import Verdict
+from hovi._native import intervals
+from hovi.dynamics.extension import SymbolicModel
+from hovi.robot.bundled_models import example
+from hovi.robot.loading import load_robot
+
+Array = np.ndarray
+SEEDS = range(4)
+
+
+def read_only(array: Array) -> Array:
+    copy = array.copy()
+    copy.setflags(write=False)
+    return copy
+
+
+def misaligned(array: Array) -> Array:
+    memory = bytearray(array.nbytes + 1)
+    return np.frombuffer(memory, array.dtype, array.size, offset=1).reshape(array.shape)
+
+
+WRONG: dict[str, Callable[[Array], Any]] = {
+    "of single precision": lambda x: x.astype(np.float32),
+    "of integers of 32 bits": lambda x: x.astype(np.int32),
+    "of the other byte order": lambda x: x.astype(x.dtype.newbyteorder()),
+    "with a dimension more": lambda x: x[None],
+    "of one number": lambda x: x.dtype.type(1),
+    "not contiguous": lambda x: np.repeat(x, 2, axis=-1)[..., ::2],
+    "longer": lambda x: np.concatenate([x, x[:1]]),
+    "shorter": lambda x: x[:-1],
+    "a list": lambda x: x.tolist(),
+    "misaligned": misaligned,
+}
+
+
+def full_call(name: str) -> dict[str, Any]:
+    """A valid call in which no array is empty, or missing."""
+    for seed in range(1_000):
+        call = valid_call(name, seed)
+        if all(isinstance(call[key], Array) and call[key].size > 1 for key in ENTRIES[name].kinds):
+            return call
+    raise AssertionError(f"no seed gives a full call of {name}")
+
+
+CASES = [(name, key) for name, entry in ENTRIES.items() for key in entry.kinds]
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_valid_calls_are_accepted_and_write_all_of_their_outputs(name: str) -> None:
+    for seed in range(30):
+        call = valid_call(name, seed)
+        assert not error_in(name, call)
+        found, why = verdict_on(name, call)
+        assert found is Verdict.ACCEPTED, why
+
+
+@pytest.mark.parametrize(("name", "key"), CASES)
+def test_an_argument_that_is_wrong_is_refused_and_named(name: str, key: str) -> None:
+    for what, change in WRONG.items():
+        call = full_call(name)
+        call[key] = change(call[key])
+        if not error_in(name, call):  # such as a band of more columns than are used
+            continue
+        with pytest.raises((TypeError, ValueError)) as refusal:
+            ENTRIES[name].function(**call)
+        sentence = str(refusal.value)
+        assert "\n" not in sentence, what
+        assert sentence.endswith("."), what
+        assert refusal.type is ValueError or sentence.startswith(f"{key} must be "), what
+
+
+@pytest.mark.parametrize(
+    ("name", "key"), [case for case in CASES if ENTRIES[case[0]].kinds[case[1]].output]
+)
+def test_an_output_that_is_read_only_is_refused(name: str, key: str) -> None:
+    call = full_call(name)
+    call[key] = read_only(call[key])
+    with pytest.raises(TypeError, match=f"{key} must be a writable.*read-only"):
+        ENTRIES[name].function(**call)
+
+
+@pytest.mark.parametrize("name", ENTRIES)
+def test_random_changes_are_refused_where_they_contradict_the_rest(name: str) -> None:
+    for seed in range(100):
+        found, why = verdict_on(name, changed(name, seed, 2))
+        assert found in (Verdict.REFUSED, Verdict.ACCEPTED), f"seed {seed}: {why}"
+
+
+def test_every_compiled_function_is_among_the_entries() -> None:
+    from hovi._native import band, dynamics, groups
+
+    functions = {
+        f"{module.__name__.rpartition('.')[2]}.{name}"
+        for module in (band, groups, intervals)
+        for name in dir(module)
+        if callable(getattr(module, name)) and not name.startswith("_")
+    }
+    methods = {
+        f"dynamics.{name}"
+        for name in dir(dynamics.InverseDynamicsKernel)
+        if not name.startswith("_") and callable(getattr(dynamics.InverseDynamicsKernel, name))
+    }
+    assert functions | methods | {"dynamics.InverseDynamicsKernel"} <= ENTRIES.keys()
+
+
+def test_a_model_that_contradicts_itself_is_refused() -> None:
+    model = load_robot(example("two_link.urdf")).model
+    text = model.saveToString()
+    SymbolicModel(text)
+    for damaged in ("", "x", text[: len(text) // 2], text.replace(" shoulder ", " ")):
+        with pytest.raises(ValueError, match="archive is "):
+            SymbolicModel(damaged)
+    model.parents[1] = 2
+    with pytest.raises(ValueError, match="contradicts itself"):
+        SymbolicModel(model.saveToString())
+
+
+def test_a_layout_whose_parts_overlap_or_leave_gaps_is_refused() -> None:
+    q, v = np.zeros((1, 14)), np.zeros((1, 12))
+    for second in ([4, 6, 6, 6], [4, 7, 7, 6], [4, 7, 6, 5], [5, 7, 6, 6], [-1, 7, 6, 6]):
+        layout = np.array([[4, 0, 0, 6], second])
+        with pytest.raises(ValueError, match="row 1 of layout is no part"):
+            compiled_calls.groups.integrate(layout, q, v, np.zeros((1, 14)))
