@@ -28,6 +28,14 @@ def test_long_words_and_gaps_are_shortened(letter: str) -> None:
     assert sentence.endswith("end of it.")
 
 
+@pytest.mark.parametrize("word", ["1 h ", "\x00 ", "pose's "])
+def test_long_messages_are_shortened(word: str) -> None:
+    sentence = str(HoviError(f"there is no pose {word * 10**4!s}of that name."))
+    assert len(sentence) < 1_500
+    assert sentence.startswith("there is no pose ")
+    assert sentence.endswith("of that name.")
+
+
 def test_errors_can_be_pickled() -> None:
     error = pickle.loads(pickle.dumps(InputError("T is\n0.")))
     assert type(error) is InputError

@@ -12,13 +12,14 @@ from collections.abc import Iterable
 _MAX_COMPARED = 256  # characters of a name; the time of a comparison grows with their square
 _MAX_LISTED = 60  # names in a message
 _LONG_RUN = re.compile(r"\S{160,}|\s{160,}")
+_FIRST, _LAST = 1_000, 400  # characters of a long message that are kept
 
 
 class HoviError(Exception):
     """Root of everything that hovi raises on purpose.
 
     Messages may quote untrusted input, so control characters are escaped, line breaks included, and
-    very long words are shortened.
+    very long words and messages are shortened.
     """
 
     def __init__(self, sentence: str = "") -> None:
@@ -79,4 +80,7 @@ def nearest(name: str, valid: Iterable[str]) -> str:
 
 def _sanitized(sentence: str) -> str:
     shorter = _LONG_RUN.sub(lambda word: f"{word[0][:80]}...{word[0][-40:]}", sentence)
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in shorter)
+    printable = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in shorter)
+    if len(printable) <= _FIRST + _LAST:
+        return printable
+    return f"{printable[:_FIRST]} ... {printable[-_LAST:]}"
