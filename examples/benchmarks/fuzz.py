@@ -1,4 +1,4 @@
-"""Fuzzing of files and of compiled functions: no crash, no hang, no silent acceptance.
+"""Fuzzing of files, compiled functions and the API: no crash, no hang, no silent acceptance.
 
 Inputs are made by the mutators of tests/hard, each from the seed and its number, and loaded in
 separate processes: a process that dies is a crash, one that is silent for 10 s a hang. Objects that
@@ -32,7 +32,8 @@ KINDS = {
     "urdf": ("hard.mutated_urdf", 10_000),
     "scene": ("hard.mutated_scene", 6_000),
     "trajectory": ("hard.mutated_motion", 6_000),
-    "compiled": ("hard.compiled_calls", 20_000),
+    "compiled": ("hard.compiled_calls", 14_000),
+    "api": ("hard.api_calls", 14_000),
 }
 HANG, STARTUP = 10.0, 120.0  # [s]
 FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)

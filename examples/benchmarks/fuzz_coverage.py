@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
-    python fuzz_coverage.py urdf|scene|trajectory|compiled SECONDS
+    python fuzz_coverage.py urdf|scene|trajectory|compiled|api SECONDS
 
 It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
@@ -22,6 +22,7 @@ MODULES = {
     "scene": "hard.mutated_scene",
     "trajectory": "hard.mutated_motion",
     "compiled": "hard.compiled_calls",
+    "api": "hard.api_calls",
 }
 CORPUS, LARGEST = 300, 60_000  # inputs to begin with; bytes of an input
 HANG = 10  # [s]

@@ -13,10 +13,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.discrete.contraction import contract
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.discrete.interval_charts import IntervalCharts
+from hovi.errors import InputError
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.lagrangian import Lagrangian, PointTerms
@@ -51,6 +54,7 @@ class Expansion:
         return float(np.sum(self.values))
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class DiscreteLagrangian:
     """L_d = h sum_j w_j L(q_j, v_j, a_j) on every interval of a grid.
@@ -75,6 +79,7 @@ class DiscreteLagrangian:
 
         jets: the result of `jets` for this path, if it is known.
         """
+        self._check(path, jets)
         values = np.empty(self.grid.intervals)
         for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
             values[batch.index] = batch.sums(self.lagrangian.value(*jet, t=batch.t))
@@ -82,6 +87,7 @@ class DiscreteLagrangian:
 
     def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
+        self._check(path, jets)
         triples = zip(self.batches, jets or self.jets(path), self.point_weights, strict=True)
         value = self.lagrangian.value
         return sum(float(weights @ value(*jet, t=batch.t)) for batch, jet, weights in triples)
@@ -101,6 +107,10 @@ class DiscreteLagrangian:
         terms: contributions of limits at the points, one per batch; they do not affect values.
         jets: as for `values`.
         """
+        self._check(path, jets)
+        self._check_terms(terms)
+        if multipliers is not None and len(multipliers) != len(self.batches):
+            raise InputError(f"multipliers are {len(self.batches)} arrays, one per batch.")
         parts = []
         known = jets or self.jets(path)
         charts = self._charts(path)
@@ -130,6 +140,7 @@ class DiscreteLagrangian:
 
         jets: as for `values`.
         """
+        self._check(path, jets)
         m = 4 + self.grid.inner_modes
         gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
         for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
@@ -180,6 +191,10 @@ class DiscreteLagrangian:
 
         expansion: at the path from which the step is taken.
         """
+        N, m = self.grid.intervals, 4 + self.grid.inner_modes
+        require_shape("step", step, N, m, self.lagrangian.nv)
+        if len(expansion.values) != N:
+            raise InputError(f"the expansion has {len(expansion.values)} intervals, not {N}.")
         steps = []
         for i, batch in enumerate(self.batches):
             columns = step[batch.index, : 4 + batch.scheme.inner_modes]
@@ -192,6 +207,7 @@ class DiscreteLagrangian:
 
     def jets(self, path: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
+        self._check(path)
         return [self._jet(batch, path) for batch in self.batches]
 
     def turns(self, path: DiscretePath) -> Array:
@@ -199,6 +215,7 @@ class DiscreteLagrangian:
 
         At its quadrature points and its end; zero without charts.
         """
+        self._check(path)
         turns = np.zeros(self.grid.intervals)
         for batch, charts in zip(self.batches, self._charts(path) or (), strict=False):
             turns[batch.index] = charts.turns
@@ -268,6 +285,8 @@ class DiscreteLagrangian:
         jets: list[Jet] | None = None,
     ) -> list[Array]:
         """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
+        self._check(path, jets)
+        self._check_terms(forces)
         known = jets or self.jets(path)
         terms: Sequence[PointTerms | None] = forces or [None] * len(known)
         triples = zip(self.batches, known, terms, strict=True)
@@ -288,6 +307,25 @@ class DiscreteLagrangian:
         d = self.derivatives(path, forces)
         total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
         return total / self.grid.duration
+
+    def _check(self, path: DiscretePath, jets: list[Jet] | None = None) -> None:
+        """Raise InputError for a path that does not fit the grid, or jets at other points."""
+        nq, nv = self.lagrangian.nq, self.lagrangian.nv
+        self.grid.require_path(path, nq, nv)
+        if jets and [[x.shape for x in jet] for jet in jets] != self._jet_shapes:
+            raise InputError("the jets are not at this path's points: see `jets`.")
+
+    @cached_property
+    def _jet_shapes(self) -> list[list[tuple[int, ...]]]:
+        """Of q, v and a at the points of each batch."""
+        nq, nv = self.lagrangian.nq, self.lagrangian.nv
+        return [[(len(b.t), nq), (len(b.t), nv), (len(b.t), nv)] for b in self.batches]
+
+    def _check_terms(self, terms: list[PointTerms] | None) -> None:
+        """Raise InputError for terms that are not one per batch, at its points."""
+        points = [len(batch.t) for batch in self.batches]
+        if terms is not None and [len(term.jet_gradient) for term in terms] != points:
+            raise InputError(f"terms are one per batch, at {points} points.")
 
     def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
         """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""

@@ -9,16 +9,21 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments, unchecked
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.schemes import Scheme, galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
 
 Array = npt.NDArray[np.float64]
 
+MAX_INTERVALS = 10**7
+"""Maximum number of intervals, of a file too."""
 MIN_STEP, MAX_STEP = 1e-12, 1e9
 """Steps, in [s], whose powers do not overflow or underflow in double precision."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Grid:
     """Intervals of time, each with its own length and scheme.
@@ -59,9 +64,11 @@ class Grid:
         """
         if not (np.isfinite(duration) and duration > 0):
             raise InputError(f"the duration must be positive and finite, got {duration} s.")
-        if not (np.isfinite(intervals) and intervals == int(intervals) and intervals >= 1):
-            raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
-        return cls(np.full(int(intervals), duration / intervals), (scheme,) * int(intervals))
+        if not 1 <= intervals <= MAX_INTERVALS:
+            raise InputError(
+                f"the number of intervals must be from 1 to {MAX_INTERVALS:,}, got {intervals}."
+            )
+        return cls(np.full(intervals, duration / intervals), (scheme,) * intervals)
 
     def stretched(self, duration: float) -> Grid:
         """The grid scaled to another duration.
@@ -75,6 +82,7 @@ class Grid:
 
         chosen: shape (N,).
         """
+        require_shape("chosen", chosen, self.intervals)
         parts = np.where(chosen, 2, 1)
         schemes = [s for s, count in zip(self.schemes, parts, strict=True) for _ in range(count)]
         return Grid(np.repeat(self.steps / parts, parts), tuple(schemes))
@@ -110,6 +118,25 @@ class Grid:
     def duration(self) -> float:
         """T, in [s]."""
         return float(self.t[-1])
+
+    @unchecked
+    def require_path(self, path: DiscretePath, nq: int, nv: int) -> None:
+        """Raise InputError unless a path has the intervals and inner modes of this grid.
+
+        It may have more inner modes. nq, nv: lengths of its configurations and velocities.
+        """
+        N, r = len(self.steps), self.inner_modes
+        inner = path.inner.shape
+        modes = max(r, inner[1]) if len(inner) == 3 else r
+        shapes = (N + 1, nq), (N + 1, nv), (N, 2, nv), (N, modes, nv)
+        if (path.q.shape, path.v.shape, path.z.shape, inner) == shapes:
+            return
+        for name, shape, array in zip(("q", "v", "z", "inner"), shapes, path.arrays, strict=True):
+            if array.shape != shape:
+                raise InputError(
+                    f"the path's {name} must have shape {shape} on this grid of {N} intervals with "
+                    f"{r} inner modes, got {array.shape}."
+                )
 
     def node_at(self, time: float) -> int:
         """The index of the inner node at a time, in [s]. Raises InputError if there is none."""
@@ -170,6 +197,7 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
     return tuple((tables[key], np.array(index)) for key, index in members.items())
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class DiscretePath:
     """The coordinates of a discrete motion on a grid.
@@ -182,12 +210,19 @@ class DiscretePath:
     v: velocities at the nodes, shape (N + 1, nv), per [s].
     z: regularized coordinates of the intervals, shape (N, 2, nv), per [s^2].
     inner: inner modes c/h^2, shape (N, r, nv), per [s^2]; 0 where an interval has fewer.
+    Compiled code reads them as contiguous arrays; `Grid.require_path` checks their shapes.
     """
 
     q: Array
     v: Array
     z: Array
     inner: Array
+
+    def __post_init__(self) -> None:
+        for name in ("q", "v", "z", "inner"):
+            array = getattr(self, name)
+            if not array.flags.c_contiguous:
+                object.__setattr__(self, name, np.ascontiguousarray(array))
 
     @property
     def intervals(self) -> int:

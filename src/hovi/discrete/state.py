@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError, nearest
 from hovi.robot.robot import Robot
 
@@ -18,6 +19,7 @@ ALL = "all"
 """Stands for all joints in a list of joint names."""
 
 
+@check_arguments_except("q", "v", "turns")
 @dataclass(frozen=True, eq=False)
 class State:
     """A point (q, v) of TQ: where a motion starts or ends.

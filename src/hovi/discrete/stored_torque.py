@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -22,6 +23,7 @@ _COUNTS = (9, 17, 33, 65)
 _TOLERANCE = 1e-12
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class StoredTorque:
     """Torques at the C Chebyshev points of each of N intervals.

@@ -16,7 +16,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import numbers_of, require_shape
+from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory_file import read_arrays, write_arrays
@@ -32,7 +34,6 @@ Index = npt.NDArray[np.intp]
 
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
 _TORQUE = "tau"
-_MAX_INTERVALS = 10**7
 
 
 class Sample(NamedTuple):
@@ -50,6 +51,7 @@ class Sample(NamedTuple):
     tau: Array
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """A motion of a scene's robot on a grid, with its costates.
@@ -135,20 +137,32 @@ class Trajectory:
 
     def jet_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Array, Array, Array]:
         """q, v and a of `sample_intervals`, without computing torques."""
-        return self._interpolate(np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64))
+        return self._interpolate(*self._checked(k, s))
 
     def sample_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> Sample:
         """q, v, a and tau in given intervals, so that both limits at a node are available.
 
         k: interval numbers, shape (M,). s: positions in [0, 1] in the interval, shape (M,).
         """
-        k, s = np.asarray(k, dtype=np.intp), np.asarray(s, dtype=np.float64)
+        k, s = self._checked(k, s)
         q, v, a = self._interpolate(k, s)
         if self.torque is not None:
             return Sample(q, v, a, self.torque(k, s))
         assert self.scene is not None
         t = self.t[k] + s * self.grid.steps[k]
         return Sample(q, v, a, self.scene.inverse_dynamics(q, v, a, t))
+
+    def _checked(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Index, Array]:
+        """Interval numbers and positions as arrays. Raises InputError if they are not these."""
+        numbers, positions = numbers_of("k", k, None), numbers_of("s", s, None)
+        known = (numbers >= 0) & (numbers < self.grid.intervals) & (numbers == np.floor(numbers))
+        if not known.all() or not ((positions >= 0) & (positions <= 1)).all():
+            raise InputError(
+                f"k must be numbers of intervals, 0 to {self.grid.intervals - 1}, and s positions "
+                "from 0 to 1 within them."
+            )
+        require_shape("s", positions, len(numbers))
+        return numbers.astype(np.intp), positions
 
     def _locate(self, t: npt.ArrayLike) -> tuple[Index, Array]:
         """The interval of each time, and the position in [0, 1] within it."""
@@ -309,7 +323,7 @@ def _schemes(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
         raise InputError("the schemes are not a list of [name, count]")
     schemes: list[Scheme] = []
     for name, count in runs:
-        if not isinstance(name, str) or type(count) is not int or not 0 < count <= _MAX_INTERVALS:
+        if not isinstance(name, str) or type(count) is not int or not 0 < count <= MAX_INTERVALS:
             raise InputError(f"{[name, count]!r} is not a scheme's name and a count")
         modes = name.rpartition("-")[2]
         if modes.isdecimal() and int(modes) > inner[1]:

@@ -138,16 +138,24 @@ class InverseDynamicsKernel:
         return tau, J, H
 
     def _points(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-        points = np.shape(q)[:1] or (1,)
-        q = self._array("q", q, (*points, self._nq))
-        v = self._array("v", v, (*points, self._n))
+        q = _numbers("q", q)
+        q = self._array("q", q, (len(q), self._nq))
+        v = self._array("v", v, (len(q), self._n))
         return q, v, self._array("a", a, v.shape)
 
     def _array(self, name: str, x: Array, shape: tuple[int, ...]) -> Array:
-        x = np.ascontiguousarray(x, dtype=np.float64)
+        x = _numbers(name, x)
         if x.shape != shape:
             raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
         return x
+
+
+def _numbers(name: str, x: Array) -> Array:
+    """x as contiguous doubles, of one dimension or more."""
+    try:
+        return np.ascontiguousarray(x, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name} must be an array of numbers: {error}.") from error
 
 
 def _check_threads(threads: int) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.function_cache import compiled
+from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
@@ -44,6 +45,7 @@ class PointFunction:
             function = compiled(function)
             self._cost //= COMPILED_SPEEDUP
         self.function = function
+        self._widths = [int(function.numel_in(i)) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]
         self._threads = default_threads()
         self._mapped = functools.lru_cache(maxsize=16)(function.map)
@@ -54,13 +56,35 @@ class PointFunction:
         return type(self), self._arguments
 
     def __call__(self, *arguments: Array) -> list[Array]:
-        """Evaluate at P points; arguments of shape (P, width)."""
-        arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
+        """Evaluate at P points; arguments of shape (P, width). Raises InputError for others."""
+        try:
+            arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"{self.function.name()} takes arrays of numbers: {error}.") from error
         points = len(arrays[0])
+        self._check(arrays, points)
         results = [np.empty((points, *reversed(shape))) for shape in self._shapes]
         for part, threads in self._parts(points):
             self._evaluate([a[part] for a in arrays], [r[part] for r in results], threads)
         return [_squeeze(result) for result in results]
+
+    def _check(self, arrays: list[Array], points: int) -> None:
+        """Raise InputError unless every argument has one row of its numbers for each point."""
+        if [array.shape for array in arrays] == [(points, width) for width in self._widths]:
+            return
+        if len(arrays) != len(self._widths):
+            raise InputError(
+                f"{self.function.name()} takes {len(self._widths)} arrays, got {len(arrays)}."
+            )
+        for i, (array, width) in enumerate(zip(arrays, self._widths, strict=True)):
+            if array.shape != (points, width) and (len(array), array.size) != (
+                points,
+                points * width,
+            ):
+                raise InputError(
+                    f"{self.function.name_in(i)} must have shape ({points}, {width}), got "
+                    f"{array.shape}."
+                )
 
     def _parts(self, points: int) -> Iterator[tuple[slice, int]]:
         """(points of a call, number of threads that share them equally); a remainder runs alone."""

@@ -12,7 +12,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_fields
 from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.errors import SceneError
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -43,9 +45,13 @@ class Effect(ABC):
     """What it modifies; a scene refuses an effect that modifies anything else."""
 
     def __post_init__(self) -> None:
-        """Convert lists to tuples, so that effects read from a file equal those written."""
+        """Convert lists to tuples, so that effects read from a file equal those written.
+
+        Raises SceneError for a field of another type than its annotation.
+        """
         for field in fields(self):
             object.__setattr__(self, field.name, _frozen(getattr(self, field.name)))
+        check_fields(self, f"effect {self.key!r}", SceneError)
 
     def check(self, robot: Robot) -> None:
         """Raise SceneError if the effect is not valid for the robot."""
@@ -79,6 +85,8 @@ class Effect(ABC):
 
 
 def _frozen(value: Any) -> Any:
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {key: _frozen(each) for key, each in value.items()}
     return tuple(_frozen(each) for each in value) if isinstance(value, (list, tuple)) else value

@@ -19,6 +19,10 @@ def register(effect: Kind) -> Kind:
     The class must be registered before such a file is read.
     Raises SceneError if another effect has the same key.
     """
+    if not (isinstance(effect, type) and issubclass(effect, Effect)):
+        raise SceneError(f"an effect is a subclass of hovi.effects.Effect, not {effect!r}.")
+    if not isinstance(getattr(effect, "key", None), str):
+        raise SceneError(f"the effect {effect.__name__} needs a class attribute key, a text.")
     known = REGISTRY.setdefault(effect.key, effect)
     if known is not effect:
         raise SceneError(

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.flows.legendre_transforms import (
     batch,
     inverse_legendre_minus,
@@ -39,6 +40,7 @@ class Regularity:
     condition: Array
 
 
+@check_arguments
 def regularity(ld: SegmentLagrangian, x0: Array, x1: Array) -> Regularity:
     """W_d at (x0, x1), with determinant and condition.
 
@@ -49,16 +51,19 @@ def regularity(ld: SegmentLagrangian, x0: Array, x1: Array) -> Regularity:
     return Regularity(matrix, np.linalg.det(matrix), np.linalg.cond(matrix))
 
 
+@check_arguments
 def euler_lagrange_residual(ld: SegmentLagrangian, x0: Array, x1: Array, x2: Array) -> Array:
     """D_{i+k} L_d(x0, x1) + D_i L_d(x1, x2), i = 1 .. k, which is F^+ - F^-; shape as x0."""
     return legendre_plus(ld, x0, x1)[1] - legendre_minus(ld, x1, x2)[1]
 
 
+@check_arguments
 def discrete_lagrangian_map(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F_{L_d} = (F^-)^-1 o F^+: (x0, x1) -> (x1, x2)."""
     return inverse_legendre_minus(ld, *legendre_plus(ld, x0, x1))
 
 
+@check_arguments
 def discrete_hamiltonian_flow(
     ld: SegmentLagrangian, x0: Array, p0: Array, form: Form = "momentum"
 ) -> tuple[Array, Array]:

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_segment
 from hovi.flows.segment import Segment, SegmentLagrangian, flat
@@ -26,6 +28,7 @@ INNER_MODES = (4, 7, 10, 14, 19, 25, 32, 40)
 """Numbers of inner modes, in the order in which they are tried."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class ExactDiscreteLagrangian(SegmentLagrangian):
     """L_d^e to a tolerance, with all its derivatives.
@@ -74,13 +77,19 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
         )
 
 
+@check_arguments
 def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float) -> float:
     """The first conjugate point along a solution, the upper bound of h of L_d^e, in [s].
 
     By Morse's index theorem the action between fixed ends is a minimum up to it; there, the
     smallest eigenvalue of the inner modes' Hessian is zero.
     x0, p0: start, shape (k, n). longest: end of the search, in [s]. Returns inf if there is none.
+    Raises InputError for other shapes, and a `longest` that is not positive.
     """
+    for name, array in (("x0", x0), ("p0", p0)):
+        require_shape(name, array, lagrangian.order, lagrangian.nv)
+    if not 0 < longest < np.inf:
+        raise InputError(f"longest must be positive and finite, in seconds, got {longest}.")
     scheme = _table(INNER_MODES[-1], lagrangian.order)
 
     def least(h: float) -> float:

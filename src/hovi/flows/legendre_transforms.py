@@ -14,6 +14,8 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.flows.segment import SegmentLagrangian
 from hovi.optimize.batched_newton import newton
@@ -30,28 +32,33 @@ INVOLVED = 0.1
 """Part in a unit vector of the kernel above which a coordinate is named."""
 
 
+@check_arguments
 def legendre_minus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^- L_d: (x0, x1) -> (x0, p0) with p0 = (-D_1 L_d, ..., -D_k L_d)."""
     segment = ld.joining(batch(x0), batch(x1))
     return x0, segment.p0.reshape(np.shape(x0))
 
 
+@check_arguments
 def legendre_plus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^+ L_d: (x0, x1) -> (x1, p1) with p1 = (D_{k+1} L_d, ..., D_2k L_d)."""
     segment = ld.joining(batch(x0), batch(x1))
     return x1, segment.p1.reshape(np.shape(x0))
 
 
+@check_arguments
 def inverse_legendre_minus(ld: SegmentLagrangian, x0: Array, p0: Array) -> tuple[Array, Array]:
     """(F^- L_d)^-1: (x0, p0) -> (x0, x1), near the diagonal."""
     return x0, ld.from_start(batch(x0), batch(p0)).x1.reshape(np.shape(x0))
 
 
+@check_arguments
 def inverse_legendre_plus(ld: SegmentLagrangian, x1: Array, p1: Array) -> tuple[Array, Array]:
     """(F^+ L_d)^-1: (x1, p1) -> (x0, x1), near the diagonal."""
     return ld.from_end(batch(x1), batch(p1)).x0.reshape(np.shape(x1)), x1
 
 
+@check_arguments
 def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]:
     """FL: T^(2k-1)Q -> T*T^(k-1)Q, (q, q', ..., q^(2k-1)) -> (x, p), both (B, k, n) or (k, n).
 
@@ -62,12 +69,15 @@ def legendre(lagrangian: Lagrangian, *jet: npt.ArrayLike) -> tuple[Array, Array]
     jet: 2 k arrays of shape (B, n) or (n,). On groups x has shape (B, 1, nq + (k - 1) nv).
     """
     arrays = [np.asarray(x, dtype=np.float64) for x in jet]
-    k = lagrangian.order
+    k, nq, n = lagrangian.order, lagrangian.nq, lagrangian.nv
     if len(arrays) != 2 * k:
         raise InputError(
             f"FL of a Lagrangian of order {k} needs {2 * k} arrays (q, q', ...), got {len(arrays)}."
         )
     one = arrays[0].ndim == 1
+    lead = () if one else (None if not arrays[0].ndim else len(arrays[0]),)
+    for j, array in enumerate(arrays):
+        require_shape(f"array {j} of the jet", array, *lead, n if j else nq)
     points = [np.atleast_2d(x) for x in arrays]
     p = _momenta(lagrangian, points) if k <= 2 else _symbolic_momenta(lagrangian, points)
     if lagrangian.space is None:
@@ -156,13 +166,23 @@ def coordinates_in_words(lagrangian: Lagrangian, coordinates: Indices) -> str:
     return ", ".join(shown[:6]) + more
 
 
+@check_arguments
 def hamiltonian(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) -> Array:
     """H = sum_j p_j . q^(j+1) - L on T*T^(k-1)Q, shape (B,); x and p of shape (B, k, n).
 
     H = E_L o FL^-1: mechanical energy for k = 1, Pontryagin's p.v + p~.a - L for k = 2.
     x: as for `highest_derivative`.
+    Raises InputError for other shapes.
     """
+    k, n = lagrangian.order, lagrangian.nv
+    require_shape("p", p, None, k, n)
+    if isinstance(x, np.ndarray):
+        require_shape("x", x, len(p), k, None)
     jet = list(np.moveaxis(x, 1, 0)) if isinstance(x, np.ndarray) else list(x)
+    if len(jet) != k:
+        raise InputError(f"x must be {k} arrays with one row per point, got {len(jet)}.")
+    for j, array in enumerate(jet):
+        require_shape(f"x[{j}]", array, len(p), n if j else lagrangian.nq)
     jet.append(highest_derivative(lagrangian, jet, p))
     rates = np.stack(jet[1:], axis=1)
     return np.asarray(np.sum(p * rates, axis=(1, 2)) - lagrangian.value(*jet))

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.errors import InputError
 from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
 from hovi.flows.legendre_transforms import legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
@@ -88,6 +90,7 @@ class VariationalOrder:
         return f"{order}, not reliable: {self.reason}" if self.reason else order
 
 
+@check_arguments
 def variational_order(
     lagrangian: Lagrangian, scheme: Scheme, steps: Sequence[float], *jet: npt.ArrayLike
 ) -> VariationalOrder:
@@ -100,7 +103,9 @@ def variational_order(
         row per solution.
     Raises InputError if a step is too long for L_d^e.
     """
-    x, p = legendre(lagrangian, *jet)
+    if not len(steps):
+        raise InputError("steps must hold three steps or more, got none.")
+    x, p = legendre(lagrangian, *map(np.atleast_2d, jet))
     found = []
     for h in steps:
         exact = ExactDiscreteLagrangian(lagrangian, h).from_start(x, p)

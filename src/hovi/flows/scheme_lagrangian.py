@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments, unchecked
+from hovi.checks.shapes import require_shape
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
 from hovi.flows.legendre_transforms import jet_at_momenta
@@ -31,6 +33,7 @@ from hovi.schemes import Scheme
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class SchemeLagrangian(SegmentLagrangian):
     """L_d = h sum_j w_j L(q_j, q'_j, ..., q^(k)_j), extremal in the inner modes.
@@ -60,6 +63,7 @@ class SchemeLagrangian(SegmentLagrangian):
 
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
         """Newton's method for the inner modes."""
+        self.require_points(x0=x0, w=w)
         B, k, r, n = len(x0), self.k, self.scheme.inner_modes, self.n
         if r == 0:
             return self._segment(x0, w, np.zeros((B, 0, n)), t0)
@@ -80,6 +84,7 @@ class SchemeLagrangian(SegmentLagrangian):
         It starts from the curve of `guess` continued, the segment before, or from the exact jet at
         (x0, p0). Where it fails or ends far from there, shorter steps decide: see `hard_step`.
         """
+        self.require_points(x0=x0, p0=p0)
         B = len(x0)
         if guess is None:
             modes = self._taylor(x0, p0, t0)
@@ -133,6 +138,7 @@ class SchemeLagrangian(SegmentLagrangian):
 
     def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
         """Newton's method for (w, c): phi_w = gamma^T (S/h) p1, phi_c = 0, with x0 from w."""
+        self.require_points(x1=x1, p1=p1)
         B, m, R = len(x1), self.k * self.n, self.regularized
         given = (R.gamma.T @ (R.scale[:, None] / self.h * p1)).reshape(B, m)
         moved = np.kron(R.inverse_taylor @ R.moments, np.eye(self.n))
@@ -151,8 +157,11 @@ class SchemeLagrangian(SegmentLagrangian):
 
     def at(self, x0: Array, w: Array, inner: Array, t0: float = 0.0) -> Segment:
         """The segment with given inner modes, which are assumed to be extremal."""
+        self.require_points(x0=x0, w=w)
+        require_shape("inner", inner, len(x0), self.scheme.inner_modes, self.n)
         return self._segment(x0, w, inner, t0)
 
+    @unchecked
     def jet(self, x0: Array, w: Array, inner: Array) -> list[Array]:
         """(q, q', ..., q^(k)) at the quadrature points, k + 1 arrays of shape (B * Q, n)."""
         data = np.concatenate([x0, w, inner], axis=1)  # (B, 2k + r, n)

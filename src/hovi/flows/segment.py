@@ -13,6 +13,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments, unchecked
+from hovi.checks.shapes import require_shape
+from hovi.errors import InputError
 from hovi.flows.regularized import Regularized, regularized
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
@@ -159,6 +162,7 @@ def flat(blocks: Array) -> Array:
     return blocks.transpose(0, 1, 3, 2, 4).reshape(B, m * n, count * n)
 
 
+@check_arguments
 class SegmentLagrangian(ABC):
     """L_d(x0, x1) for an interval of length h, x = (q, q', ..., q^(k-1)) in T^(k-1)Q.
 
@@ -202,7 +206,18 @@ class SegmentLagrangian(ABC):
 
     def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> Segment:
         """The segment between two points of T^(k-1)Q, both (B, k, n)."""
+        self.require_points(x0=x0, x1=x1)
         return self.between(x0, self.regularized.w(x0, x1), t0)
+
+    @unchecked
+    def require_points(self, **points: Array) -> None:
+        """Raise InputError unless arrays have the same shape (B, k, n), with B of 1 or more."""
+        B = 0
+        for name, array in points.items():
+            require_shape(name, array, B or None, self.k, self.n)
+            B = len(array)
+            if B == 0:
+                raise InputError(f"{name} must have one row or more, got shape {array.shape}.")
 
     def value(self, x0: Array, x1: Array) -> Array:
         """L_d(x0, x1), shape (B,)."""

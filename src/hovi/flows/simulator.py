@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import regularized
 from hovi.discrete.state import State, as_state
@@ -110,6 +111,7 @@ class Simulation:
         return Trajectory(grid, path, momenta, self.scene, {"status": "simulated"})
 
 
+@check_arguments
 @one_blas_thread
 def simulate(
     scene: Scene,

@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import numbers_of
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
@@ -110,6 +112,7 @@ class Flow:
         return Trajectory(grid, path, self.p, scene, {"status": "flow"})
 
 
+@check_arguments
 def flow(
     ld: DiscreteLagrangian | SegmentLagrangian | ChartedLagrangian,
     z0: State | npt.ArrayLike,
@@ -270,7 +273,7 @@ def _start(
         v = np.zeros(ld.n) if z0.v is None else z0.v
         rows = [np.asarray(z0.q, float), np.asarray(v, float)][: ld.k]
         z0 = np.concatenate(rows)[None] if isinstance(ld, ChartedLagrangian) else np.stack(rows)
-    x, p = np.array(z0, dtype=np.float64), np.array(p0, dtype=np.float64)
+    x, p = numbers_of("z0", z0), numbers_of("p0", p0)
     shape = (ld.k, ld.n)
     if isinstance(ld, ChartedLagrangian):
         shape = (1, ld.space.nq + (ld.k - 1) * ld.n)

@@ -17,6 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import numbers_of, require_shape
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError, SceneError
@@ -29,6 +31,7 @@ Array = npt.NDArray[np.float64]
 MAX_DERIVATIVES = 4
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Symmetry:
     """A one-parameter group of motions of Q = R^n, by its generator.
@@ -43,21 +46,27 @@ class Symmetry:
     def momentum(self, x: Array, p: Array) -> Array:
         """J at N points, shape (N,); x and p of shape (N, k, n).
 
-        The group need not be a symmetry of L.
+        The group need not be a symmetry of L. Raises InputError for other shapes.
         """
+        require_shape("p", p, *x.shape)
         lifted = self.lift(x)
         return np.asarray(np.sum(p * lifted, axis=(1, 2)))
 
     def defect(self, lagrangian: Lagrangian, *jet: Array) -> Array:
         """sum_j dL/dq^(j) . d^j/dt^j xi, shape (P,): zero if L is invariant.
 
-        jet: (q, q', ..., q^(k)), k + 1 arrays of shape (P, n).
+        jet: (q, q', ..., q^(k)), k + 1 arrays of shape (P, n). Raises InputError for others.
         """
+        if not jet or len(jet) != lagrangian.order + 1:
+            raise InputError(f"L takes {lagrangian.order + 1} arrays (q, q', ...), got {len(jet)}.")
+        for j, array in enumerate(jet):
+            require_shape(f"array {j} of the jet", array, len(jet[0]) if j else None, self.n)
         lifted = self.lift(np.stack(jet, axis=1))
         return np.asarray(np.sum(lagrangian.gradient(*jet) * lifted, axis=(1, 2)))
 
     def lift(self, x: Array) -> Array:
         """(xi, d/dt xi, ...) at N points of T^(k-1)Q, shape (N, k, n)."""
+        require_shape("x", x, None, None, self.n)
         k = x.shape[1]
         if k > MAX_DERIVATIVES:
             raise InputError(f"symmetries are lifted to k <= {MAX_DERIVATIVES}, got {k}.")
@@ -76,6 +85,7 @@ class Symmetry:
         ]
 
 
+@check_arguments
 def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 0, 0)) -> Symmetry:
     """The rotation of a whole robot about an axis under which gravity is invariant.
 
@@ -91,9 +101,10 @@ def base_rotation(scene: Scene, axis: npt.ArrayLike, point: npt.ArrayLike = (0, 
             f"gravity {g.tolist()} changes under a rotation about {w.tolist()}; use an axis along "
             "gravity."
         )
-    return _base_motion(scene, np.concatenate([np.cross(np.asarray(point, float), w), w]))
+    return _base_motion(scene, np.concatenate([np.cross(numbers_of("point", point, 3), w), w]))
 
 
+@check_arguments
 def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
     """The translation of a whole robot along a direction orthogonal to gravity.
 
@@ -110,8 +121,8 @@ def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
 
 
 def _unit(vector: npt.ArrayLike) -> Array:
-    array = np.asarray(vector, dtype=np.float64)
-    if array.shape != (3,) or not np.linalg.norm(array) > 0:
+    array = numbers_of("a direction of the world", vector, 3)
+    if not 0 < np.linalg.norm(array) < np.inf:
         raise InputError(f"a direction of the world is three numbers, not all zero; got {array}.")
     return array / np.linalg.norm(array)
 

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
@@ -70,6 +71,7 @@ class Tracking:
         return more
 
 
+@check_arguments_except("plan")
 def play(
     scene: Scene,
     plan: Trajectory,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import SceneError, nearest
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -11,6 +12,7 @@ _FOLDERS = (_PACKAGE / "models", _PACKAGE.parents[1] / "models")
 """Inside an installed wheel, and in a source tree."""
 
 
+@check_arguments
 def example(name: str) -> Path:
     """The path of a scene or URDF that ships with hovi.
 

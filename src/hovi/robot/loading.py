@@ -9,7 +9,8 @@ from typing import Any
 
 import pinocchio as pin
 
-from hovi.errors import ModelError, expect
+from hovi.checks.arguments import check_arguments_except
+from hovi.errors import InputError, ModelError, expect
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
 from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
@@ -24,8 +25,16 @@ def is_path(text: str) -> bool:
 
 
 def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
-    """Names as a tuple; a single string counts as one name."""
-    return (values,) if isinstance(values, str | Path) else tuple(values)
+    """Names as a tuple; a single string counts as one name. Raises InputError for others."""
+    if isinstance(values, str | Path):
+        return (values,)
+    try:
+        names = tuple(values)
+    except TypeError:  # no iterable
+        names = (None,)
+    if not all(isinstance(name, str | Path) for name in names):
+        raise InputError(f"expected a list of names, or a single one, got {values!r}.")
+    return names
 
 
 def file_source(
@@ -80,6 +89,7 @@ def example_source(
     return replace(source, armature=rotor_armature(build_full_model(source), example.srdf))
 
 
+@check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs")
 def load_robot(
     x: str | Path | pin.Model,
     *,
@@ -106,7 +116,7 @@ def load_robot(
     InputError for a mimic or free_flyer that is neither True nor False.
     """
     expect(mimic, bool, "mimic=True or mimic=False")
-    expect(free_flyer or False, bool, "free_flyer=True or free_flyer=False")
+    expect(False if free_flyer is None else free_flyer, bool, "free_flyer=True or free_flyer=False")
     names = as_names(locked)
     folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
     semantics = None if srdf is None else Path(srdf)

@@ -18,6 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments, check_arguments_except
+from hovi.checks.shapes import require_rows
 from hovi.errors import InputError, ModelError, nearest
 from hovi.robot import model as robot_model
 from hovi.robot.description import describe
@@ -35,6 +37,7 @@ from hovi.robot.tip_frame import is_moved, tip_frames
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A robot, created by `load_robot`.
@@ -125,7 +128,9 @@ class Robot:
         return nearest(name, self.joint_names if valid is None else valid)
 
     def joint_at(self, index: int) -> str:
-        """The joint that the entry of v at an index belongs to."""
+        """The joint that the entry of v at an index belongs to. Raises InputError without one."""
+        if not 0 <= index < self.nv:
+            raise InputError(f"v has entries 0 to {self.nv - 1}, not {index}.")
         pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
         return next(n for n, joint in pairs if joint.idx_v <= index < joint.idx_v + joint.nv)
 
@@ -288,18 +293,28 @@ class Robot:
         return np.array(pin.neutral(self.model), dtype=float)
 
     def integrate(self, q: Array, dq: Array) -> Array:
-        """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq)."""
+        """q (+) dq: move configurations (..., nq) by tangent vectors (..., nv) -> (..., nq).
+
+        Raises InputError for other shapes.
+        """
         if self.vector_joints:
-            return np.asarray(q, dtype=float) + dq
+            require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
+            return np.asarray(q + dq)
         if self.unplanned_joints:
+            require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
             return configuration.integrate(self.model, q, dq)
         return self.space.integrate(q, dq)
 
     def difference(self, q0: Array, q1: Array) -> Array:
-        """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq)."""
+        """q1 (-) q0: the tangent vector (..., nv) that moves q0 (..., nq) to q1 (..., nq).
+
+        Raises InputError for other shapes.
+        """
         if self.vector_joints:
-            return np.asarray(q1, dtype=float) - q0
+            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
+            return np.asarray(q1 - q0)
         if self.unplanned_joints:
+            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
             return configuration.difference(self.model, q0, q1)
         return self.space.difference(q0, q1)
 
@@ -314,6 +329,7 @@ class Robot:
         indices = [robot_model.frame_id(self.model, frame) for frame in frames]
         return configuration.frame_positions(self.model, indices, q)
 
+    @check_arguments_except("q")
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.
 
@@ -333,6 +349,7 @@ class Robot:
             configuration.manifold_hint(self.model),
         )
 
+    @check_arguments_except("v")
     def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
         """`v` as a finite float array (nv,). Raises InputError naming the joint."""
         return configuration.check_vector(v, name, self.coordinate_names)

@@ -6,7 +6,9 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.dynamics.point_function import PointFunction
+from hovi.errors import InputError
 from hovi.robot.space import tangent
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.lagrangian import Lagrangian
@@ -22,9 +24,15 @@ class CasadiLagrangian(Lagrangian):
     space: the configuration space; None if it is a vector space.
     """
 
+    @check_arguments
     def __init__(
         self, jet: list[ca.SX], expression: ca.SX, space: ConfigurationSpace | None = None
     ) -> None:
+        if len(jet) < 2 or not all(each.is_column() and each.numel() for each in jet):
+            raise InputError(
+                "a jet is a list of two or more columns (q, v, ...) of CasADi symbols, got "
+                f"{len(jet)}, of shapes {', '.join(str(each.shape) for each in jet)}."
+            )
         self.order = len(jet) - 1
         self.jet = list(jet)
         self.expression = expression

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.dynamics.torque_model import TorqueModel
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -79,6 +80,7 @@ class EffortLagrangian(Lagrangian):
         """R (tau + J dx), shape (P, nv)."""
         return predict(outputs, self.weight, jacobian, change)
 
+    @check_arguments
     def reweighted(self, weight: Array) -> EffortLagrangian:
         """The same Lagrangian with another R, shape (nv,)."""
         return replace(self, weight=weight)

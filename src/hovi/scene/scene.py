@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
@@ -28,6 +29,7 @@ from hovi.scene.terms import SceneTerms
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments_except("effects", "passive")
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A robot with the effects that act on it; nothing else is simulated.
@@ -183,14 +185,17 @@ class Scene:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Scene:
-        """The scene from the result of `to_dict`. Raises SceneError for an unknown effect."""
-        effects = []
-        for key, values in data["effects"].items():
-            if key not in REGISTRY:
-                raise SceneError(f"there is no effect {key!r}: {nearest(key, REGISTRY)}")
-            effects.append(REGISTRY[key](**values))
-        robot = Robot.from_dict(data["robot"])
-        return cls(robot, effects, passive=tuple(data.get("passive", ())))
+        """The scene from the result of `to_dict`.
+
+        Raises SceneError for an unknown effect, ModelError for a robot that cannot be read.
+        """
+        tables = data.get("effects"), data.get("robot")
+        if not all(isinstance(table, dict) for table in tables):
+            raise SceneError("a stored scene needs the tables 'robot' and 'effects'.")
+        effects = [_effect(key, values) for key, values in data["effects"].items()]
+        return cls(
+            Robot.from_dict(data["robot"]), effects, passive=_passive_names(data.get("passive", ()))
+        )
 
     @cached_property
     def _without_kernel(self) -> tuple[str, ...]:
@@ -265,10 +270,32 @@ def require_known_joints(robot: Robot) -> None:
             raise ModelError(f"robot {robot.name!r} does not support planning: {wrong}") from None
 
 
+def _effect(key: str, values: object) -> Effect:
+    """An effect from its key and its fields as a file has them. Raises SceneError."""
+    if key not in REGISTRY:
+        raise SceneError(f"there is no effect {key!r}: {nearest(str(key), REGISTRY)}")
+    known = {each.name for each in dataclasses.fields(REGISTRY[key])}
+    if not isinstance(values, dict) or not values.keys() <= known:
+        raise SceneError(f"effect {key!r} takes {', '.join(sorted(known))}, not {values!r}.")
+    try:
+        return REGISTRY[key](**values)
+    except TypeError as error:  # a parameter without a default is missing
+        raise SceneError(f"effect {key!r} lacks a parameter: {error}.") from error
+
+
+def _passive_names(names: object) -> tuple[str, ...]:
+    """Names as a tuple. Raises SceneError for anything but a list of texts."""
+    if not isinstance(names, Sequence) or not all(isinstance(name, str) for name in names):
+        raise SceneError(f"passive is a list of joint names, not {names!r}.")
+    return tuple(names)
+
+
 def _as_effects(given: object) -> tuple[Effect, ...]:
     """Effects as a tuple. Raises SceneError for anything but a list of effects."""
-    effects = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
-    if not isinstance(effects, tuple) or not all(isinstance(each, Effect) for each in effects):
+    effects: tuple[Any, ...] = (None,)
+    if isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
+        effects = tuple(given)
+    if not all(isinstance(each, Effect) for each in effects):
         raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")
     return effects
 
@@ -277,6 +304,7 @@ def _passive(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     """The names of passive joints, checked."""
     if isinstance(names, str):
         raise SceneError(f"passive is a list of joint names, not the string {names!r}.")
+    names = _passive_names(names)
     for name in names:
         if name not in robot.joint_names:
             raise SceneError(

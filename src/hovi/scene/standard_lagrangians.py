@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
 from hovi.scene.added_inertia import added_inertia
@@ -15,18 +16,27 @@ from hovi.scene.scene import Scene, require_known_joints
 Array = npt.NDArray[np.float64]
 
 
+MAX_DIMENSION, MAX_ORDER = 1_000, 20
+"""Of a spline."""
+
+
+@check_arguments
 def spline(n: int, derivatives: int = 2) -> CasadiLagrangian:
     """L = 1/2 |q^(k)|^2 on R^n: cubic splines for k = 2, quintic ones (minimum jerk) for k = 3.
 
-    n: dimension, 1 or more. derivatives: k, 1 or more. Raises InputError otherwise.
+    n: dimension, 1 to 1,000. derivatives: k, 1 to 20. Raises InputError otherwise.
     [ColomboFerraroMartin2016, examples of sections 3 and 4]
     """
-    if n < 1 or derivatives < 1:
-        raise InputError(f"a spline needs n >= 1 and k >= 1, got n = {n}, k = {derivatives}.")
+    if not (1 <= n <= MAX_DIMENSION and 1 <= derivatives <= MAX_ORDER):
+        raise InputError(
+            f"a spline needs n >= 1 and k >= 1, at most {MAX_DIMENSION} and {MAX_ORDER}, got "
+            f"n = {n}, k = {derivatives}."
+        )
     jet = [ca.SX.sym(f"q{j}", n) for j in range(derivatives + 1)]
     return CasadiLagrangian(jet, ca.sumsqr(jet[-1]) / 2)
 
 
+@check_arguments
 def mechanics(scene: Scene) -> CasadiLagrangian:
     """L = 1/2 v^T (M(q) + A(q)) v - V(q) on TQ, in [J]: the robot under gravity, k = 1.
 
@@ -46,6 +56,7 @@ def mechanics(scene: Scene) -> CasadiLagrangian:
     return CasadiLagrangian([q, v], L, scene.robot.curved_space)
 
 
+@check_arguments
 def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
     """L = 1/2 g(D_t v, D_t v) for the robot's own metric g = M(q), k = 2.
 

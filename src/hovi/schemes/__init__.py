@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import SchemeError, nearest
 from hovi.schemes.classic import (
     hermite_simpson,
@@ -35,6 +36,7 @@ FAMILIES: dict[str, Callable[[int, int, int | None], Scheme]] = {"galerkin": gal
 _MEMBER = re.compile(r"(.+?)-(\d{1,4})(?:x(\d{1,4}))?(?:-k([1-9]))?")
 
 
+@check_arguments
 def by_name(name: str) -> Scheme:
     """The scheme with a name, as in files and on the command line.
 

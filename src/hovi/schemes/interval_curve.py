@@ -13,9 +13,15 @@ from math import factorial
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
+from hovi.errors import SchemeError
 from hovi.schemes.polynomials import legendre
 
 Array = npt.NDArray[np.float64]
+
+MAX_ORDER = 20
+"""Maximum order k of a Lagrangian whose curves have a basis here."""
 
 
 def end_degrees(k: int) -> list[int]:
@@ -23,12 +29,15 @@ def end_degrees(k: int) -> list[int]:
     return [k - 1 - j for j in range(k)]
 
 
+@check_arguments
 def end_basis(s: Array, k: int) -> Array:
     """The paper's b^[k]_j(s) = sqrt(2 m + 1) P_m(1 - 2 s), m = k - 1 - j, shape (k, M).
 
     Orthonormal on [0, 1]; b^[2] = (sqrt(3) (1 - 2 s), 1).
     """
-    P = legendre(1 - 2 * np.asarray(s, dtype=np.float64), max(k - 1, 1))
+    _require_order(k)
+    require_shape("s", s, None)
+    P = legendre(1 - 2 * s, max(k - 1, 1))
     return np.array([np.sqrt(2 * m + 1) * P[m] for m in end_degrees(k)])
 
 
@@ -38,12 +47,14 @@ def end_weights(s: Array, k: int) -> Array:
     return np.array([(1 - s) ** m / factorial(m) for m in end_degrees(k)])
 
 
+@check_arguments
 def gamma(k: int) -> Array:
     """gamma[j, i] of a^[k]_j = sum_i gamma[j, i] b^[k]_i, so that z = gamma w, shape (k, k).
 
     With d = k - 1 - j and m = k - 1 - i it is sqrt(2 m + 1) d! / ((d - m)! (d + m + 1)!), and 0
     where m > d. gamma^[2] = [[1 / (2 sqrt(3)), 1/2], [0, 1]].
     """
+    _require_order(k)
     matrix = np.zeros((k, k))
     for j, d in enumerate(end_degrees(k)):
         for i, m in enumerate(end_degrees(k)):
@@ -53,9 +64,15 @@ def gamma(k: int) -> Array:
     return matrix
 
 
+@check_arguments
 def inverse_gamma(k: int) -> Array:
     """The matrix of w = gamma^-1 z, (k, k); for k = 2: w0 = 2 sqrt(3) (z0 - z1/2), w1 = z1."""
     return np.asarray(np.linalg.inv(gamma(k)))
+
+
+def _require_order(k: int) -> None:
+    if not 1 <= k <= MAX_ORDER:
+        raise SchemeError(f"the order k of a curve must be from 1 to {MAX_ORDER}, got {k}.")
 
 
 def repeated_integral(coefficients: Array, times: int) -> Array:

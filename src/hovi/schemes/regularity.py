@@ -7,12 +7,14 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import SchemeError
 from hovi.schemes.scheme import Scheme, regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments
 def regularity_matrix(scheme: Scheme) -> Array:
     """W_d = [[D13, D14], [D23, D24]] L_d for L = a^2/2, n = 1 and h = 1, shape (2, 2).
 
@@ -30,12 +32,14 @@ def regularity_matrix(scheme: Scheme) -> Array:
     return np.asarray(H[:2, 2:])
 
 
+@check_arguments
 @lru_cache(maxsize=256)
 def is_regular(scheme: Scheme) -> bool:
     """Whether W_d is invertible, that is whether end data determine a discrete motion."""
     return bool(np.linalg.matrix_rank(regularity_matrix(scheme), tol=1e-10) == 2)
 
 
+@check_arguments
 def require_regular(scheme: Scheme) -> None:
     """Raise SchemeError for a scheme that does not support planning."""
     if scheme.derivatives != 2:

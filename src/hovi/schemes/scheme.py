@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows, legendre
 
@@ -23,6 +25,7 @@ _REGULAR_COLUMNS = np.array(
 )
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Scheme:
     """The discrete Lagrangian L_d = h sum_j w_j L(q_j, v_j, a_j) as numbers.
@@ -105,6 +108,7 @@ class Scheme:
 
         s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite for r = 0.
         """
+        require_shape("s", s, None)
         if self.derivatives != 2:
             return jet_rows(s, self.derivatives, self.inner_modes)
         return interval_rows(s, self.inner_modes)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, InputError, expect
 from hovi.system.files import reason, whole_file
@@ -20,6 +21,7 @@ MAX_ROWS = 50_000_000
 _ROWS_PER_BATCH = 10_000
 
 
+@check_arguments_except("trajectory")
 def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float = 1000.0) -> None:
     """Write t, q, v, a and tau as comma-separated values in full precision, SI units.
 

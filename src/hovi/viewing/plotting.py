@@ -23,6 +23,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limit_violation import at_limit
@@ -73,6 +74,7 @@ _VELOCITY = _Panel(KINDS.index("v"), ("velocity [deg/s]", np.degrees(1.0)), ("ve
 _EFFORT = _Panel(KINDS.index("tau"), ("torque [N m]", 1.0), ("force [N]", 1.0))
 
 
+@check_arguments_except("trajectory")
 def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
     """Write `motion_figure` to a file.
 

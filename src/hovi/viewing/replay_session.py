@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, expect
 from hovi.robot.robot import Robot
@@ -118,6 +119,7 @@ class Replay:
         self.close()
 
 
+@check_arguments_except("trajectory")
 def replay(
     trajectory: Trajectory,
     *,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +29,7 @@ def joint_values(robot: Robot, what: str, given: JointValues, least: float = -np
     if isinstance(given, Mapping):
         for joint, value in given.items():
             values[_coordinates(robot, what, joint)] = value
-    elif isinstance(given, tuple | list) and len(given) != robot.nv:
+    elif isinstance(given, Sequence) and len(given) != robot.nv:
         raise SceneError(
             f"{what} needs one number per joint coordinate, {robot.nv} of them, got {len(given)}."
         )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.planning.clearance.obstacles import Obstacle, obstacle_from_dict
 
@@ -15,10 +15,13 @@ DISTANCE_SCALE = 0.1
 """Unit in which the solver measures distances, in [m]; limits are measured by their ranges."""
 DEFAULT_MARGIN = 0.01
 """Margin where none is given, in [m]."""
+MAX_MARGIN = 1e9
+"""Largest margin, in [m]."""
 MAX_OBSTACLES = 1_000
 """Maximum number of obstacles."""
 
 
+@check_arguments_except("obstacles", "margin")
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
@@ -37,6 +40,11 @@ class Clearance:
     def __post_init__(self) -> None:
         if isinstance(self.obstacles, Obstacle):
             object.__setattr__(self, "obstacles", (self.obstacles,))
+        if not isinstance(self.obstacles, Sequence):
+            raise InputError(
+                f"obstacles are a list of hovi.Sphere, hovi.Capsule and hovi.Box, got "
+                f"{self.obstacles!r}."
+            )
         if len(self.obstacles) > MAX_OBSTACLES:
             raise InputError(f"there may be at most {MAX_OBSTACLES} obstacles.")
         for each in self.obstacles:
@@ -54,7 +62,7 @@ class Clearance:
                 raise InputError(f"two obstacles have the name {name!r}; give each its own name.")
         object.__setattr__(self, "obstacles", named)
         number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
-        if not (number and math.isfinite(self.margin) and self.margin >= 0):
+        if not (number and 0 <= self.margin <= MAX_MARGIN):
             raise InputError(
                 "the margin from obstacles must be a length of 0 or more, in metres, got "
                 f"{self.margin!r}."
@@ -75,6 +83,9 @@ class Clearance:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Clearance:
-        """The inverse of to_dict. Raises InputError, KeyError or TypeError."""
-        obstacles = [obstacle_from_dict(each) for each in data["obstacles"]]
-        return cls(obstacles, float(data["margin"]), bool(data["self_collision"]))
+        """The inverse of to_dict. Raises InputError for other data."""
+        try:
+            obstacles = [obstacle_from_dict(each) for each in data["obstacles"]]
+            return cls(obstacles, float(data["margin"]), bool(data["self_collision"]))
+        except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
+            raise InputError(f"this is no clearance of `to_dict`: {error!r}.") from error

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError, nearest
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +50,7 @@ class Obstacle(ABC):
         value = getattr(self, key)
         try:
             numbers = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             numbers = np.full((), np.nan)
         if numbers.shape != shape or not np.isfinite(numbers).all():
             size = f"{' x '.join(str(n) for n in shape)} finite numbers" if shape else "a number"
@@ -65,6 +66,7 @@ class Obstacle(ABC):
             )
 
 
+@check_arguments_except("position", "radius")
 @dataclass(frozen=True)
 class Sphere(Obstacle):
     """A ball.
@@ -89,6 +91,7 @@ class Sphere(Obstacle):
         return pin.SE3(np.eye(3), np.asarray(self.position))
 
 
+@check_arguments_except("ends", "radius")
 @dataclass(frozen=True)
 class Capsule(Obstacle):
     """Everything within a radius of a line segment.
@@ -122,6 +125,7 @@ class Capsule(Obstacle):
         return pin.SE3(turn.matrix(), 0.5 * (first + last))
 
 
+@check_arguments_except("size", "position", "rpy")
 @dataclass(frozen=True)
 class Box(Obstacle):
     """A cuboid.

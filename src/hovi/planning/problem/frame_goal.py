@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
 from hovi.planning.problem.node_conditions import Condition
@@ -26,6 +27,7 @@ ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class FrameGoal:
     """A target pose, position, orientation or axis direction of a frame of the robot.
@@ -189,7 +191,7 @@ class FrameCondition(Condition):
 def _numbers(name: str, value: Any) -> Array:
     try:
         return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"the {name} of a frame goal must be numeric, got {value!r}.") from None
 
 

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -20,6 +21,7 @@ from hovi.robot.robot import Robot
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments_except("time", "goal")
 @dataclass(frozen=True, eq=False)
 class Via:
     """A via point: a goal that the motion meets at a given time.

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError, nearest
 from hovi.robot.robot import Robot
 
@@ -26,6 +28,7 @@ TOLERANCE = 1e-6
 """Share of its range by which a limit may be exceeded between the quadrature points."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Limits:
     """lower <= (q, v, a, tau) <= upper along a motion; infinite where there is no limit.
@@ -41,6 +44,8 @@ class Limits:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
+        require_shape("lower", self.lower, len(KINDS), None)
+        require_shape("upper", self.upper, *self.lower.shape)
         if np.isnan(self.lower).any() or np.isnan(self.upper).any():
             raise InputError("a limit is not a number; use -inf or inf for no bound.")
         for k, i in np.argwhere(self._empty):
@@ -82,18 +87,26 @@ class Limits:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Limits:
-        """The inverse of to_dict."""
-        bounds = [
-            np.array([[free if x is None else x for x in row] for row in data[name]], dtype=float)
-            for name, free in (("lower", -np.inf), ("upper", np.inf))
-        ]
-        return cls(bounds[0], bounds[1], float(data["tolerance"]))
+        """The inverse of to_dict. Raises InputError for other data."""
+        try:
+            lower, upper = (
+                np.array([[free if x is None else x for x in row] for row in data[name]], float)
+                for name, free in (("lower", -np.inf), ("upper", np.inf))
+            )
+            return cls(lower, upper, float(data["tolerance"]))
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"these are not limits of `to_dict`: {error!r}.") from error
 
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a share of the range; negative inside.
 
         outputs: (q, v, a, tau) stacked, shape (..., 4, nv).
         """
+        if outputs.ndim < 2 or outputs.shape[-2:] != self.lower.shape:
+            raise InputError(
+                f"outputs must have shape (..., {len(KINDS)}, {self.lower.shape[1]}), got "
+                f"{outputs.shape}."
+            )
         outside = np.maximum(self.lower - outputs, outputs - self.upper)
         return np.asarray(outside / self.ranges)
 
@@ -201,7 +214,7 @@ def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]
 def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
     try:
         numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = np.full(3, np.nan)
     if numbers.ndim == 0 and numbers > 0:
         return -float(numbers), float(numbers)

@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, path_on_grid
@@ -38,6 +39,7 @@ MORE_MODES = 2
 nearly the same error, which their difference would not show."""
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class TrajectoryProblem:
     """Make the discrete action stationary between two given states.

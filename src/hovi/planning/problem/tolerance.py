@@ -11,6 +11,8 @@ from typing import Self
 
 import numpy as np
 
+from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import shown
 from hovi.discrete.motion_error import MotionError
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
@@ -26,6 +28,7 @@ class Quantity(StrEnum):
     FRAME = "frame"
 
 
+@check_arguments_except("tolerance")
 @dataclass(frozen=True)
 class Tolerance:
     """The largest allowed error of a plan, over the whole motion.
@@ -59,7 +62,10 @@ class Tolerance:
             return cls._parsed(tolerance)._checked(robot)
         if isinstance(tolerance, bool) or not isinstance(tolerance, float | int | np.number):
             raise InputError(_expected(tolerance))
-        return cls(float(tolerance))._checked(robot)
+        try:
+            return cls(float(tolerance))._checked(robot)
+        except OverflowError:
+            raise InputError(_expected(tolerance)) from None
 
     @classmethod
     def _parsed(cls, text: str) -> Self:
@@ -130,7 +136,7 @@ def as_number_or_text(tolerance: float | str | Tolerance | None) -> float | str 
 def _expected(tolerance: object) -> str:
     return (
         "a tolerance must be a number, relative to the cost, or a text such as '0.1 mm', "
-        f"'0.1 mm at tool0' or '0.01 deg', got {tolerance!r}."
+        f"'0.1 mm at tool0' or '0.01 deg', got {shown(tolerance)}."
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hovi.checks.kinds import shown
 from hovi.errors import InputError, nearest
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -38,8 +39,8 @@ def seconds(given: Any, what: str) -> float:
     what: its name in messages, such as "the duration".
     Raises InputError for anything else.
     """
-    if isinstance(given, float | int | np.number):
-        return float(given)
+    if isinstance(given, float | int | np.number) and not isinstance(given, bool):
+        return _as_double(given, what)
     parsed = number_and_unit(given) if isinstance(given, str) else None
     if parsed is None:
         raise InputError(
@@ -52,6 +53,13 @@ def seconds(given: Any, what: str) -> float:
     if unit not in DURATIONS:
         raise InputError(f"{what} {given!r} has the unit {unit!r}: {nearest(unit, DURATIONS)}")
     return number * DURATIONS[unit]
+
+
+def _as_double(number: float | np.number[Any], what: str) -> float:
+    try:
+        return float(number)
+    except (TypeError, OverflowError):  # a complex number, an integer of hundreds of digits
+        raise InputError(f"{what} must be a number of seconds, got {shown(number)}.") from None
 
 
 def as_duration(given: Any) -> float | tuple[float, float]:

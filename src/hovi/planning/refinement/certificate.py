@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.curve_integral import CurveIntegral, integral_along
 from hovi.discrete.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
@@ -80,6 +81,7 @@ class Certificate:
         return relative_difference(self.action, self.integral)
 
 
+@check_arguments_except("solution")
 @interruptible
 def certify(solution: Solution, frame: str | None = None, *, estimate: bool = True) -> Certificate:
     """The certificate of a solution.

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import Expansion
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
@@ -34,6 +35,7 @@ MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
 
+@check_arguments
 def estimate_error(solution: Solution, frame: str | None = None) -> MotionError | None:
     """The estimated error of a solution, over the whole motion.
 

@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from hovi.checks.kinds import shown
 from hovi.errors import InputError, nearest
 
+MAX_WHOLE_NUMBER = 10**9
+"""Largest value of an integer option without a maximum of its own."""
 WIDTH = 96
 """Line length of the arguments in a docstring."""
 
@@ -65,21 +68,24 @@ def option_infos(options: type) -> dict[str, OptionInfo]:
 
 def keep_whole_numbers(options: Any) -> None:
     """Convert integer options to int. Raises InputError for other numbers, or out of bounds."""
+    defaults = {each.name: each.default for each in fields(options)}
     for name, known in option_infos(type(options)).items():
         number = getattr(options, name)
-        if known.whole and number is not None:
+        if known.whole and (number is not None or defaults[name] is not None):
             object.__setattr__(options, name, _whole(name, known, number))
 
 
 def _whole(name: str, known: OptionInfo, number: Any) -> int:
-    least, most = known.least or 0, math.inf if known.most is None else known.most
-    is_number = isinstance(number, int) or (
+    least, most = known.least or 0, MAX_WHOLE_NUMBER if known.most is None else known.most
+    is_number = (isinstance(number, int) and not isinstance(number, bool)) or (
         isinstance(number, float | np.number) and math.isfinite(number)
     )
     if is_number and number == int(number) and least <= number <= most:
         return int(number)
     allowed = f"of {least} or more" if known.most is None else f"from {least} to {known.most:,}"
-    raise InputError(f"{name} must be a whole number {allowed}, got {number}.")
+    if is_number and known.most is None and number > most:
+        allowed = f"from {least} to {most:,}"
+    raise InputError(f"{name} must be a whole number {allowed}, got {shown(number)}.")
 
 
 def require_known(options: type, names: Iterable[str]) -> None:

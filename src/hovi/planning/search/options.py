@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
@@ -37,6 +38,10 @@ DEFAULT_INTERVALS = 16
 """Number of intervals if only the scheme is named, and of the first grid of a refinement."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
+_CHECKED_HERE = (
+    *("via", "scheme", "intervals", "starts", "seed", "obstacles", "margin"),
+    *("max_iterations", "time_limit", "processes"),
+)
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
@@ -48,6 +53,7 @@ def _if_clearance(options: PlanOptions) -> bool:
     return options.clearance.wanted
 
 
+@check_arguments_except(*_CHECKED_HERE)
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlanOptions:
     """The options of `hovi.plan`, which takes them by keyword. Valid once built.

@@ -9,6 +9,7 @@ from typing import Any, ParamSpec, Protocol, cast
 
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
@@ -69,6 +70,7 @@ def _with_option_keywords(
 
 
 @_with_option_keywords(PlanOptions)
+@check_arguments_except("scene", "start", "goal", "duration", "options")
 @one_blas_thread
 @interruptible
 def plan(

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, moved, named_curve, stretched, with_turns
 from hovi.discrete.nodal_momenta import accumulated_momenta
@@ -83,6 +84,7 @@ class Solution:
             raise InputError("this solution has no problem; call plan again instead.")
         return self.problem.ld.duration_derivative(self.trajectory.path, self.forces)
 
+    @check_arguments
     def replan(
         self,
         start: State | npt.ArrayLike | str | None = None,
@@ -124,6 +126,7 @@ def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> Sta
     return goal if isinstance(goal, FrameGoal) else as_state(goal, robot)
 
 
+@check_arguments
 @one_blas_thread
 @interruptible
 def solve_on_grid(

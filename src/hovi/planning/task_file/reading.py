@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
@@ -33,6 +34,7 @@ MAX_DOTS = 1_000
 """Maximum number of dots in a line; parsing time is quadratic in the parts of a dotted key."""
 
 
+@check_arguments
 def load_task(path: str | Path) -> Task:
     """The task of a scene file.
 

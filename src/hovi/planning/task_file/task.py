@@ -8,6 +8,7 @@ import warnings
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -17,6 +18,7 @@ from hovi.planning.search.options import PlanOptions
 from hovi.scene.scene import Scene
 
 
+@check_arguments_except("duration")
 @dataclass(frozen=True, eq=False)
 class Task:
     """A planning task, valid once built.

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from hovi.checks.arguments import check_arguments
 from hovi.planning.search.job import Progress
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
 
+@check_arguments
 def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> Solution:
     """Plan a task with its options.
 

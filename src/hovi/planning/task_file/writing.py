@@ -8,6 +8,7 @@ from typing import Any
 
 import tomlkit
 
+from hovi.checks.arguments import check_arguments
 from hovi.errors import SceneError, SchemeError
 from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.search.option_fields import option_infos
@@ -28,6 +29,7 @@ _TABLES = ("limits", "start", "goal", "via", "obstacles", "scheme")
 _EMPTY: tuple[Any, ...] = (None, [])
 
 
+@check_arguments
 def save_task(task: Task, path: str | Path) -> Path:
     """Write a task as TOML; returns the path.
 

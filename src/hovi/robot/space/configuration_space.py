@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.arguments import check_arguments_except
+from hovi.checks.shapes import require_rows
 from hovi.errors import InputError
 from hovi.robot.space.groups import GROUPS, SE2, SO2, Group, Layout, differenced, integrated
 from hovi.robot.space.joint_kinds import COMPOSITE, kind_of
@@ -27,6 +29,7 @@ class Factor:
     v: slice
 
 
+@check_arguments_except("parts")
 @dataclass(frozen=True)
 class ConfigurationSpace:
     """Q as a product; each part is a number of vector coordinates or the name of a group.
@@ -38,6 +41,8 @@ class ConfigurationSpace:
     parts: tuple[int | str, ...]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.parts, tuple):
+            raise InputError(f"the parts of a configuration space are a tuple, not {self.parts!r}.")
         for part in self.parts:
             plain = type(part) is int and part > 0
             if not plain and not (isinstance(part, str) and part in GROUPS):
@@ -122,6 +127,7 @@ class ConfigurationSpace:
         """q (+) dq: configurations (..., nq), tangent vectors (..., nv) -> (..., nq)."""
         q, dq = np.asarray(q, dtype=np.float64), np.asarray(dq, dtype=np.float64)
         if self.vector:
+            require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
             return q + dq
         return integrated(self.layout, q, dq)
 
@@ -129,6 +135,7 @@ class ConfigurationSpace:
         """q1 (-) q0: the tangent vector of least angles that moves q0 to q1, (..., nv)."""
         q0, q1 = np.asarray(q0, dtype=np.float64), np.asarray(q1, dtype=np.float64)
         if self.vector:
+            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
             return q1 - q0
         return differenced(self.layout, q0, q1)
 
@@ -138,6 +145,7 @@ class ConfigurationSpace:
         So rotations are continuous beyond half a turn, where `difference` jumps.
         """
         if self.vector:
+            require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
             return q1 - q0
         return differenced(self.layout, q0, q1, expected)
 

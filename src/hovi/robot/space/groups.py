@@ -79,7 +79,7 @@ def integrated(layout: Layout, q: Array, dq: Array) -> Array:
     nq, nv = _totals(layout)
     _check_length("configuration", nq, q)
     _check_length("tangent vector", nv, dq)
-    lead = np.broadcast_shapes(q.shape[:-1], dq.shape[:-1])
+    lead = _common_rows(q, dq)
     result = np.empty((*lead, nq))
     native.integrate(layout, _rows(q, lead), _rows(dq, lead), result.reshape(-1, nq))
     return result
@@ -94,8 +94,10 @@ def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = N
     _check_length("configuration", nq, q0, q1)
     if expected is not None:
         _check_length("tangent vector", nv, expected)
-    lead = np.broadcast_shapes(q0.shape[:-1], q1.shape[:-1])
+    lead = _common_rows(q0, q1)
     result = np.empty((*lead, nv))
+    if expected is not None and _common_rows(q0, q1, expected) != lead:
+        raise InputError(f"expected has rows {expected.shape[:-1]}, the configurations {lead}.")
     near = None if expected is None else _rows(expected, lead)
     native.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
     return result
@@ -116,6 +118,15 @@ def _check_length(what: str, count: int, *arrays: Array) -> None:
                 f"a {what} has {count} numbers here, got {came} in an array of shape "
                 f"{array.shape}: give (..., {count})."
             )
+
+
+def _common_rows(*arrays: Array) -> tuple[int, ...]:
+    """The shape to which rows (..., n) broadcast. Raises InputError."""
+    leads = [array.shape[:-1] for array in arrays]
+    try:
+        return np.broadcast_shapes(*leads)
+    except ValueError:
+        raise InputError(f"rows {', '.join(map(str, leads))} do not broadcast.") from None
 
 
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:

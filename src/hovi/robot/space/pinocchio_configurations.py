@@ -57,7 +57,7 @@ def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: 
     """
     try:
         vector = np.array(value, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be {len(entries)} numbers, not {value!r}.") from error
     if vector.shape != (len(entries),):
         raise InputError(

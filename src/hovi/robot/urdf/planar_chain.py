@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.robot.urdf.check import MAX_DOF
 from hovi.system.files import whole_file
@@ -37,6 +38,7 @@ _LINK = """
   </joint>"""
 
 
+@check_arguments_except("n")
 def chain(n: int, *, length: float = 1.0, mass: float = 1.0) -> str:
     """The URDF of a serial chain of n uniform rods in the vertical plane x-z.
 

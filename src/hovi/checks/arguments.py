@@ -1,0 +1,168 @@
+"""Arguments of public functions, checked against their annotations.
+
+Misuse is refused before anything is computed, in one sentence: the argument, what it must be, and
+what was given. Shapes and values are checked by each function itself.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import sys
+import types
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from hovi.checks.kinds import Kind, MismatchError, kind_of, resolved
+from hovi.errors import HoviError, InputError
+
+Accept = Callable[[Any], Any]
+_MARK = "_hovi_checks_arguments"  # of functions that are checked
+Checked = TypeVar("Checked", bound=Callable[..., Any])
+
+
+def check_arguments(checked: Checked) -> Checked:
+    """A decorator: arguments that are not what their annotations say raise InputError.
+
+    Numbers of any real type are floats, whole ones integers too; what numpy converts to an array of
+    numbers is one, and the function receives the array where the annotation is one. What is
+    annotated by Any, or a name that only type checkers import, is left to the function.
+
+    checked: a function; or a class, whose constructor and public methods are checked unless they
+        have a decorator of their own.
+    """
+    return check_arguments_except()(checked)
+
+
+def check_arguments_except(*names: str) -> Callable[[Checked], Checked]:
+    """As `check_arguments`, without some arguments, of which the function itself says more."""
+
+    def decorate(checked: Checked) -> Checked:
+        if not isinstance(checked, type):
+            return _checking(checked, names)
+        _check_members(checked, names)
+        return checked
+
+    return decorate
+
+
+def unchecked(function: Checked) -> Checked:
+    """A decorator: what is called within hovi at each step, and so not checked with its class."""
+    setattr(function, _MARK, True)
+    return function
+
+
+def _checking(checked: Checked, names: Collection[str]) -> Checked:
+    parameters = functools.cache(lambda: _Parameters.of(checked, names))
+
+    @functools.wraps(checked)
+    def checking(*args: Any, **kwargs: Any) -> Any:
+        known = parameters()
+        accepted, named = args, kwargs
+        try:
+            accepts = known.accepts if len(args) <= len(known.accepts) else known.repeated(args)
+            accepted = tuple([accept(value) for accept, value in zip(accepts, args, strict=False)])
+            for name in kwargs:
+                named[name] = known.named.get(name, _anything)(kwargs[name])
+        except MismatchError:
+            known.refuse(args, kwargs)
+        return checked(*accepted, **named)
+
+    setattr(checking, _MARK, True)
+    return checking  # type: ignore[return-value]
+
+
+def _check_members(checked: type, names: Collection[str]) -> None:
+    for name, member in list(vars(checked).items()):
+        if (name != "__init__" and name.startswith("_")) or hasattr(member, _MARK):
+            continue
+        if inspect.isfunction(member):
+            setattr(checked, name, _checking(member, names))
+        elif isinstance(member, classmethod | staticmethod):
+            setattr(checked, name, type(member)(_checking(member.__func__, names)))
+
+
+def _anything(value: Any) -> Any:
+    return value
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    """The parameters of a function.
+
+    kinds: of each, by name; None where it may be anything. positional: names of those that can be
+    given by position; rest: the name of further ones, or "". accepts, named: how they are accepted,
+    by position and by name.
+    """
+
+    function: str
+    kinds: Mapping[str, Kind | None]
+    positional: tuple[str, ...]
+    rest: str
+    accepts: tuple[Accept, ...]
+    named: Mapping[str, Accept]
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], left_out: Collection[str]) -> _Parameters:
+        kinds, positional, rest = dict[str, Kind | None](), list[str](), ""
+        scope = inspect.unwrap(function).__globals__
+        for name, each in inspect.signature(function).parameters.items():
+            if each.kind is each.VAR_KEYWORD:
+                continue
+            kinds[name] = None
+            if name not in left_out:
+                kinds[name] = kind_of(resolved(each.annotation, scope))
+            if each.kind is each.VAR_POSITIONAL:
+                rest = name
+            elif each.kind is not each.KEYWORD_ONLY:
+                positional.append(name)
+        named = {name: _anything if kind is None else kind.accept for name, kind in kinds.items()}
+        accepts = tuple(named[name] for name in positional)
+        name = function.__qualname__.removesuffix(".__init__")
+        return cls(name, kinds, tuple(positional), rest, accepts, named)
+
+    def repeated(self, args: tuple[Any, ...]) -> tuple[Accept, ...]:
+        """How as many positional arguments as these are accepted."""
+        more = len(args) - len(self.accepts)
+        return (*self.accepts, *[self.named.get(self.rest, _anything)] * more)
+
+    def refuse(self, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> None:
+        """Raise InputError about the first argument that is not accepted."""
+        names = (*self.positional, *[self.rest] * len(args))
+        for name, value in [*zip(names, args, strict=False), *kwargs.items()]:
+            kind = self.kinds.get(name)
+            if kind is None:
+                continue
+            try:
+                kind.accept(value)
+            except MismatchError as mismatch:
+                sentence = kind.refusal(name, value, mismatch)
+                raise InputError(f"{self.function}: {sentence}") from None
+
+
+def check_fields(value: object, what: str, error: type[HoviError]) -> None:
+    """Raise an error unless the fields of a dataclass are what their annotations say.
+
+    Integers that no machine word holds become doubles. what: the start of the message.
+    """
+    kinds = _field_kinds(type(value))  # type: ignore[arg-type]
+    for name, kind in kinds.items():
+        if kind is None or name not in vars(value):
+            continue
+        given = getattr(value, name)
+        try:
+            object.__setattr__(value, name, kind.accept(given))
+        except MismatchError as mismatch:
+            raise error(f"{what}: {kind.refusal(name, given, mismatch)}") from None
+
+
+@functools.cache
+def _field_kinds(owner: type[Any]) -> dict[str, Kind | None]:
+    """Kinds of the fields of a dataclass and of those that it extends."""
+    kinds: dict[str, Kind | None] = {}
+    for each in reversed(owner.__mro__):
+        scope = vars(sys.modules.get(each.__module__, types))
+        for name, annotation in vars(each).get("__annotations__", {}).items():
+            kinds[name] = kind_of(resolved(annotation, scope))
+    return kinds

@@ -1,0 +1,512 @@
+"""Calls of the public API with an argument of another type, shape or value.
+
+A call must be refused with one sentence, or return. What an argument may be is not said here, but
+the values of `NEVER` mean nothing anywhere: a call with one of them must be refused.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import io
+import json
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+import hovi
+from hard.verdict import Mutant, Verdict, judge
+from hovi.discrete.stored_torque import StoredTorque
+from hovi.flows.legendre_transforms import legendre
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.schemes import by_name, galerkin
+from samples.slider import SLIDER
+
+Q, N, H = 2, 4, 0.1
+
+
+class Nothing:
+    """A type that no argument has."""
+
+    def __repr__(self) -> str:
+        return "Nothing()"
+
+
+NEVER: tuple[Any, ...] = (Nothing(), b"bytes", 1j, [Nothing()])
+WRONG: tuple[Any, ...] = (
+    *NEVER,
+    *({1: Nothing()}, {"elbow": Nothing()}),
+    *(None, "x", "", "nan", 3, -1, 0, 2.5, True, 10**400, 10**30, float("nan"), float("inf")),
+    *(
+        [],
+        [[]],
+        (),
+        {},
+        [None],
+        ["x"],
+        [[1.0], [2.0, 3.0]],
+        {"a": 1},
+        {"shoulder": None},
+        {None: 1},
+    ),
+    *(
+        np.zeros(0),
+        np.zeros(3),
+        np.zeros((1, 3)),
+        np.zeros((5, 2)),
+        np.full(2, np.nan),
+        np.array("x"),
+    ),
+    *(np.zeros((2, 2, 2, 2)), np.array([None, 1]), np.zeros(2, complex), range(3), ..., set()),
+)
+
+
+@dataclass(frozen=True)
+class Call:
+    """A valid call: a function, positional arguments, and keywords."""
+
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...] = ()
+    keywords: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def places(self) -> tuple[int | str, ...]:
+        """Where an argument can be replaced."""
+        return (*range(len(self.arguments)), *(name for name, _ in self.keywords))
+
+    def replaced(self, place: int | str, value: Any) -> Call:
+        """The call with another argument."""
+        arguments, keywords = list(self.arguments), dict(self.keywords)
+        if isinstance(place, int):
+            arguments[place] = value
+        else:
+            keywords[place] = value
+        return Call(self.function, tuple(arguments), tuple(keywords.items()))
+
+    def __call__(self) -> Any:
+        """Call it, without what it prints."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            return self.function(*self.arguments, **dict(self.keywords))
+
+
+def call(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Call:
+    """A call."""
+    return Call(function, arguments, tuple(keywords.items()))
+
+
+def own(value: Any, method: str, *arguments: Any, **keywords: Any) -> Call:
+    """The call of a method."""
+    return call(getattr(value, method), *arguments, **keywords)
+
+
+@cache
+def folder() -> Path:
+    """For files that calls write."""
+    return Path(tempfile.mkdtemp(prefix="hovi-calls-"))
+
+
+def build(make: type, **fields: Any) -> Call:
+    """The call of a constructor by keywords."""
+    return call(make, **fields)
+
+
+@cache
+def calls() -> dict[str, Call]:
+    """The valid calls, by name."""
+    found: dict[str, Call] = {}
+    for group in (_models, _scenes, _grids, _motions, _problems, _plans, _flows, _files):
+        for each in group():
+            name = _name(each)
+            numbers = (f"{name} {i}" for i in range(2, 99))
+            found[name if name not in found else next(n for n in numbers if n not in found)] = each
+    return found
+
+
+def _name(each: Call) -> str:
+    name = each.function.__qualname__
+    return name.removesuffix(".__init__")
+
+
+@cache
+def robot() -> hovi.Robot:
+    return hovi.load_robot(hovi.example("two_link.urdf"))
+
+
+@cache
+def panda() -> hovi.Robot:
+    return hovi.load_robot("panda")
+
+
+@cache
+def cart() -> hovi.Scene:
+    path = folder() / "slider.urdf"
+    path.write_text(SLIDER)
+    return hovi.Scene(hovi.load_robot(path), [hovi.effects.Gravity()])
+
+
+@cache
+def pendulum() -> hovi.Robot:
+    return hovi.load_robot(hovi.example("pendulum.urdf"))
+
+
+@cache
+def scene() -> hovi.Scene:
+    return hovi.Scene(robot(), [hovi.effects.Gravity(9.8)])
+
+
+@cache
+def solution() -> hovi.Solution:
+    return hovi.plan(scene(), [0.0, 0.0], [0.3, 0.7], 1.0, intervals=N, processes=1)
+
+
+def problem() -> hovi.TrajectoryProblem:
+    found = solution().problem
+    assert found is not None
+    return found
+
+
+def _models() -> list[Call]:
+    q, rows = np.zeros(2), np.zeros((3, 2))
+    return [
+        call(hovi.example, "two_link.urdf"),
+        call(hovi.chain, 3, length=1.0, mass=1.0),
+        call(
+            hovi.load_robot,
+            hovi.example("two_link.urdf"),
+            **{"package_dirs": (), "free_flyer": None, "locked": ("elbow",), "visual": None},
+            **{"collision": None, "srdf": None, "mimic": False},
+        ),
+        *(own(robot(), name, q, "q") for name in ("check_configuration", "check_velocity")),
+        *(own(robot(), name, rows, rows) for name in ("integrate", "difference")),
+        *(own(panda(), name, panda().neutral(), np.zeros(9)) for name in ("integrate",)),
+        own(robot(), "frame_position", "tip", rows),
+        own(robot(), "frame_positions", ("tip",), rows),
+        own(robot(), "check_frame_moves", "tip"),
+        own(robot(), "measured_frames", "tip"),
+        own(robot(), "hint", "tipp", ("tip",)),
+        own(robot(), "joint_at", 1),
+        own(panda(), "pose", "default"),
+        call(hovi.Robot.from_dict, robot().to_dict(), package_dirs=()),
+        call(ConfigurationSpace, (2, "SO(2)")),
+        own(ConfigurationSpace((2, "SE(3)")), "integrate", np.zeros((3, 9)), np.zeros((3, 8))),
+        own(ConfigurationSpace((2, "SE(3)")), "difference", np.zeros((3, 9)), np.zeros((3, 9))),
+    ]
+
+
+def _scenes() -> list[Call]:
+    e = hovi.effects
+    effects = [
+        build(e.AccelerationCost, weight={"elbow": 1.0}),
+        build(e.Armature, inertia={"elbow": 1.0}, from_urdf=False),
+        build(e.Custom, torque_of={"elbow": "t"}, cost="t"),
+        build(e.Drag, frame="tip", area=0.1, density=1.2, linear=0.1, wind=(0, 0, 0), width=0.01),
+        build(
+            e.DryFriction,
+            **{"coulomb": {"elbow": 1.0}, "static": {"elbow": 2.0}, "stribeck_velocity": 0.1},
+            **{"width": 0.05, "from_urdf": False},
+        ),
+        build(e.EffortWeight, weight={"elbow": 2.0}),
+        build(e.Gravity, acceleration=9.81, direction=(0.0, 0.0, -1.0)),
+        build(e.JointLimitPotential, ranges={"elbow": (0, 1)}, slope=10.0, width=0.01, stops=False),
+        build(e.JointSprings, stiffness={"elbow": 1.0}, rest=0.0),
+        build(e.MovingBase, position=(0, 0, "t"), rotation=(0.0, 0.0, 0.0)),
+        build(e.Payload, frame="tip", mass=1.0, center=(0, 0, 0), inertia=(1, 1, 1, 0, 0, 0)),
+        build(e.PowerCost, weight={"elbow": 1.0}, width=0.1),
+        build(e.ReferenceCost, reference={"elbow": "t"}, weight=1.0),
+        build(e.VelocityCost, weight={"elbow": 1.0}),
+        build(e.ViscousFriction, coefficient={"elbow": 1.0}, from_urdf=False),
+        build(e.Wrench, frame="tip", force=(1, 0, 0), moment=(0, 0, "t"), axes="world"),
+    ]
+    return [
+        *(call(_scene_with(each.function), **dict(each.keywords)) for each in effects),
+        build(hovi.Scene, robot=robot(), effects=[], passive=("elbow",), compile=False),
+        own(scene(), "effort_lagrangian", weight=[1.0, 2.0]),
+        own(scene(), "inverse_dynamics", *[np.zeros((3, 2))] * 3, np.zeros(3)),
+        own(scene(), "without", "gravity"),
+        call(hovi.Scene.from_dict, scene().to_dict()),
+        call(hovi.effects.register, hovi.effects.Gravity),
+    ]
+
+
+def _scene_with(effect: Callable[..., Any]) -> Callable[..., hovi.Scene]:
+    """A scene with an effect, which is checked with the robot of its scene."""
+
+    @functools.wraps(effect)
+    def with_effect(**fields: Any) -> hovi.Scene:
+        return hovi.Scene(robot(), [effect(**fields)])
+
+    return with_effect
+
+
+def _grids() -> list[Call]:
+    grid, scheme = problem().ld.grid, by_name("galerkin-2")
+    tau = np.zeros((N, 3, 2))
+    return [
+        build(hovi.Grid, steps=np.full(N, H), schemes=(scheme,) * N),
+        call(hovi.Grid.uniform, 1.0, 4, scheme),
+        own(grid, "stretched", 2.0),
+        own(grid, "halved", np.array([True, False, True, False])),
+        own(grid, "enriched", 2),
+        own(grid, "node_at", 0.5),
+        own(grid, "with_nodes", [0.3]),
+        call(by_name, "galerkin-2"),
+        call(galerkin, 2, derivatives=2, points=4),
+        *(call(getattr(hovi.schemes, name), 2) for name in ("gamma", "inverse_gamma")),
+        call(hovi.schemes.end_basis, np.array([0.5]), 2),
+        *(
+            call(getattr(hovi.schemes, name), scheme)
+            for name in ("is_regular", "regularity_matrix", "require_regular")
+        ),
+        own(scheme, "rows", np.array([0.5])),
+        build(
+            hovi.schemes.Scheme,
+            **{"name": "own", "order": 4, "points": scheme.points, "weights": scheme.weights},
+            table=scheme.table,
+        ),
+        call(StoredTorque, tau),
+    ]
+
+
+def _motions() -> list[Call]:
+    trajectory, ld = solution().trajectory, problem().ld
+    path, jets = trajectory.path, problem().ld.jets(trajectory.path)
+    expansion, step = ld.expand(path), np.zeros((N, 6, 2))
+    k, s = np.array([0, 1]), np.array([0.0, 1.0])
+    points = [np.zeros((len(jets[0][0]), 2))]
+    return [
+        build(hovi.DiscretePath, q=path.q, v=path.v, z=path.z, inner=path.inner),
+        build(hovi.DiscreteLagrangian, lagrangian=ld.lagrangian, grid=ld.grid),
+        *(own(ld, name, path, jets) for name in ("values", "action")),
+        own(ld, "expand", path, "nodal", points, None, jets),
+        own(ld, "gradient", path, "regular", jets),
+        *(own(ld, name, path) for name in ("jets", "turns")),
+        *(own(ld, name, path, None) for name in ("momenta", "duration_derivative")),
+        *(own(ld, name, path, None, jets) for name in ("derivatives", "point_gradients")),
+        own(ld, "predict", expansion, step, "nodal"),
+        own(ld, "point_steps", step, "nodal", expansion),
+        call(
+            _state_on_robot,
+            **{"q": [0.0, 1.0], "v": [0.0, 0.0], "free": ("elbow",), "free_velocity": ("elbow",)},
+            turns={},
+        ),
+        own(hovi.State([0.0, 1.0]), "on", robot(), "start"),
+        own(hovi.State([0.0, 1.0]), "free_on", robot(), "start"),
+        own(hovi.State([0.0, 1.0]), "turns_on", robot(), "start"),
+        build(
+            hovi.Trajectory,
+            **{"grid": trajectory.grid, "path": path, "momenta": trajectory.momenta},
+            **{"scene": trajectory.scene, "metadata": {}, "torque": None},
+        ),
+        *(own(trajectory, name, [0.0, 0.5]) for name in ("sample", "configurations", "jet")),
+        *(own(trajectory, name, k, s) for name in ("jet_intervals", "sample_intervals")),
+    ]
+
+
+def _state_on_robot(**fields: Any) -> object:
+    """A state, which is checked with a robot."""
+    state = hovi.State(**fields)
+    return state.on(robot(), "start"), state.free_on(robot(), "start"), state.turns_on(robot(), "")
+
+
+def _problems() -> list[Call]:
+    limits, task = problem().limits, _task()
+    assert limits is not None
+    start, goal = hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7])
+    frame_goal = hovi.FrameGoal("tip", position=[0.2, 0.0, 0.0])
+    sphere = hovi.Sphere([5.0, 0.0, 0.0], 0.1)
+    return [
+        build(hovi.Sphere, position=[1.0, 0.0, 0.0], radius=0.1, name="ball"),
+        build(hovi.Capsule, ends=[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], radius=0.1, name="post"),
+        build(hovi.Box, size=[1.0] * 3, position=[2.0] * 3, rpy=[0.0] * 3, name="box"),
+        build(hovi.Clearance, obstacles=(sphere,), margin=0.01, self_collision=False),
+        call(hovi.Clearance.from_dict, hovi.Clearance((sphere,)).to_dict()),
+        build(hovi.Limits, lower=limits.lower, upper=limits.upper, tolerance=1e-6),
+        call(hovi.Limits.from_dict, limits.to_dict()),
+        own(limits, "with_margin", 0.1),
+        own(limits, "excess", np.zeros((3, 4, 2))),
+        build(
+            hovi.FrameGoal,
+            **{"frame": "tip", "position": [0.2, 0.0, 0.0], "rotation": np.eye(3)},
+            **{"free_velocity": ("elbow",), "guess": [0.0, 0.0]},
+        ),
+        build(hovi.FrameGoal, frame="tip", axis=([1, 0, 0], [0, 0, 1])),
+        build(hovi.FrameGoal, frame="tip", pose=np.eye(4)),
+        own(frame_goal, "check", robot()),
+        own(frame_goal, "condition", robot()),
+        build(hovi.Via, time=0.5, goal=goal),
+        call(hovi.Tolerance.of, "1 mm", robot()),
+        own(hovi.Tolerance.of("1 mm", robot()), "in_words", 1e-3, "tip"),
+        build(
+            hovi.TrajectoryProblem,
+            **{"ld": problem().ld, "start": start, "goal": goal, "limits": limits},
+            **{"via": (hovi.Via(0.5, goal),), "clearance": hovi.Clearance()},
+        ),
+        own(problem(), "between", start, goal),
+        own(problem(), "on", problem().ld.grid),
+        own(problem(), "trajectory", solution().trajectory.path),
+        build(
+            hovi.Task,
+            **{each: getattr(task, each) for each in ("scene", "start", "goal")},
+            duration=1.0,
+            options=task.options,
+            name="task",
+        ),
+        own(task, "with_options", intervals=4),
+        own(task.options, "with_changes", intervals=4),
+        own(task.options, "on", robot()),
+    ]
+
+
+def _task() -> hovi.Task:
+    options = hovi.PlanOptions(intervals=N, processes=1, max_iterations=2, time_limit=1.0)
+    return hovi.Task(scene(), hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7]), 1.0, options)
+
+
+def _plans() -> list[Call]:
+    quick = {"max_iterations": 2, "time_limit": 1.0, "intervals": N, "processes": 1, "starts": 1}
+    options = {
+        **{"time_weight": 0.0, "via": (), "scheme": "galerkin-2", "limits": "none", "seed": 0},
+        **{"tolerance": None, "obstacles": (), "margin": 0.01, "self_collision": False},
+        **{"guess": "cubic", "turns": None, "weight": None, "continuation": False},
+    }
+    ends = [0.0, 0.0], [0.3, 0.7]
+    return [
+        call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
+        call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
+        build(hovi.PlanOptions, **quick, **options),
+        call(hovi.plan_task, _task(), progress=None, intervals=2),
+        call(
+            hovi.solve,
+            problem(),
+            "cubic",
+            **{"max_iterations": 2, "time_limit": 1.0, "escape_saddles": True, "report": None},
+            method=None,
+        ),
+        own(solution(), "replan", [0.0, 0.0], [0.3, 0.6], None),
+        call(hovi.certify, solution(), "tip", estimate=False),
+        call(hovi.estimate_error, solution(), "tip"),
+    ]
+
+
+def _flows() -> list[Call]:
+    arm = scene().effort_lagrangian()
+    mechanics = hovi.mechanics(scene())
+    jet = np.array([[0.4, -0.3], [0.6, -0.8], [1.2, 0.5], [-2.0, 1.5]])
+    x, p = legendre(arm, *jet)
+    one = hovi.SchemeLagrangian(arm, by_name("galerkin-1"), H)
+    exact = hovi.ExactDiscreteLagrangian(arm, H, tolerance=1e-8)
+    segment = one.from_start(x[None], p[None])
+    x1 = segment.x1[0]
+    symbols = [ca.SX.sym(name, 2) for name in "qva"]
+    turn = hovi.Symmetry(lambda q: ca.vertcat(-q[1], q[0]), 2)
+    pushed = scene().effort_lagrangian()
+    found = [
+        build(hovi.SchemeLagrangian, lagrangian=arm, scheme=by_name("galerkin-1"), h=H),
+        build(hovi.ExactDiscreteLagrangian, lagrangian=arm, h=H, tolerance=1e-8),
+        call(hovi.SchemeLagrangian.of, hovi.DiscreteLagrangian(arm, problem().ld.grid)),
+        build(hovi.CasadiLagrangian, jet=symbols, expression=ca.sumsqr(symbols[2]) / 2, space=None),
+        call(hovi.spline, 2, derivatives=2),
+        call(hovi.mechanics, scene()),
+        call(hovi.riemannian_cubic, scene()),
+        call(hovi.legendre, arm, *jet),
+        call(hovi.hamiltonian, arm, x[None], p[None]),
+        call(hovi.conjugate_time, hovi.spline(2), x, p, 0.2),
+        call(hovi.variational_order, arm, by_name("galerkin-0"), [0.02, 0.01], *jet[:, None]),
+        call(
+            hovi.flow, one, x, p, 3, t0=0.0, force=False, tolerance=1e-6, symmetries={"turn": turn}
+        ),
+        call(hovi.discrete_hamiltonian_flow, one, x, p, "momentum"),
+        call(hovi.discrete_lagrangian_map, one, x, x1),
+        call(hovi.euler_lagrange_residual, one, x, x1, x1),
+        call(hovi.regularity, one, x, x1),
+        call(hovi.inverse_legendre_minus, one, x, p),
+        call(hovi.inverse_legendre_plus, one, x, p),
+        call(hovi.legendre_minus, one, x, x1),
+        call(hovi.legendre_plus, one, x, x1),
+        build(hovi.Symmetry, generator=lambda q: q, n=2),
+        own(turn, "lift", x[None]),
+        own(turn, "momentum", x[None], p[None]),
+        own(turn, "defect", arm, *jet[:3, None]),
+        call(hovi.base_translation, cart(), [1, 0, 0]),
+        call(hovi.base_rotation, hovi.Scene(pendulum()), [0, -1, 0], point=[0, 0, 0]),
+        call(hovi.simulate, scene(), [0.1, 0.0], 0.1, None, intervals=5, inner_modes=1),
+        call(
+            hovi.play,
+            scene(),
+            solution().trajectory,
+            "none",
+            **{"bandwidth": 10.0, "intervals": 8, "inner_modes": 1},
+        ),
+        *(own(mechanics, name, *jet[:2, None]) for name in ("value", "evaluate", "expand")),
+        *(own(pushed, name, *jet[:3, None]) for name in ("value", "evaluate", "gradient")),
+        own(pushed, "reweighted", np.ones(2)),
+    ]
+    for ld in (one, exact):
+        found += [
+            own(ld, "from_start", x[None], p[None], 0.0, None),
+            own(ld, "from_end", x[None], p[None], 0.0),
+            own(ld, "joining", x[None], x1[None], 0.0),
+            own(ld, "value", x[None], x1[None]),
+            own(ld, "between", x[None], segment.w, 0.0),
+        ]
+    return found
+
+
+def _files() -> list[Call]:
+    trajectory = solution().trajectory
+    npz, toml = folder() / "motion.npz", folder() / "task.toml"
+    trajectory.save(npz)
+    task = hovi.Task(scene(), hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7]), 1.0)
+    hovi.save_task(task, toml)
+    return [
+        own(trajectory, "save", npz),
+        call(hovi.Trajectory.load, npz),
+        call(hovi.load_task, toml),
+        call(hovi.save_task, task, toml),
+        call(hovi.write_csv, trajectory, folder() / "motion.csv", rate=100.0),
+        call(hovi.plot, trajectory, folder() / "motion.svg"),
+        call(
+            hovi.replay,
+            trajectory,
+            **{"speed": 1.0, "loop": False, "trace": False, "open_browser": False},
+            **{"html": folder() / "motion.html", "announce": print},
+        ),
+    ]
+
+
+# The fuzzer
+
+
+def mutate(random: Random) -> Mutant:
+    """A call: its name, where another argument is given, and which, as JSON."""
+    name = random.choice(list(calls()))
+    place = random.choice(calls()[name].places)
+    return Mutant(json.dumps([name, place, random.randrange(len(WRONG))]).encode())
+
+
+def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
+    """Call it. Bytes that are not such a call are nothing to judge, and refused."""
+    try:
+        name, place, number = json.loads(mutant.content)
+        number = int(number) % len(WRONG)
+        known = place in calls()[name].places
+    except (ValueError, TypeError, LookupError, OverflowError, RecursionError):
+        known = False
+    return verdict_on(name, place, number) if known else (Verdict.REFUSED, "not a call")
+
+
+def verdict_on(name: str, place: int | str, number: int) -> tuple[Verdict, str]:
+    """The verdict on a valid call with another argument."""
+    value = WRONG[number]
+    meaningless = any(value is each for each in NEVER)
+    reason = f"{value!r} was accepted" if meaningless else ""
+    changed = calls()[name].replaced(place, value)
+    found, why = judge(changed, lambda result: "", reason)
+    return found, f"{name}, {place}: {why}"
