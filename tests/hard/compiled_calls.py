@@ -687,7 +687,8 @@ def _written(entry: Entry, arguments: Arguments, outputs: list[str], fill: float
     result = entry.function(**call)
     if result is False:  # a factorisation that failed leaves its output incomplete
         return []
-    return [repr(result).encode() if not callable(result) else b"", *_bytes(call, outputs)]
+    told = repr(result) if isinstance(result, bool | float | str | tuple) else ""
+    return [told.encode(), *_bytes(call, outputs)]
 
 
 def _bytes(call: Arguments, outputs: list[str]) -> list[bytes]:

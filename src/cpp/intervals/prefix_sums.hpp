@@ -25,7 +25,7 @@ inline void replace_by_prefix_sums(std::size_t N, std::size_t n, const double* i
       const double moved = (sums[k * n + i] += means[i]) - x[k * stride + i];
       if (!(std::abs(moved) <= share * largest)) return;  // nor where it is not a number
     }
-  for (std::size_t k = 0; k <= N; ++k) std::copy_n(&sums[k * n], n, x + k * stride);
+  for (std::size_t k = 0; k <= N; ++k) std::copy_n(sums.data() + k * n, n, x + k * stride);
 }
 
 }  // namespace hovi::intervals
