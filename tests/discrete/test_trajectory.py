@@ -349,7 +349,11 @@ def npy(header: str, data: bytes = b"") -> bytes:
 
 
 @pytest.mark.parametrize(
-    "shape", ["(10**18, 2)", "(1000000000000, 2)", "(-1, 2)", "(3, 2)", "(2,)", "'x'"]
+    "shape",
+    [
+        *("(10**18, 2)", "(1000000000000, 2)", "(-1, 2)", "(3, 2)", "(2,)", "'x'"),
+        *("(True, 3)", "(3, True)", f"({'1, ' * 70}3)", "(3, 1.0)", "((), 3)"),
+    ],
 )
 def test_a_shape_that_does_not_match_the_data_is_refused(saved: Path, shape: str) -> None:
     header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"

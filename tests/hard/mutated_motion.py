@@ -257,7 +257,9 @@ def _pickle(entries: Entries, random: Random) -> None:
 
 def _bomb(entries: Entries, random: Random) -> None:
     """an array claims more numbers than it holds"""
-    shape = random.choice(("(10**18, 2)", "(1000000000000, 2)", "(-1, 2)", "(5, 3)", "(2**63,)"))
+    shapes = ("(10**18, 2)", "(1000000000000, 2)", "(-1, 2)", "(5, 3)", "(2**63,)")
+    odd = ("(True, 10)", "(0, 10000000000000000000000)", "(5, False)", "((),)", f"({'1,' * 70})")
+    shape = random.choice((*shapes, *odd))
     header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
     data = b"\0" * random.choice((0, 80, 10_000_000))
     start = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header

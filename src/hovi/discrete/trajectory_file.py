@@ -181,9 +181,13 @@ def _decode_array(raw: bytes, dtype: np.dtype[Any], label: str) -> npt.NDArray[A
     if found != dtype or fortran:
         raise TrajectoryFileError(f"{label}: expected {dtype} in C order, the file has {found}.")
     data = memoryview(raw)[stream.tell() :]
-    if min(shape, default=0) < 0 or len(data) != math.prod(shape) * dtype.itemsize:
+    sizes = all(type(size) is int and size >= 0 for size in shape)  # True is an int, too
+    if not sizes or len(data) != math.prod(shape) * dtype.itemsize:
         raise TrajectoryFileError(f"{label}: shape {shape} does not fit its {len(data)} bytes.")
-    return np.frombuffer(data, dtype).reshape(shape)
+    try:
+        return np.frombuffer(data, dtype).reshape(shape)
+    except (ValueError, OverflowError) as error:  # too many dimensions; a zero beside large sizes
+        raise TrajectoryFileError(f"{label}: no array has the shape {shape}.") from error
 
 
 def _decode_doubles(raw: bytes, label: str) -> Array:
