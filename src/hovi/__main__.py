@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -9,6 +10,7 @@ import time
 from _thread import interrupt_main, start_new_thread
 from collections.abc import Iterator
 from types import FrameType
+from typing import TextIO
 
 EXIT_INTERRUPTED = 130
 IMPORTLIB_FILE = "<frozen importlib"
@@ -23,6 +25,7 @@ RETRY_DELAY = 0.05
 
 def run() -> None:
     """Run the command line and exit with its code."""
+    _replace_closed_streams()
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
         signal.signal(signal.SIGINT, _handle_interrupt)
     try:
@@ -40,7 +43,12 @@ def run() -> None:
     # Python remembers an interrupt inside `exec`, which dataclasses use, until the next `exec`,
     # and would otherwise exit with that signal although it was handled.
     exec("")
-    sys.exit(_flush_output(code))
+    code = _flush_output(code)
+    try:
+        sys.stderr.flush()
+    except OSError:
+        _discard(sys.stderr)
+    sys.exit(code)
 
 
 def _handle_interrupt(number: int, frame: FrameType | None) -> None:
@@ -90,17 +98,70 @@ def _is_library_frame(frame: FrameType) -> bool:
     return package == "hovi" and module not in ([], ["cli"], ["__main__"])
 
 
+class _ClosedStream(io.RawIOBase):
+    """Stands for a standard stream that was closed when the process began.
+
+    number: its descriptor, which is that of /dev/null now; worker processes inherit it.
+    lost: whether something was to be written to it.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number, self.lost = number, False
+
+    def fileno(self) -> int:
+        return self.number
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: object) -> int:
+        self.lost = True
+        return len(memoryview(data))  # type: ignore[arg-type]
+
+
+def _replace_closed_streams() -> None:
+    """Open /dev/null in place of closed standard streams.
+
+    The next file to be opened would get the number of such a stream, and what is printed to it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the smallest free number
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:  # as Python has it
+            buffer = io.BufferedWriter(_ClosedStream(number))
+            setattr(sys, name, io.TextIOWrapper(buffer, "utf-8", "backslashreplace"))
+
+
 def _flush_output(code: int) -> int:
     """Flush stdout, with one sentence if that fails; returns the exit code."""
     try:
         sys.stdout.flush()
     except OSError as error:
-        # Otherwise Python flushes again at exit, and prints a traceback.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard(sys.stdout)
         if not isinstance(error, BrokenPipeError):
-            print(f"error: cannot write the output: {error.strerror}.", file=sys.stderr)
+            _report_lost_output(str(error.strerror))
+        return code or 1
+    raw = getattr(sys.stdout.buffer, "raw", None)
+    if isinstance(raw, _ClosedStream) and raw.lost:
+        _report_lost_output("stdout is closed")
         return code or 1
     return code
+
+
+def _report_lost_output(reason: str) -> None:
+    try:
+        print(f"error: cannot write the output: {reason}.", file=sys.stderr)
+    except OSError:
+        _discard(sys.stderr)
+
+
+def _discard(stream: TextIO) -> None:
+    """Send what a stream still holds nowhere: Python flushes it again at exit, and would fail."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 if __name__ == "__main__":

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import select
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from contextlib import suppress
+from typing import Annotated, TextIO
 
 import typer
 from typer.exceptions import TyperException
@@ -23,6 +25,8 @@ from hovi.system.files import reason
 
 BAD_INPUT = 2
 """Exit code for invalid input."""
+OUTPUT_FAILED = 1
+"""Exit code for output that could not be written."""
 
 app = typer.Typer(
     help="Least-torque motions of URDF robots by higher-order variational integrators.",
@@ -68,8 +72,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments: those after `hovi` on the command line; from sys.argv by default.
     """
+    stdout, stderr = sys.stdout, sys.stderr
     try:
         code = app(args=arguments, prog_name="hovi", standalone_mode=False)
+    except SystemExit as error:  # how typer ends where a pipe is broken, whichever it is
+        sys.stdout, sys.stderr = stdout, stderr
+        if not isinstance(error.__context__, BrokenPipeError) or _has_no_reader(stdout):
+            return OUTPUT_FAILED
+        return _report_error(
+            "the connection to another process broke; if it was a worker of several starts, memory "
+            "or the number of processes may be limited: use --starts 1."
+        )
     except HoviError as error:
         return _report_error(str(error))
     except TyperException as error:
@@ -83,7 +96,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
+def _has_no_reader(stream: TextIO) -> bool:
+    """Whether a stream is a pipe, socket or terminal whose other end is closed."""
+    poll = select.poll()
+    try:
+        poll.register(stream.fileno(), 0)
+    except OSError:  # no file
+        return False
+    return bool(poll.poll(0))
+
+
 def _report_error(sentence: str) -> int:
     if sentence:  # empty when the help was printed instead
-        print(f"error: {sentence}", file=sys.stderr)
+        with suppress(OSError):  # stderr may be closed, too
+            print(f"error: {sentence}", file=sys.stderr)
     return BAD_INPUT

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,9 +22,19 @@ def progress(quiet: bool) -> Iterator[Progress | None]:
         yield None
     elif sys.stderr.isatty():
         with _progress_bar() as report:
-            yield report
+            yield _harmless(report)
     else:
-        yield _plain_lines()
+        yield _harmless(_plain_lines())
+
+
+def _harmless(report: Progress) -> Progress:
+    """A report that ends nothing where stderr cannot be written, as when its reader has gone."""
+
+    def reporting(text: str, fraction: float) -> None:
+        with suppress(OSError):
+            report(text, fraction)
+
+    return reporting
 
 
 @contextmanager
@@ -46,7 +56,8 @@ def _progress_bar() -> Iterator[Progress]:
     try:
         yield report
     finally:
-        bar.stop()
+        with suppress(OSError):
+            bar.stop()
 
 
 def _plain_lines() -> Progress:

@@ -1,0 +1,132 @@
+"""Standard streams that are closed, full or without a reader: nothing computed is lost.
+
+Real processes, which end with an exit code, at most one sentence, and the file that was asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from hovi.cli.reports import progress as reports
+from hovi.discrete.trajectory import Trajectory
+
+CLOSED = "error: cannot write the output: stdout is closed.\n"
+
+
+def run(
+    arguments: Sequence[str | Path], closed: Sequence[int], program: Sequence[str] = ("-m", "hovi")
+) -> subprocess.CompletedProcess[str]:
+    """A command whose standard streams with these numbers are closed when it begins."""
+
+    def close() -> None:
+        for number in closed:
+            os.close(number)
+
+    return subprocess.run(
+        [sys.executable, *program, *map(str, arguments)],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        preexec_fn=close,
+    )
+
+
+@pytest.mark.parametrize("starts", ["1", "3"])  # with worker processes, too
+@pytest.mark.parametrize("closed", [(0,), (1,), (2,), (1, 2), (0, 1, 2)], ids=str)
+def test_a_plan_is_kept_whichever_stream_is_closed(
+    closed: tuple[int, ...], starts: str, tmp_path: Path
+) -> None:
+    out = tmp_path / "motion.npz"
+    options = ("--starts", starts, "--out", out)
+    done = run(("plan", "two_link_reach", *options), closed)
+    lost = 1 in closed
+    assert done.returncode == (1 if lost else 0)
+    assert done.stderr == (CLOSED if lost and 2 not in closed else "")
+    assert (f"wrote {out}" in done.stdout) != lost
+    assert Trajectory.load(out).duration == 1.0
+
+
+@pytest.mark.parametrize(
+    "words", [("--version",), ("info", "two_link_reach"), ("schema",), ("info", "panda")]
+)
+def test_output_that_nobody_can_read_is_an_error(words: Sequence[str]) -> None:
+    done = run(words, (1,))
+    assert (done.returncode, done.stderr) == (1, CLOSED)
+
+
+def test_a_command_without_output_does_not_mind() -> None:
+    program = (
+        "import hovi.cli.application as a\n"
+        "a.app.command('quiet')(lambda: None)\n"
+        "from hovi.__main__ import run\n"
+        "run()\n"
+    )
+    done = run(("quiet",), (1, 2), ("-c", program))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_a_refusal_does_not_go_to_stdout() -> None:
+    done = run(("plan", "nowhere"), (2,))
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+@pytest.mark.parametrize("words", [("plan", "two_link_reach"), ("plan", "nowhere")])
+def test_a_full_or_broken_stderr_changes_no_exit_code(words: Sequence[str]) -> None:
+    expected = 2 if "nowhere" in words else 0
+    reader, writer = os.pipe()
+    os.close(reader)
+    with Path("/dev/full").open("w") as full, os.fdopen(writer, "w") as broken:
+        for stderr in (full, broken):
+            command = [sys.executable, "-m", "hovi", *words]
+            done = subprocess.run(
+                command, stdout=subprocess.PIPE, stderr=stderr, timeout=120, check=False
+            )
+            assert done.returncode == expected
+
+
+BROKEN = """
+import os
+import hovi.cli.application as application
+def broken():
+    reader, writer = os.pipe()
+    os.close(reader)
+    os.write(writer, b"to a process that has ended")
+application.app.command("broken")(broken)
+from hovi.__main__ import run
+run()
+"""
+
+
+def test_a_pipe_that_breaks_elsewhere_is_told() -> None:
+    """A worker that ends while it is started, for instance; only stdout's reader may be silent."""
+    done = run(("broken",), (), ("-c", BROKEN))
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: the connection to another process broke; ")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_progress_ends_nothing_when_its_reader_has_gone(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader, writer = os.openpty() if terminal else os.pipe()
+    monkeypatch.setattr(reports, "LINE_PERIOD", 0.0)
+    monkeypatch.setattr(reports, "BAR_DELAY", 0.0)
+    with os.fdopen(writer, "w") as stream:
+        monkeypatch.setattr(sys, "stderr", stream)
+        with reports.progress(quiet=False) as report:
+            assert report is not None
+            report("first", 0.1)
+            os.close(reader)
+            for share in (0.2, 0.3, 0.9):
+                report("later", share)
+        monkeypatch.undo()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), writer)  # for the buffer that is left
