@@ -21,6 +21,11 @@ from hovi.robot.example_robots import example_robot
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
 from hovi.robot.source import RobotSource
 from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.mesh_contents import (
+    one_line,
+    remove_unusable_shapes,
+    without_unreadable_meshes,
+)
 from hovi.robot.urdf.normalize import make_plain
 
 
@@ -41,8 +46,15 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
     model = build_full_model(source)
     try:
         geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
-    except (ValueError, RuntimeError) as error:
-        return Shapes(None, f"the {kind} shapes of {source.reference!r} cannot be read: {error}.")
+    except (ValueError, RuntimeError):
+        text, more = without_unreadable_meshes(text, kind)
+        problems += more
+        try:
+            geometry = pin.buildGeomFromUrdfString(model, text, geometry_type)
+        except (ValueError, RuntimeError) as error:
+            reason = one_line(error)
+            return Shapes(None, f"{kind} shapes of {source.reference!r} cannot be read: {reason}.")
+    problems += remove_unusable_shapes(geometry, model)
     _, (geometry,) = locked_and_coupled(model, [geometry], source.locked, couplings_in(source))
     problem = _sentence(source, kind, problems)
     return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
