@@ -1,4 +1,4 @@
-"""Fuzzing of files, compiled functions and the API: no crash, no hang, no silent acceptance.
+"""Fuzzing of files, meshes, compiled functions and the API: no crash, no hang, nothing silent.
 
 Inputs are made by the mutators of tests/hard, each from the seed and its number, and loaded in
 separate processes: a process that dies is a crash, one that is silent for 10 s a hang. Objects that
@@ -34,6 +34,7 @@ KINDS = {
     "trajectory": ("hard.mutated_motion", 6_000),
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
+    "mesh": ("hard.mutated_mesh", 3_000),
 }
 HANG, STARTUP = 10.0, 120.0  # [s]
 FAULTS = (Verdict.CRASH, Verdict.HANG, Verdict.SILENT, Verdict.UNCLEAR)

@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
-    python fuzz_coverage.py urdf|scene|trajectory|compiled|api SECONDS
+    python fuzz_coverage.py urdf|scene|trajectory|mesh|compiled|api SECONDS
 
 It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
@@ -23,6 +23,7 @@ MODULES = {
     "trajectory": "hard.mutated_motion",
     "compiled": "hard.compiled_calls",
     "api": "hard.api_calls",
+    "mesh": "hard.mutated_mesh",
 }
 CORPUS, LARGEST = 300, 60_000  # inputs to begin with; bytes of an input
 HANG = 10  # [s]
@@ -35,6 +36,7 @@ def main() -> None:
         "hovi.robot.urdf.check",
         "hovi.robot.urdf.rules",
         "hovi.robot.urdf.normalize",
+        "hovi.robot.urdf.mesh_files",
         "hovi.discrete.trajectory_file",
     ]
     with atheris.instrument_imports(

@@ -11,10 +11,24 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hard import api_calls, compiled_calls, mutated_motion, mutated_scene, mutated_urdf
+from hard import (
+    api_calls,
+    compiled_calls,
+    mutated_mesh,
+    mutated_motion,
+    mutated_scene,
+    mutated_urdf,
+)
 from hard.verdict import Verdict
 
-MUTATED = (mutated_urdf, mutated_scene, mutated_motion, compiled_calls, api_calls)
+MUTATED = (
+    mutated_urdf,
+    mutated_scene,
+    mutated_motion,
+    mutated_mesh,
+    compiled_calls,
+    api_calls,
+)
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hard import mutated_motion, mutated_scene, mutated_urdf
+from hard import mutated_mesh, mutated_motion, mutated_scene, mutated_urdf
 from hard.case import Case, Outcome, parameters
 from hard.strange_files import ARM, MASS, by_pinocchio, loaded, long_chain, refusals, run_process
 from hard.verdict import Verdict
@@ -297,7 +297,7 @@ def refused_inputs() -> Outcome:
     )
 
 
-MUTATED = (mutated_urdf, mutated_scene, mutated_motion)
+MUTATED = (mutated_urdf, mutated_scene, mutated_motion, mutated_mesh)
 GOOD = (Verdict.REFUSED, Verdict.ACCEPTED)
 
 
@@ -377,7 +377,7 @@ CASES = (
     ),
     Case(
         "30b",
-        "mutated URDFs, scenes and trajectory files are refused or load correctly",
+        "mutated URDFs, scenes, trajectory files and meshes are refused or load correctly",
         lambda: "see 26 to 30a",
         fuzzed(100),
         "no crash, no silent acceptance",

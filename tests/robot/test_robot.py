@@ -14,6 +14,7 @@ from hovi.errors import InputError, ModelError
 from hovi.robot.example_robots import BUILT_IN_CODE, example_names, example_robot
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot, RobotSource
+from samples.meshes import TRIANGLE, mesh_arm
 
 Array = npt.NDArray[np.float64]
 
@@ -29,22 +30,6 @@ MASSLESS = {
     "romeo": r"[LR](Finger\d\d|Thumb\d|Hand)",
 }
 """Examples whose fingers have no mass, with a pattern of the joints of these fingers."""
-
-MESH_ARM = """<robot name="mesh_arm"><link name="base"/><link name="rod">
-  <inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
-  <visual><geometry><mesh filename="{mesh}"/></geometry></visual></link>
-  <joint name="hinge" type="continuous"><parent link="base"/><child link="rod"/></joint></robot>"""
-
-TRIANGLE = """solid t
-facet normal 0 0 1
-outer loop
-vertex 0 0 0
-vertex 1 0 0
-vertex 0 1 0
-endloop
-endfacet
-endsolid t
-"""
 
 
 def printed_torques(q: Array, v: Array, a: Array) -> Array:
@@ -68,12 +53,6 @@ def printed_torques(q: Array, v: Array, a: Array) -> Array:
         + (m2 * l2**2 / 4 + j2) * a[1]
     )
     return np.array([u1, u2])
-
-
-def mesh_arm(folder: Path, mesh: str) -> Path:
-    path = folder / "arm.urdf"
-    path.write_text(MESH_ARM.format(mesh=mesh))
-    return path
 
 
 # The shipped models

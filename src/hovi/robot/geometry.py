@@ -1,9 +1,9 @@
 """The geometry of a robot, loaded on first access so that planning reads no mesh.
 
 Mesh names are untrusted input: each file must lie inside its own package folder (or, for plain
-paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`). A shape
-whose mesh is missing or lies outside is left out and the reason is recorded; the robot stays
-usable.
+paths, inside the URDF's folder, the ROS package around it, or one of `package_dirs`), and so must
+every file that a mesh names. A shape whose mesh is missing or lies outside is left out and the
+reason is recorded; the robot stays usable.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from hovi.robot.urdf.mesh_contents import (
     remove_unusable_shapes,
     without_unreadable_meshes,
 )
+from hovi.robot.urdf.mesh_files import check_mesh, is_inside
 from hovi.robot.urdf.normalize import make_plain
 
 
@@ -60,16 +61,22 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
     return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
 
 
-def find_mesh(filename: str, source: RobotSource) -> Path:
-    """The file of a mesh. Raises ModelError if it is outside its folder or does not exist."""
+def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> Path:
+    """The file of a mesh.
+
+    drawn: whether its textures are needed, too.
+    Raises ModelError if it does not exist, cannot be used, or if it or a file that it names is
+    outside its folder.
+    """
     candidates = list(_candidates(filename, source))
     for root, path in candidates:
-        if not _inside(path, root):
+        if not is_inside(path, root):
             raise ModelError(
                 f"mesh {filename!r} lies outside {str(root)!r}: mesh names must stay inside "
                 "their package; to allow another folder, name it in package_dirs."
             )
         if path.is_file():
+            check_mesh(path, root, drawn)
             return path
     raise ModelError(f"mesh {filename!r} was not found in {_places(candidates)}.")
 
@@ -88,7 +95,7 @@ def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path
     if source.folder:
         pairs.insert(0, (_package_root(Path(source.folder)), Path(source.folder)))
     if path.is_absolute():
-        inside = [pair for pair in pairs if _inside(Path(os.path.normpath(path)), pair[0])]
+        inside = [pair for pair in pairs if is_inside(path, pair[0])]
         pairs = inside or pairs[:1]
     for root, folder in pairs:
         yield root.absolute(), Path(os.path.normpath(folder.absolute() / path))
@@ -123,24 +130,32 @@ def _package_dirs(source: RobotSource) -> list[Path]:
 def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     """The URDF with absolute mesh paths, without shapes whose mesh is unusable; and the reasons."""
     robot = checked_urdf(source.urdf or "", source.reference)
+    _drop_textures(robot)
     problems = []
     for link in robot.iterfind("link"):
         for shape in link.findall(kind):
-            if problem := _find_files(shape, source):
+            if problem := _find_meshes(shape, source, drawn=kind == "visual"):
                 problems.append(f"link {link.get('name')!r}: {problem}")
                 link.remove(shape)
-    for material in robot.iterfind("material"):
-        if _find_files(material, source):
-            robot.remove(material)
     make_plain(robot)
     return ElementTree.tostring(robot, encoding="unicode"), problems
 
 
-def _find_files(element: ElementTree.Element, source: RobotSource) -> str:
-    """Replace mesh and texture names by absolute paths; returns what is wrong, or ""."""
-    for file in (*element.iter("mesh"), *element.iter("texture")):
+def _drop_textures(robot: ElementTree.Element) -> None:
+    """Remove the textures of materials, which no page shows, so that nothing opens their files."""
+    for material in [*robot.iter("material")]:
+        for texture in material.findall("texture"):
+            material.remove(texture)
+    for material in robot.findall("material"):
+        if material.find("color") is None:
+            robot.remove(material)
+
+
+def _find_meshes(shape: ElementTree.Element, source: RobotSource, drawn: bool) -> str:
+    """Replace the names of meshes by absolute paths; returns what is wrong, or ""."""
+    for mesh in shape.iter("mesh"):
         try:
-            file.set("filename", f"file://{find_mesh(file.get('filename', ''), source)}")
+            mesh.set("filename", f"file://{find_mesh(mesh.get('filename', ''), source, drawn)}")
         except ModelError as error:
             return str(error)
     return ""
@@ -151,12 +166,6 @@ def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
         return ""
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"robot {source.reference!r} lacks {kind} shapes: {problems[0]}{more}"
-
-
-def _inside(path: Path, folder: Path) -> bool:
-    """Whether a path is inside a folder, before and after following symbolic links."""
-    named = path.is_relative_to(os.path.normpath(folder.absolute()))
-    return named and path.resolve().is_relative_to(folder.resolve())
 
 
 def _places(candidates: list[tuple[Path, Path]]) -> str:

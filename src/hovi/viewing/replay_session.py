@@ -262,12 +262,15 @@ def _swept_box(visualizer: MeshcatVisualizer, q: Array) -> tuple[Array, Array]:
 
 
 def _corners(item: pin.GeometryObject) -> Array:
-    """Corners of a drawn object's own bounding box, shape (8, 3), in [m]."""
+    """Corners of a drawn object's own bounding box, shape (8, 3), in [m].
+
+    None, shape (0, 3), for a mesh whose points are not all finite.
+    """
     item.geometry.computeLocalAABB()
     box = item.geometry.aabb_local
     choices = np.array(list(itertools.product((0, 1), repeat=3)))
     corners: Array = np.where(choices, box.max_, box.min_)
-    return corners
+    return corners if np.isfinite(corners).all() else np.zeros((0, 3))
 
 
 def _draw_trace(visualizer: MeshcatVisualizer, points: Array, width: float) -> None:

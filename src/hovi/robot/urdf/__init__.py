@@ -1,1 +1,1 @@
-"""Checks and normalizes URDFs before Pinocchio reads them."""
+"""Checks and normalizes URDFs, and checks the meshes they name, before Pinocchio reads them."""

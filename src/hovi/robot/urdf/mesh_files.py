@@ -1,0 +1,168 @@
+"""Checks the files that a mesh names: textures of Collada, material libraries of OBJ.
+
+Coal opens a library when it reads the mesh, and a replay page embeds the textures, so both must lie
+where the mesh itself must lie. Formats other than MESH_TYPES are refused: Coal would read them, and
+some of them open further files by rules of their own.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from xml.parsers import expat
+
+from hovi.errors import ModelError
+from hovi.system.files import reason, require_file
+
+MESH_TYPES = (".dae", ".obj", ".off", ".ply", ".stl")
+MAX_MESH_BYTES = 256_000_000
+MAX_NAMED_BYTES = 64_000_000
+"""Largest mesh, and largest texture or material library, in bytes."""
+
+_LIBRARY_TAG = "http://www.collada.org/2005/11/COLLADASchema}library_images"
+_CONTINUED = re.compile(rb"\\(?:\n|[\r\0\f][^\n]*\n)")
+_LIBRARY = re.compile(rb"mtllib[ \t\v]*([^\r\n\0\f]*)")
+
+
+def check_mesh(path: Path, root: Path, drawn: bool) -> None:
+    """Check a mesh and the names of files in it.
+
+    path: of the mesh, an existing file.
+    root: the folder that must contain everything that the mesh names.
+    drawn: whether the mesh is shown, so that its textures have to exist.
+    Raises ModelError for another type of file, one that is too large or unreadable, and a name that
+    leaves `root` or is no regular file there.
+    """
+    kind = path.suffix.lower()
+    if kind not in MESH_TYPES:
+        raise ModelError(
+            f"mesh {path.name!r} is not of a type that hovi reads ({', '.join(MESH_TYPES)}): "
+            "convert it to one of them."
+        )
+    try:
+        require_file(path, MAX_MESH_BYTES)
+        content = path.read_bytes() if kind in _FILES_IN else b""
+    except OSError as error:
+        raise ModelError(f"mesh {path.name!r} cannot be read: {reason(error)}.") from error
+    for name, is_shown in _FILES_IN[kind](path.name, content) if content else ():
+        _check_named(path, name, root, must_exist=drawn and is_shown)
+    if drawn:
+        _check_text(path.name, content)
+
+
+def is_inside(path: Path, folder: Path) -> bool:
+    """Whether a path is inside a folder, before and after following symbolic links."""
+    named = Path(os.path.normpath(path)).is_relative_to(os.path.normpath(folder.absolute()))
+    return named and path.resolve().is_relative_to(folder.resolve())
+
+
+def _check_named(mesh: Path, name: str, root: Path, must_exist: bool) -> None:
+    try:
+        file = mesh.parent / name
+        if not is_inside(file, root):
+            raise ModelError(
+                f"mesh {mesh.name!r} names {name!r}, which lies outside {str(root)!r}: "
+                "what a mesh names must stay inside its package; copy that file there."
+            )
+        if must_exist or file.exists():
+            require_file(file, MAX_NAMED_BYTES)
+    except (OSError, ValueError, RuntimeError) as error:  # a NUL in the name, or a loop of links
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        raise ModelError(
+            f"mesh {mesh.name!r} names {name!r}, which cannot be read ({why}): "
+            "put that file there, or remove its name from the mesh."
+        ) from error
+
+
+def _check_text(mesh: str, content: bytes) -> None:
+    """A page gets Collada and OBJ files as text."""
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        raise ModelError(
+            f"mesh {mesh!r} is not UTF-8 text (byte {error.start}): save it as UTF-8."
+        ) from error
+
+
+def _textures(mesh: str, content: bytes) -> list[tuple[str, bool]]:
+    """The name of every image in a Collada file, and whether a page embeds it."""
+    return _ImageNames(mesh).read(content)
+
+
+def _material_libraries(mesh: str, content: bytes) -> Iterator[tuple[str, bool]]:
+    """The libraries that an OBJ file names, and the one that Coal opens where they are missing.
+
+    A backslash at the end of a line continues it; Coal reads any other as a slash.
+    """
+    joined = _CONTINUED.sub(b"", content)
+    libraries = {os.fsdecode(match[1]).replace("\\", "/") for match in _LIBRARY.finditer(joined)}
+    if libraries:
+        libraries.add(f"{mesh[:-4]}.mtl")
+    yield from ((name, False) for name in sorted(libraries - {""}))
+
+
+_FILES_IN: dict[str, Callable[[str, bytes], Iterable[tuple[str, bool]]]]
+_FILES_IN = {".dae": _textures, ".obj": _material_libraries}
+
+
+class _ImageNames:
+    """Collects the texts of <init_from> in <library_images> and <image>, in any namespace.
+
+    Elsewhere <init_from> has the identifier of an image. Pinocchio embeds the images that have
+    init_from in their tag, inside the <library_images> of Collada 1.4, and takes the text before
+    the first element inside. In Collada 1.5 the name is in a <ref>.
+    """
+
+    def __init__(self, mesh: str) -> None:
+        self.mesh = mesh
+        self.image_depth = self.library_depth = self.name_depth = 0
+        self.text, self.begins_name = "", False
+        self.names: list[tuple[str, bool]] = []
+
+    def read(self, content: bytes) -> list[tuple[str, bool]]:
+        parser = expat.ParserCreate(namespace_separator="}")
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.characters
+        parser.StartDoctypeDeclHandler = self.doctype
+        try:
+            parser.Parse(content, True)
+        except (expat.ExpatError, LookupError, ValueError) as error:  # or an unknown encoding
+            raise ModelError(f"mesh {self.mesh!r} is not well-formed XML: {error}.") from error
+        return self.names
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.take()
+        self.image_depth += _is_image(tag)
+        self.library_depth += tag == _LIBRARY_TAG
+        self.name_depth += _is_name(tag)
+        self.begins_name = _is_name(tag)
+
+    def end(self, tag: str) -> None:
+        self.take()
+        self.image_depth -= _is_image(tag)
+        self.library_depth -= tag == _LIBRARY_TAG
+        self.name_depth -= _is_name(tag)
+
+    def characters(self, text: str) -> None:
+        self.text += text if self.image_depth and self.name_depth else ""
+
+    def take(self) -> None:
+        """Keep the text since the last tag, if it is the name of an image."""
+        is_shown = bool(self.begins_name and self.library_depth)
+        if is_shown or self.text.strip():
+            self.names.append((self.text, is_shown))
+        self.text, self.begins_name = "", False
+
+    def doctype(self, *_: object) -> None:
+        raise ModelError(f"mesh {self.mesh!r} has a DOCTYPE, which no mesh needs: delete it.")
+
+
+def _is_image(tag: str) -> bool:
+    return tag.rpartition("}")[2] in ("library_images", "image")
+
+
+def _is_name(tag: str) -> bool:
+    return "init_from" in tag
