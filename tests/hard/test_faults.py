@@ -191,6 +191,7 @@ LONG_COMMANDS: dict[str, Sequence[str]] = {
     "simulate": ("simulate", "two_link_reach", "--duration", "3000", "--out", "{folder}/m.npz"),
     "export": ("export", "{motion}", "--csv", "{folder}/table.csv", "--rate", "5e6"),
     "replay": ("replay", "{motion}", "--no-browser"),
+    "replay --loop": ("replay", "{motion}", "--no-browser", "--loop"),
     "info": ("info", "talos"),
     "plot": ("plot", "{motion}", "--out", "{folder}/picture.png"),
 }
@@ -289,6 +290,19 @@ def test_without_a_browser_the_address_is_printed(motion: Path) -> None:
     assert process.stdout.readline().startswith("playing at http://127.0.0.1:")
     os.killpg(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (0, "")
+
+
+def test_one_ctrl_c_ends_a_replay_that_loops(motion: Path) -> None:
+    process = start("replay", motion, "--no-browser", "--loop", "--speed", "50")
+    assert process.stdout is not None
+    assert process.stdout.readline().startswith("playing at http://127.0.0.1:")
+    time.sleep(1.0)
+    os.kill(process.pid, signal.SIGINT)
+    try:
+        _, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
     assert (process.returncode, err) == (0, "")
 
 

@@ -73,7 +73,7 @@ class Replay:
         speed: motion seconds per second. rate: frames per second.
         loop: play again and again until interrupted (Ctrl-C, or Jupyter's stop button).
         """
-        _check_positive("speed", speed)
+        check_speed(speed)
         _check_positive("rate", rate)
         try:
             self._play_once(speed, rate)
@@ -82,6 +82,10 @@ class Replay:
         except KeyboardInterrupt:
             if not loop:
                 raise
+
+    def offer_controls(self, *, loop: bool = False) -> None:
+        """Give browsers that are opened from now on the motion with the page's controls."""
+        self.page.keep(_animation(self.trajectory, self.visualizer, loop, self.highlights))
 
     def close(self) -> None:
         """Stop the server, if there is one. An open page stays as it is."""
@@ -147,25 +151,39 @@ def replay(
     announce: called with the page's address before the motion starts.
     Raises DisplayError when the page cannot be served, opened or written.
     """
-    _check_positive("speed", speed)
+    check_speed(speed)
     if html is not None:
         return write_html(trajectory, html, speed=speed, loop=loop, trace=trace)
+    shown = serve(trajectory, trace, open_browser, port, announce)
+    try:
+        shown.play(speed=speed, loop=loop)
+        shown.offer_controls(loop=loop)
+    except BaseException:
+        shown.close()
+        raise
+    return shown
+
+
+def serve(
+    trajectory: Trajectory,
+    trace: bool = True,
+    open_browser: bool = False,
+    port: int = 0,
+    announce: Callable[[str], object] = print,
+) -> Replay:
+    """A live page that shows the start of a motion; arguments and errors as in `replay`."""
     robot = _robot(trajectory)
     highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
     page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)
     try:
         visualizer = _draw(trajectory, robot, page, trace, highlights)
-        shown = Replay(trajectory, visualizer, page.web_url, page, highlights)
         announce(page.web_url)
         if open_browser:
             _open_browser(page)
-        shown.play(speed=speed, loop=loop)
-        # Browsers opened from now on get the motion with its controls.
-        page.keep(_animation(trajectory, visualizer, loop, highlights))
     except BaseException:
         page.close()
         raise
-    return shown
+    return Replay(trajectory, visualizer, page.web_url, page, highlights)
 
 
 def write_html(
@@ -180,7 +198,7 @@ def write_html(
 
     The same motion gives the same bytes. Arguments as in `replay`. Raises DisplayError.
     """
-    _check_positive("speed", speed)
+    check_speed(speed)
     robot = _robot(trajectory)
     highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
     page = Page(_title(trajectory, robot), _note(robot, highlights))
@@ -364,6 +382,11 @@ def _track(
 
 def _title(trajectory: Trajectory, robot: Robot) -> str:
     return f"{robot.name}, {trajectory.duration:g} s"
+
+
+def check_speed(speed: float) -> None:
+    """Raise DisplayError unless a speed is a positive number."""
+    _check_positive("speed", speed)
 
 
 def _check_positive(name: str, value: float) -> None:

@@ -41,17 +41,16 @@ def _serve(trajectory: Trajectory, speed: float, loop: bool, browser: bool) -> N
     import contextlib
     import threading
 
-    from hovi.viewing.replay_session import replay as play
+    from hovi.viewing.replay_session import check_speed, serve
 
+    check_speed(speed)
     with contextlib.suppress(KeyboardInterrupt):
-        play(
-            trajectory,
-            speed=speed,
-            loop=loop,
-            open_browser=browser and _has_browser(),
-            announce=_announce,
-        )
-        threading.Event().wait()
+        open_browser = browser and _has_browser()
+        with serve(trajectory, open_browser=open_browser, announce=_announce) as shown:
+            shown.play(speed=speed, loop=loop)
+            if not loop:  # a loop has ended by Ctrl-C
+                shown.offer_controls()
+                threading.Event().wait()
 
 
 def _announce(address: str) -> None:
