@@ -96,11 +96,19 @@ class Tab:
 
 
 @contextlib.contextmanager
-def headless_browser(profile: Path, size: tuple[int, int] = (800, 600)) -> Iterator[Tab]:
-    """A browser with a fresh profile in the folder `profile`, closed at the end."""
+def headless_browser(
+    profile: Path, size: tuple[int, int] = (800, 600), names: str = ""
+) -> Iterator[Tab]:
+    """A browser with a fresh profile in the folder `profile`, closed at the end.
+
+    names: rules by which it resolves names of hosts, such as "MAP other.test 127.0.0.1".
+    """
     assert CHROMIUM is not None
     window = f"--window-size={size[0]},{size[1]}"
-    command = [CHROMIUM, *_FLAGS.split(), window, f"--user-data-dir={profile}", "about:blank"]
+    flags = [*_FLAGS.split(), window, f"--user-data-dir={profile}"]
+    if names:
+        flags.append(f"--host-resolver-rules={names}")
+    command = [CHROMIUM, *flags, "about:blank"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     loop = asyncio.new_event_loop()
     try:

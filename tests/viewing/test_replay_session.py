@@ -324,7 +324,7 @@ def test_playback_shows_and_hides_highlights(limited_motion: Trajectory, tmp_pat
     during = float(shown.highlights.times[shown.highlights.flags.any(axis=1)].mean())
 
     def hidden() -> int:
-        drawn = [umsgpack.unpackb(message) for message in shown.page.messages]
+        drawn = [umsgpack.unpackb(message.packed) for message in shown.page.messages.all()]
         flags = [
             m["value"] for m in drawn if m.get("property") == "visible" and "/visuals/" in m["path"]
         ]

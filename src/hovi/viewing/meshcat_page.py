@@ -14,7 +14,7 @@ import json
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import umsgpack
 
@@ -59,11 +59,11 @@ viewer.gui.__folders["Scene"].close();
 </html>
 """
 
-# With this policy the browser itself blocks every network access.
+# With this policy the browser itself blocks every network access but to the server of a live page.
 _POLICY = """
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; \
-script-src 'unsafe-inline' 'unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; \
-img-src data: blob:; connect-src data: blob:">"""
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; base-uri 'none'; \
+form-action 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob:{script}; worker-src blob:; \
+style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:{socket}">"""
 
 _PLAY = """for (const message of {messages}) {{
     viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
@@ -79,6 +79,45 @@ class Command(Protocol):
         """The message as a dictionary for MessagePack."""
 
 
+class Message(NamedTuple):
+    """A packed message to meshcat's window; the last one of a path, kind and name counts."""
+
+    path: str
+    kind: str
+    name: str
+    packed: bytes
+
+
+class Messages:
+    """Messages in their order, without those that a later one overrides.
+
+    deletions: whether to keep the deletions of parts, which are of no use to a new window.
+    """
+
+    def __init__(self, deletions: bool = False) -> None:
+        self._deletions = deletions
+        self._packed: dict[tuple[str, str, str], bytes] = {}
+
+    def add(self, message: Message) -> None:
+        """Add a message, and drop those that it overrides."""
+        is_deletion = message.kind == "delete"
+        if is_deletion:
+            inside = message.path.rstrip("/") + "/"
+            for key in [k for k in self._packed if f"{k[0]}/".startswith(inside)]:
+                del self._packed[key]
+        if self._deletions or not is_deletion:
+            self._packed[message[:3]] = message.packed
+
+    def take(self) -> bytes | None:
+        """Remove the first message and return it; None if there is none."""
+        key = next(iter(self._packed), None)
+        return None if key is None else self._packed.pop(key)
+
+    def all(self) -> list[Message]:
+        """The messages, while another thread may add some: the copy is atomic."""
+        return [Message(*key, packed) for key, packed in self._packed.copy().items()]
+
+
 class Page:
     """A window for `meshcat.Visualizer` that stores what is drawn.
 
@@ -92,28 +131,20 @@ class Page:
         """An empty page."""
         self.title, self.note = title, note
         self.web_url = ""
-        self._messages: dict[tuple[str, str, str], bytes] = {}
+        self.messages = Messages()
         self._uuids: dict[bytes, bytes] = {}
 
     def send(self, command: Command) -> None:
         """Store a message. The method's name is meshcat's."""
         self.keep(command.lower())
 
-    def keep(self, message: Mapping[str, Any]) -> bytes:
-        """Store a message and return its bytes."""
-        kind, path = message["type"], message.get("path", "")
-        if kind == "delete":
-            self._drop(path)
+    def keep(self, message: Mapping[str, Any]) -> Message:
+        """Store a message and return it packed."""
         packed = _UUID.sub(self._stable_uuid, umsgpack.packb(message))
-        if kind != "delete":
-            self._messages[path, kind, str(message.get("property", ""))] = packed
-        return packed
-
-    @property
-    def messages(self) -> list[bytes]:
-        """The messages that make a browser show the page."""
-        # A browser may connect while a motion plays; copying is atomic.
-        return list(self._messages.values())
+        path, name = message.get("path", ""), str(message.get("property", ""))
+        kept = Message(path, message["type"], name, packed)
+        self.messages.add(kept)
+        return kept
 
     def offline_html(self, speed: float = 1.0) -> str:
         """The page as one HTML file that loads nothing else.
@@ -121,22 +152,22 @@ class Page:
         speed: time scale of the animation.
         """
         script = (VIEWER_FOLDER / "main.min.js").read_text(encoding="utf-8")
-        messages = json.dumps([base64.b64encode(m).decode() for m in self.messages])
+        messages = json.dumps([base64.b64encode(m.packed).decode() for m in self.messages.all()])
         start = _PLAY.format(messages=messages, speed=float(speed))
-        return self._fill(_POLICY, f"<script>{script}</script>", start)
+        policy = _POLICY.format(script="", socket="")
+        return self._fill(policy, f"<script>{script}</script>", start)
 
-    def live_html(self) -> str:
-        """The page that receives its messages from the server."""
-        return self._fill("", '<script src="main.min.js"></script>', "viewer.connect();")
+    def live_html(self, host: str) -> str:
+        """The page that receives its messages from the server.
+
+        host: name and port of the server, as the browser has them.
+        """
+        policy = _POLICY.format(script=" 'self'", socket=html.escape(f" ws://{host}"))
+        return self._fill(policy, '<script src="main.min.js"></script>', "viewer.connect();")
 
     def _fill(self, policy: str, meshcat: str, start: str) -> str:
         title, note = html.escape(self.title), html.escape(self.note)
         return _PAGE.format(policy=policy, title=title, note=note, meshcat=meshcat, start=start)
-
-    def _drop(self, path: str) -> None:
-        inside = path.rstrip("/") + "/"
-        for key in [k for k in self._messages if k[0] == path or k[0].startswith(inside)]:
-            del self._messages[key]
 
     def _stable_uuid(self, match: re.Match[bytes]) -> bytes:
         """Replace meshcat's identifiers, which contain time and MAC address, by a counter."""

@@ -1,19 +1,38 @@
-"""A meshcat page served to browsers on this machine only, by a thread of this process."""
+"""A meshcat page served to browsers on this machine only, by a thread of this process.
+
+Requests that name another host are refused, since a site whose name leads to this machine (DNS
+rebinding) could read the page. A browser gets the next message when it has taken the last one, and
+those that later ones override are skipped, so what waits for a slow browser does not grow.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import threading
 
 import tornado.httpserver
+import tornado.iostream
 import tornado.web
 import tornado.websocket
 
 from hovi.errors import DisplayError
-from hovi.viewing.meshcat_page import VIEWER_FOLDER, Command, Page
+from hovi.viewing.meshcat_page import VIEWER_FOLDER, Command, Message, Messages, Page
 
 _HOST = "127.0.0.1"
+_HOST_NAMES = r"(127\.0\.0\.1|localhost)"
+"""Accepted in requests, with any port, since a tunnel may end at another one."""
+MAX_BROWSERS = 16
+"""Windows that show a page at once; each may hold the copy of one message."""
+_MAX_CONNECTIONS = 64
+_MAX_HEADER, _MAX_BODY = 16_384, 0  # [bytes]; browsers send nothing but requests
+_IDLE_SECONDS = 30.0
+_TRY_AGAIN_LATER = 1013  # of the WebSocket protocol
+_LEAVE_SECONDS = 5.0
+_TAKE_SECONDS = 60.0  # for one message, until a browser counts as gone
+_LARGE, _LARGE_AT_ONCE = 1_000_000, 2
+"""Bytes from which a message is large, and number of copies of large ones in memory."""
 
 
 class ServedPage(Page):
@@ -47,9 +66,9 @@ class ServedPage(Page):
 
     def send(self, command: Command) -> None:
         """Store a message and send it to every browser."""
-        packed = self.keep(command.lower())
+        message = self.keep(command.lower())
         if not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._broadcast, packed)
+            self._loop.call_soon_threadsafe(self._broadcast, message)
 
     def wait(self, seconds: float) -> bool:
         """Wait until a browser shows the page; False when none connects within that time [s]."""
@@ -68,35 +87,77 @@ class ServedPage(Page):
         finally:
             self._server.stop()
             for browser in list(self._browsers):
-                browser.close()
+                browser.leave()
             self._loop.run_until_complete(self._server.close_all_connections())
+            if rest := asyncio.all_tasks(self._loop):  # of the browsers
+                self._loop.run_until_complete(asyncio.wait(rest, timeout=_LEAVE_SECONDS))
             self._loop.run_until_complete(self._loop.shutdown_asyncgens())
             self._loop.close()
 
     def _listen(self, listener: socket.socket) -> None:
+        self._large = asyncio.Semaphore(_LARGE_AT_ONCE)
         application = tornado.web.Application(
+            [(r".*", _OtherHost)],
+            log_function=lambda handler: None,
+            websocket_max_message_size=_MAX_HEADER,
+        )
+        application.add_handlers(
+            _HOST_NAMES,
             [
                 tornado.web.url(r"/view/", _LivePage, {"page": self}),
                 tornado.web.url(r"/view/(main.min.js)", _Script, {"path": str(VIEWER_FOLDER)}),
                 tornado.web.url(r"/", _Browser, {"page": self}),
             ],
-            log_function=lambda handler: None,
         )
-        self._server = tornado.httpserver.HTTPServer(application)
+        self._server = _Server(
+            application,
+            idle_connection_timeout=_IDLE_SECONDS,
+            body_timeout=_IDLE_SECONDS,
+            max_header_size=_MAX_HEADER,
+            max_body_size=_MAX_BODY,
+        )
         self._server.add_socket(listener)
 
-    def _broadcast(self, packed: bytes) -> None:
+    def _broadcast(self, message: Message) -> None:
         for browser in list(self._browsers):
-            browser.show(packed)
+            browser.show(message)
 
     def _connect(self, browser: _Browser) -> None:
-        for message in self.messages:
-            browser.show(message)
+        if len(self._browsers) >= MAX_BROWSERS:
+            browser.leave(_TRY_AGAIN_LATER, "too many windows show this page")
+            return
         self._browsers.add(browser)
+        for message in self.messages.all():
+            browser.show(message)
         self._connected.set()
 
     def _disconnect(self, browser: _Browser) -> None:
         self._browsers.discard(browser)
+
+
+class _Server(tornado.httpserver.HTTPServer):
+    """A server with a limited number of open requests; browsers that show the page are no more."""
+
+    _open = 0
+
+    def handle_stream(self, stream: tornado.iostream.IOStream, address: tuple[object, ...]) -> None:
+        if self._open >= _MAX_CONNECTIONS:
+            stream.close()
+            return
+        self._open += 1
+        super().handle_stream(stream, address)
+
+    def on_close(self, server_conn: object) -> None:
+        self._open -= 1
+        super().on_close(server_conn)
+
+
+class _OtherHost(tornado.web.RequestHandler):
+    """The answer to a request for another host."""
+
+    def prepare(self) -> None:
+        self.set_status(403)
+        self.finish(f"This page is served to {_HOST} and localhost only.\n")
 
 
 class _LivePage(tornado.web.RequestHandler):
@@ -106,7 +167,7 @@ class _LivePage(tornado.web.RequestHandler):
         self.page = page
 
     def get(self) -> None:
-        self.write(self.page.live_html())
+        self.write(self.page.live_html(self.request.host))
 
 
 class _Script(tornado.web.StaticFileHandler):
@@ -121,6 +182,8 @@ class _Browser(tornado.websocket.WebSocketHandler):
 
     def initialize(self, page: ServedPage) -> None:
         self.page = page
+        self.waiting = Messages(deletions=True)
+        self.sender: asyncio.Task[None] | None = None
 
     def open(self, *args: str, **kwargs: str) -> None:
         self.page._connect(self)
@@ -131,9 +194,27 @@ class _Browser(tornado.websocket.WebSocketHandler):
     def on_close(self) -> None:
         self.page._disconnect(self)
 
-    def show(self, packed: bytes) -> None:
+    def show(self, message: Message) -> None:
+        self.waiting.add(message)
+        if self.sender is None or self.sender.done():
+            self.sender = asyncio.ensure_future(self._send())
+
+    async def _send(self) -> None:
+        """Send what waits, each message when the browser has taken the one before."""
         try:
-            future = self.write_message(packed, binary=True)
-        except tornado.websocket.WebSocketClosedError:
-            return self.page._disconnect(self)
-        future.add_done_callback(lambda done: done.exception())  # a browser may close any time
+            while (packed := self.waiting.take()) is not None:
+                async with self.page._large if len(packed) > _LARGE else contextlib.nullcontext():
+                    written = self.write_message(packed, binary=True)
+                    written.add_done_callback(lambda done: done.exception())
+                    if not (await asyncio.wait({written}, timeout=_TAKE_SECONDS))[0]:
+                        self.leave()
+        except tornado.websocket.WebSocketClosedError:  # a browser may close any time
+            self.page._disconnect(self)
+
+    def leave(self, code: int | None = None, reason: str | None = None) -> None:
+        """End the connection at once, without an answer of the browser."""
+        self.page._disconnect(self)
+        stream = None if self.ws_connection is None else self.ws_connection.stream
+        if stream is not None:
+            self.close(code, reason)
+            stream.close()

@@ -126,7 +126,7 @@ def page_of(robot: Robot) -> str:
     assert robot.visual is not None, robot.visual_problem
     folder = Path(robot.source.folder)
     shown = replay(cubic_motion(Scene(robot))[0], html=folder / "page.html")
-    return "".join(message.decode(errors="replace") for message in shown.page.messages)
+    return "".join(each.packed.decode(errors="replace") for each in shown.page.messages.all())
 
 
 def test_a_texture_inside_the_package_is_on_the_page(package: Path) -> None:
