@@ -35,6 +35,7 @@ def main() -> None:
     readers = [
         "hovi.robot.urdf.check",
         "hovi.robot.urdf.rules",
+        "hovi.robot.urdf.spelling",
         "hovi.robot.urdf.normalize",
         "hovi.robot.urdf.mesh_files",
         "hovi.discrete.trajectory_file",

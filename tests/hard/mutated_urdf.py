@@ -258,6 +258,38 @@ def _many(robot: Element, random: Random) -> None:
         ElementTree.SubElement(robot, "link", name=f"more{i}")
 
 
+def _misspell(robot: Element, random: Random) -> None:
+    """a name is misspelt"""
+    parts = [element for tag in ("link", "joint") for element in robot.iterfind(f"{tag}//*")]
+    element = random.choice(parts)
+    names = [None, *element.attrib]
+    name = random.choice(names)
+    wrong = _misspelt(name or element.tag, random)
+    if name is None:
+        element.tag = wrong
+    elif wrong in element.attrib:  # as ixy for ixx
+        _misspell(robot, random)
+    else:
+        element.set(wrong, element.attrib.pop(name))
+
+
+def _misspelt(name: str, random: Random) -> str:
+    at = random.randrange(len(name) - 1)
+    ways = (name[:at] + name[at + 1 :], name[:at] + "q" + name[at:], name.capitalize())
+    swapped = name[:at] + name[at + 1] + name[at] + name[at + 2 :]
+    return random.choice([way for way in (*ways, swapped) if way != name])
+
+
+def _misplace(robot: Element, random: Random) -> None:
+    """an element is not where it belongs"""
+    part = random.choice(robot.findall("link/inertial") + robot.findall("joint/axis"))
+    places = robot.findall("link/visual") + robot.findall("joint/origin")
+    (owner,) = (each for each in robot.iter() if part in list(each))
+    owner.remove(part)
+    random.choice(places).append(part)
+
+
 _INVALIDATING_CHANGES: tuple[Change, ...] = (
     *(_mass, _mass, _inertia, _axis, _limits, _mimic, _cycle, _twice, _mesh, _many),
+    *(_misspell, _misspell, _misplace),
 )

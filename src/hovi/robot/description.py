@@ -16,6 +16,7 @@ from hovi.robot.model import couplings_in
 from hovi.robot.source import RobotSource
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.robot.urdf.check import checked_urdf
+from hovi.robot.urdf.spelling import passed_over
 
 Array = npt.NDArray[np.float64]
 
@@ -138,9 +139,45 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"the position range of {_some(unbounded)} is not enforced, since its leader is a "
             "continuous joint"
         )
+    if names := passed_over(robot):
+        yield f"passed over, since URDF has no such elements and attributes: {_some(names)}"
+    moving = _moving_links(source, robot)
+    bare = [link.get("name", "") for link in moving if link.find("inertial") is None]
+    if bare:
+        yield f"{_some(bare)}: moving without <inertial>, so without mass and inertia"
     odd = [link.get("name", "") for link in robot.iterfind("link") if _breaks_triangle(link)]
     if odd:
         yield f"the principal inertias of {_some(odd)} violate the triangle inequality"
+
+
+def _moving_links(source: RobotSource, robot: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """Links moved by a joint of their own, and others that move and have shapes.
+
+    A link without shapes on a fixed joint is a frame.
+    """
+    joints = {_end(joint, "child"): joint for joint in robot.iterfind("joint")}
+    moves: dict[str, bool] = {}
+    for link in robot.iterfind("link"):
+        chain = [link.get("name", "")]
+        while chain[-1] in joints and chain[-1] not in moves:
+            chain.append(_end(joints[chain[-1]], "parent"))
+        moving = moves.get(chain[-1], source.free_flyer)
+        for name in reversed(chain):
+            moving = moves[name] = moving or _is_movable(joints.get(name), source)
+        has_shapes = not {"visual", "collision"}.isdisjoint(part.tag for part in link)
+        if _is_movable(joints.get(chain[0]), source) or (moving and has_shapes):
+            yield link
+
+
+def _is_movable(joint: ElementTree.Element | None, source: RobotSource) -> bool:
+    if joint is None:
+        return False
+    return joint.get("type") != "fixed" and joint.get("name") not in source.locked
+
+
+def _end(joint: ElementTree.Element, tag: str) -> str:
+    element = joint.find(tag)
+    return "" if element is None else element.get("link", "")
 
 
 def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[str]:

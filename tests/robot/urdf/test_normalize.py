@@ -43,7 +43,7 @@ def test_an_axis_is_read_as_it_is_written(axis: str, tmp_path: Path) -> None:
         ('encoding="utf-8"', 'encoding="klingon"'),
         ("</robot>", '<gazebo><mass value="heavy"/></gazebo></robot>'),
         (AXIS, AXIS + "<dynamics/>"),
-        (AXIS, '<axis xyz="0 -1 0"><mass value="heavy"/></axis>'),
+        (AXIS, '<axis xyz="0 -1 0"><note value="heavy"/></axis>'),
         ("<robot", '<robot xmlns="http://www.ros.org"'),
     ],
     ids=["instruction", "encoding", "extension", "no dynamics", "inside an axis", "namespace"],
@@ -60,6 +60,13 @@ def test_content_that_pinocchio_does_not_use_is_harmless(
     assert robot.visual is not None
     assert robot.visual.ngeoms > 0
     assert "2 joints" in robot.describe()
+
+
+def test_stray_text_does_not_reach_pinocchio(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace("<inertial>", "<inertial>stray --").replace("<axis", "stray<axis"))
+    assert "stray" not in plain_urdf(path.read_text())
+    assert load_robot(path).visual is not None
 
 
 @pytest.mark.parametrize("name", example_names())

@@ -78,6 +78,7 @@ class _Reader:
         parser = expat.ParserCreate()
         parser.StartElementHandler = self.start
         parser.EndElementHandler = self.end
+        parser.CharacterDataHandler = self.builder.data
         parser.StartDoctypeDeclHandler = self.doctype
         try:
             parser.Parse(text, True)  # as UTF-8, regardless of the declaration

@@ -10,7 +10,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ElementTree
 
 from hovi.robot.urdf.check import checked_urdf
-from hovi.robot.urdf.rules import NUMBERS, elements_in_use
+from hovi.robot.urdf.elements import NUMBERS, elements_in_use
 
 _PARTS = {
     "link": ("inertial",),
@@ -36,8 +36,10 @@ def plain_urdf(text: str, name: str = "robot.urdf") -> str:
 def make_plain(robot: ElementTree.Element) -> None:
     """Rewrite every number of a checked URDF with all digits and single spaces, in place.
 
-    An empty <dynamics/> is removed, since Pinocchio's parser stops at it.
+    Text is removed, and so is an empty <dynamics/>, since Pinocchio's parser stops at it.
     """
+    for element in robot.iter():
+        element.text = element.tail = None
     for joint in robot.iterfind("joint"):
         for dynamics in joint.findall("dynamics"):
             if {"damping", "friction"}.isdisjoint(dynamics.attrib):

@@ -16,6 +16,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from hovi.errors import nearest
+from hovi.robot.urdf.elements import NUMBERS, called, elements_in_use
+from hovi.robot.urdf.spelling import names_are_of_urdf, values_are_attributes
 
 Rule = Callable[[Element], Iterator[str]]
 
@@ -34,28 +36,7 @@ _WORLD = "universe"
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-
-NUMBERS: dict[str, dict[str, int]] = {
-    "origin": {"xyz": 3, "rpy": 3},
-    "axis": {"xyz": 3},
-    "mass": {"value": 1},
-    "inertia": dict.fromkeys(_INERTIA, 1),
-    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
-    "dynamics": {"damping": 1, "friction": 1},
-    "mimic": {"multiplier": 1, "offset": 1},
-    "calibration": {"rising": 1, "falling": 1},
-    "safety_controller": dict.fromkeys(
-        ("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), 1
-    ),
-    "box": {"size": 3},
-    "cylinder": {"radius": 1, "length": 1},
-    "capsule": {"radius": 1, "length": 1},
-    "sphere": {"radius": 1},
-    "mesh": {"scale": 3},
-    "color": {"rgba": 4},
-}
-"""Number of values in each attribute, by element."""
+_INERTIA = tuple(NUMBERS["inertia"])
 
 _ONCE: dict[str, tuple[str, ...]] = {
     "link": ("inertial",),
@@ -114,7 +95,7 @@ def elements_are_not_repeated(robot: Element) -> Iterator[str]:
             for tag in _ONCE.get(element.tag, ()):
                 if (count := len(element.findall(tag))) > 1:
                     yield (
-                        f"<{element.tag}> of {_called(owner)} has {count} elements <{tag}>: "
+                        f"<{element.tag}> of {called(owner)} has {count} elements <{tag}>: "
                         "keep one."
                     )
 
@@ -124,7 +105,7 @@ def attributes_are_there(robot: Element) -> Iterator[str]:
     for owner, element in elements_in_use(robot):
         for attribute in _REQUIRED.get(element.tag, ()):
             if not element.get(attribute):
-                yield f"<{element.tag}> of {_called(owner)} needs {attribute}=."
+                yield f"<{element.tag}> of {called(owner)} needs {attribute}=."
 
 
 def numbers_are_finite(robot: Element) -> Iterator[str]:
@@ -133,7 +114,7 @@ def numbers_are_finite(robot: Element) -> Iterator[str]:
         for attribute, count in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
             if text is not None and (problem := _number_problem(text, count, element.tag)):
-                place = f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)}"
+                place = f"<{element.tag} {attribute}={_short(text)}> of {called(owner)}"
                 yield f"{place} must be {problem}."
 
 
@@ -223,7 +204,7 @@ def shapes_have_a_size(robot: Element) -> Iterator[str]:
         for attribute in ("size", "radius", "length"):
             text = element.get(attribute) if element.tag in NUMBERS else None
             if text is not None and min(map(float, text.split())) < 0.0:
-                yield f"<{element.tag} {attribute}={_short(text)}> of {_called(owner)} is negative."
+                yield f"<{element.tag} {attribute}={_short(text)}> of {called(owner)} is negative."
 
 
 def axes_are_not_zero(robot: Element) -> Iterator[str]:
@@ -237,15 +218,15 @@ def axes_are_not_zero(robot: Element) -> Iterator[str]:
 
 
 def planes_are_level(robot: Element) -> Iterator[str]:
-    """The normal of a planar joint is z, the only one that Pinocchio supports."""
+    """The normal of a planar joint is +z, the only one that Pinocchio supports."""
     for joint in robot.iterfind("joint"):
         axis = joint.find("axis")
         xyz = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
         x, y, z = map(float, xyz.split())
-        if joint.get("type") == "planar" and math.hypot(x, y) > 1e-9 * abs(z):
+        if joint.get("type") == "planar" and math.hypot(x, y) > 1e-9 * z:
             yield (
-                f"joint {_name(joint)} is planar with the normal {_short(xyz)}, and only planes "
-                'normal to z are supported: write <axis xyz="0 0 1"/> and rotate its <origin>.'
+                f"joint {_name(joint)} is planar with the normal {_short(xyz)}, and only the "
+                'normal +z is supported: write <axis xyz="0 0 1"/> and rotate its <origin>.'
             )
 
 
@@ -295,12 +276,14 @@ def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
         inside = posixpath.normpath(rest).startswith(f"{package}/")
         if separator and scheme != "file" and (package in ("", ".", "..") or not inside):
             yield (
-                f"{element.tag} {_short(filename)} of {_called(owner)} leaves its package: "
+                f"{element.tag} {_short(filename)} of {called(owner)} leaves its package: "
                 "write package://<package>/<path inside it>."
             )
 
 
 RULES: tuple[Rule, ...] = (
+    names_are_of_urdf,
+    values_are_attributes,
     the_robot_is_named,
     links_are_named,
     joints_are_named,
@@ -338,17 +321,6 @@ def _named(robot: Element, tag: str) -> Iterator[str]:
             yield f"{tag} {name!r} occurs {count} times: {tag} names must be unique."
 
 
-def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
-    """(link, joint or material, element inside it) for everything that Pinocchio reads."""
-    for link in robot.iterfind("link"):
-        for tag in ("inertial", "visual", "collision"):
-            for part in link.iterfind(tag):
-                yield from ((link, element) for element in part.iter())
-    for tag in ("joint", "material"):
-        for owner in robot.iterfind(tag):
-            yield from ((owner, element) for element in owner)
-
-
 def _number_problem(text: str, count: int, tag: str) -> str:
     words = text.split()
     largest = MAX_LIMIT if tag in ("limit", "safety_controller") else MAX_MAGNITUDE
@@ -370,10 +342,6 @@ def _name_problem(name: str) -> str:
 def _end(joint: Element, tag: str) -> str:
     element = joint.find(tag)
     return "" if element is None else element.get("link", "")
-
-
-def _called(owner: Element) -> str:
-    return f"{owner.tag} {_name(owner)}"
 
 
 def _name(element: Element) -> str:
