@@ -341,6 +341,14 @@ ENTRIES: dict[str, Entry] = {
         {**_CHARTS, "gradient": _in("B*Q 3*n"), "columns_gradient": _out("B m n")},
         **{**_ON_CHARTS, "scalars": {"regular": True, **_PORTABLE}},
     ),
+    "groups.pull_moments": Entry(
+        groups.pull_moments,
+        {
+            **{**_CHARTS, "tests": _in("K Q"), "jacobian": _in("B*Q p 3*n")},
+            "columns_gradients": _out("B K p m n"),
+        },
+        **{**_ON_CHARTS, "letters": _ON_CHARTS["letters"] | {"K": (0, 3), "p": (0, 3)}},
+    ),
     "groups.push_steps": Entry(
         groups.push_steps,
         {**_CHARTS, "step": _in("B m n"), "change": _out("B Q 3 n")},

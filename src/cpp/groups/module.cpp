@@ -180,12 +180,18 @@ void pull_moments(const Layout& layout, const Input<3>& table, const Input<1>& w
                   const Input<1>& steps, const Input<3>& x, const Input<3>& ends,
                   const Input<2>& tests, const Input<3>& jacobian,
                   const Output<5>& columns_gradients, bool portable) {
-  const auto parts = parts_of(layout);
+  const Parts parts(layout);
   const Charts charts = charts_of(parts, table, weights, steps, x, ends);
+  const std::size_t B = charts.intervals, n = parts.nv();
+  const std::size_t K = tests.shape(0), outputs = jacobian.shape(1);
+  tests.require("tests", {K, charts.points});
+  jacobian.require("jacobian", {B * charts.points, outputs, 3 * n});
+  columns_gradients.require("columns_gradients", {B, K, outputs, charts.columns, n});
+  if (B == 0 || K == 0 || outputs == 0) return;
   const nb::gil_scoped_release released;
-  const auto work = allocate(kernels(portable).moments_workspace_size(charts, tests.shape(0)));
-  kernels(portable).pull_moments(charts, tests.shape(0), tests.data(), jacobian.shape(1),
-                                 jacobian.data(), work.get(), columns_gradients.data());
+  const auto work = allocate(kernels(portable).moments_workspace_size(charts, K));
+  kernels(portable).pull_moments(charts, K, tests.data(), outputs, jacobian.data(), work.get(),
+                                 columns_gradients.data());
 }
 
 void push_steps(const Layout& layout, const Input<3>& table, const Input<1>& weights,
