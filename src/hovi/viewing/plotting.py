@@ -34,6 +34,7 @@ from hovi.viewing.distance_panel import draw_distances
 from hovi.viewing.figures import align_zeros, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
+from hovi.viewing.scheme_torque import scheme_torque
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
@@ -233,6 +234,8 @@ def _sampled_motion(trajectory: Trajectory) -> _SampledMotion:
     s = np.linspace(0.0, 1.0, max(3, -(-_CURVE_POINTS // N) + 1))
     motion = trajectory.sample_intervals(np.repeat(np.arange(N), len(s)), np.tile(s, N))
     t = trajectory.t[:-1, None] + trajectory.grid.steps[:, None] * s
+    tau = scheme_torque(trajectory, t.ravel())
+    motion = motion if tau is None else motion._replace(tau=tau)
     limits = imposed_limits(trajectory)
     active: Mask = np.zeros((N, len(s), 4, motion.v.shape[1]), dtype=bool)
     if limits is not None:
