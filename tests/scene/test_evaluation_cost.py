@@ -29,13 +29,14 @@ def rich() -> Task:
 
 def test_a_scene_with_five_effects_on_panda_plans_and_simulates(rich: Task) -> None:
     assert tuple(effect.key for effect in rich.scene.effects) == ("gravity", *RICH)
-    solution = plan(rich.scene, rich.start, rich.goal, rich.duration, limits="none")
+    ends = rich.start, rich.goal, rich.duration
+    solution = plan(rich.scene, *ends, limits="none", tolerance=1e-7)
     assert solution.success
     simple = plan(
         Scene(rich.scene.robot, [Gravity()]), rich.start, rich.goal, rich.duration, limits="none"
     )
     assert solution.cost > 1.5 * simple.cost
-    motion = simulate(rich.scene, rich.start, rich.duration, solution.trajectory, intervals=160)
+    motion = simulate(rich.scene, rich.start, rich.duration, solution.trajectory, intervals=320)
     np.testing.assert_allclose(motion.q[-1], rich.goal.q, atol=2e-2)
 
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
+import hovi
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
@@ -21,6 +22,7 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing import plotting
 from hovi.viewing.figures import align_zeros
+from hovi.viewing.scheme_torque import scheme_torque
 from samples.cubic_motion import cubic_motion
 
 Picture = Callable[[Trajectory, Path], None]
@@ -239,3 +241,21 @@ def test_an_unknown_format_or_an_unwritable_path_raises(motion: Trajectory, tmp_
     with pytest.raises(DisplayError, match="No such file or directory"):
         plotting.plot(motion, tmp_path / "no" / "motion.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_torque_of_a_taylor_scheme_is_drawn_without_zigzag() -> None:
+    """Against a fine Galerkin solution; the interpolant's own torque is far off."""
+    scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()])
+    ends = [-np.pi / 2, 0.0], [0.3, 0.7], 1.0
+    options = {"limits": "none", "processes": 1}
+    motion = hovi.plan(scene, *ends, scheme="taylor-midpoint", intervals=100, **options).trajectory
+    fine = hovi.plan(scene, *ends, tolerance=1e-9, **options).trajectory
+    t = np.linspace(0.02, 0.98, 501)
+    true, drawn = fine.sample(t).tau, scheme_torque(motion, t)
+    assert drawn is not None
+    assert scheme_torque(fine, t) is None
+    interpolated = motion.sample(t).tau
+    assert np.abs(drawn - true).max() < 0.4 * np.abs(interpolated - true).max()
+    variation = [np.abs(np.diff(each, axis=0)).sum() for each in (true, drawn, interpolated)]
+    assert variation[1] == pytest.approx(variation[0], rel=0.05)
+    assert variation[2] > 2 * variation[0]

@@ -86,7 +86,6 @@ def test_a_mesh_without_usable_contents_is_left_out_by_name(
     shapes, problem = getattr(robot, kind), getattr(robot, f"{kind}_problem")
     assert [item.name for item in shapes.geometryObjects] == ["first_0"]
     assert problem.startswith(f"robot 'two.urdf' lacks {kind} shapes: link 'second': mesh '{mesh}'")
-    assert ("cannot be read: " in problem) == (mesh in UNREADABLE)
     assert "\n" not in problem
     assert "assimp" not in problem
     assert "/project/" not in problem

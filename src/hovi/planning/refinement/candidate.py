@@ -39,6 +39,8 @@ HAMILTONIAN_ERROR_SHARE = 0.1
 """Relative error of the cost that is inferred from the nodal Hamiltonian, over its spread."""
 ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
+LOOSE_SAFETY_FACTOR = 3.0
+"""Factor on estimates above CURVE_TOLERANCE, where the finer solution is not better by orders."""
 LIMITED_SAFETY_FACTOR = 1.5
 """Factor on estimates under limits, where the finer solution is not better by orders."""
 CONTRADICTION_RATIO = 10.0
@@ -198,7 +200,10 @@ def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
         return error
     problem = solution.problem
     assert problem is not None
-    error *= LIMITED_SAFETY_FACTOR if problem.limited else 1.0
+    if problem.limited:
+        error *= LIMITED_SAFETY_FACTOR
+    elif error > CURVE_TOLERANCE:
+        error *= LOOSE_SAFETY_FACTOR
     return max(error + cost_of_tolerance(solution), ROUNDING_FLOOR)
 
 

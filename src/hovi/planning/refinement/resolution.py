@@ -146,10 +146,13 @@ def _compared(solution: Solution) -> tuple[Solution, str]:
         return solution, f"it could not be compared with a finer one: {str(refused).rstrip('.')}"
     if finer is None:
         return solution, "from it no minimum was found on a finer grid"
-    estimate = error_of_cost(solution, finer)
+    estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost
-    return _with_estimate(solution, estimate), _estimate_sentence(estimate)
+    compared = _with_estimate(solution, estimate)
+    if difference <= RESOLVED * abs(solution.cost):
+        return compared, ""
+    return compared, _sentence(difference / abs(solution.cost))
 
 
 def _whirling_sentence(solution: Solution) -> str:
@@ -164,9 +167,11 @@ def _whirling_sentence(solution: Solution) -> str:
 def _estimate_sentence(estimate: float | None) -> str:
     if estimate is None:
         return "from it no minimum was found on a finer grid"
-    if estimate <= RESOLVED:
-        return ""
-    return f"a finer grid changes its cost by {100 * estimate:.2g} %"
+    return "" if estimate <= RESOLVED else _sentence(estimate)
+
+
+def _sentence(change: float) -> str:
+    return f"a finer grid changes its cost by {100 * change:.2g} %"
 
 
 def _with_estimate(solution: Solution, estimate: float) -> Solution:

@@ -103,7 +103,7 @@ def plan(
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = options.with_changes(**changes).on(scene.robot)
     free, T = _time(scene, as_duration(duration), chosen)
-    grid = _grid(T, chosen, scene.robot)
+    grid = _grid(T, chosen, scene.robot, free is not None)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
     for bound in () if free is None else (free.lower, free.upper):
@@ -143,7 +143,7 @@ def _time(
     return free, free.first
 
 
-def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
+def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
     """The requested grid, or the first grid of the refinement to a tolerance.
 
     That is the guess's own if it is a motion on a finer grid, so that nothing of it is lost.
@@ -156,7 +156,7 @@ def _grid(T: float, options: PlanOptions, robot: Robot) -> Grid:
     else:
         limited = as_limits(robot, options.limits).bounded.any()
         kinks = limited or options.clearance.wanted or options.via
-        few = options.starts == 1 and not isinstance(guess, Trajectory)
+        few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
         grid = first_grid(T, options.interval_count, not kinks, more_points=not few)
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
 
