@@ -59,6 +59,11 @@ def unfinished(stop: Stop) -> tuple[Status, str]:
     return _UNFINISHED[stop]
 
 
+def diverged(reason: str, steps: int) -> str:
+    """The message about a motion with a number that is not finite; reason: a clause."""
+    return f"{reason}, after {steps} steps; try another initial guess."
+
+
 def status_of(
     problem: TrajectoryProblem, outcome: Outcome[DiscretePath], n_neg: int
 ) -> tuple[Status, str]:
@@ -66,9 +71,7 @@ def status_of(
     if outcome.stop is Stop.DIVERGED:
         reason = non_finite_sentence(problem, outcome.x)
         if reason:
-            return Status.DIVERGED, (
-                f"{reason}, after {outcome.iterations} steps; try another initial guess."
-            )
+            return Status.DIVERGED, diverged(reason, outcome.iterations)
     left = "".join(
         f" A saddle of cost {cost:.10g} was left along negative curvature."
         for cost in outcome.saddles_left

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
+
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Iteration, Options, Outcome, minimize
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -83,7 +85,7 @@ def _status(
     problem: TrajectoryProblem, rounds: ConstrainedResult[Outcome[DiscretePath]], n_neg: int
 ) -> tuple[Status, str]:
     """Status and message; INFEASIBLE if the constraints cannot be met."""
-    if rounds.reason:
+    if rounds.reason and np.isfinite(rounds.result.value):
         return Status.INFEASIBLE, f"{rounds.reason}."
     status, message = status_of(problem, rounds.result, n_neg)
     if status is not Status.MINIMUM and not rounds.met:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.bounded_search import BoundedSearch
+from hovi.planning.solver.methods.bounded_search import STOPPED, BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
-from hovi.planning.solver.status import Status, unfinished
+from hovi.planning.solver.non_finite import non_finite_sentence
+from hovi.planning.solver.status import Status, diverged, unfinished
 from hovi.system.interruption import record_interrupt
 
 
@@ -56,7 +59,10 @@ def _searched(search: BoundedSearch) -> MethodResult:
         reason = reason or search.unmet
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
     value, nit = problem.ld.action(x), search.iterations
-    if reason:
+    broken = "" if outcome.stop in STOPPED else _non_finite(search, x, value, excess)
+    if broken:  # by an effect, not by the limits
+        status, message = Status.DIVERGED, diverged(broken, nit)
+    elif reason:
         status, message = Status.INFEASIBLE, _infeasible(reason)
     elif outcome.stop is not Stop.STATIONARY:
         status, message = _unfinished(outcome.stop, nit, value)
@@ -74,6 +80,17 @@ def _interrupted(search: BoundedSearch) -> MethodResult:
     value, nit = problem.ld.action(path), search.iterations
     status, message = _unfinished(Stop.INTERRUPTED, nit, value)
     return MethodResult(problem, path, value, status, message, nit, history=search.history)
+
+
+def _non_finite(search: BoundedSearch, path: DiscretePath, cost: float, excess: float) -> str:
+    """The first number that is infinite or NaN, as a clause; "" if all are finite.
+
+    excess: the largest over any limit, between the points too.
+    """
+    if np.isfinite(cost) and not np.isnan(excess):
+        return ""
+    at_points = non_finite_sentence(search.problem, path)
+    return at_points or f"{search.worst(path)}, between the quadrature points"
 
 
 def _infeasible(reason: str) -> str:
