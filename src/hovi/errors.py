@@ -58,6 +58,10 @@ class DisplayError(HoviError):
     """A figure, a page or a viewer cannot be created."""
 
 
+class HoviWarning(UserWarning):
+    """Something that is accepted, but is probably not what was meant."""
+
+
 def expect(value: object, kind: type, hint: str) -> None:
     """Raise InputError unless `value` is an instance of `kind`; hint: what to pass instead."""
     if not isinstance(value, kind):

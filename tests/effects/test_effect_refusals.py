@@ -35,6 +35,10 @@ from hovi.scene.scene import Scene
 TIP = "panda_hand_tcp"
 CASES: dict[str, tuple[Effect, str]] = {
     "no direction": (Gravity(9.8, (0.0, 0.0, 0.0)), "direction must be three finite numbers"),
+    "gravity upwards": (
+        Gravity(-9.81),
+        r"0 or more, got -9.81 .* upwards; .* `dir",
+    ),
     "negative friction": (
         ViscousFriction({"panda_joint2": -0.1}),
         r"viscous_friction': coefficient of joint 'panda_joint2' must be finite and 0 or more, got",

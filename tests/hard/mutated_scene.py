@@ -221,8 +221,8 @@ def _unknown(scene: dict[str, Any], random: Random) -> None:
 
 
 def _gravity(scene: dict[str, Any], random: Random) -> None:
-    """gravity is not a finite number"""
-    value = random.choice(NOT_NUMBERS)
+    """gravity is not a finite number of 0 or more"""
+    value = random.choice((*NOT_NUMBERS, -9.81, -1e-9))
     scene.setdefault("effects", {})["gravity"] = {"acceleration": value}
 
 

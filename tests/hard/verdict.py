@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
-from hovi.errors import HoviError
+from hovi.errors import HoviError, HoviWarning
 
 Loaded = TypeVar("Loaded")
 
@@ -46,7 +47,9 @@ def judge(
     reason: see Mutant.
     """
     try:
-        problem = error_in(load()) or reason
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", HoviWarning)  # a word, and no failure
+            problem = error_in(load()) or reason
     except HoviError as error:
         sentence = str(error)
         clear = 0 < len(sentence) <= MAX_SENTENCE_LENGTH and "\n" not in sentence

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import select
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated, TextIO
+from typing import Annotated, Any, TextIO
 
 import typer
 from typer.exceptions import TyperException
@@ -20,7 +21,7 @@ from hovi.cli.commands import plot as plot_command
 from hovi.cli.commands import replay as replay_command
 from hovi.cli.commands import schema as schema_command
 from hovi.cli.commands import simulate as simulate_command
-from hovi.errors import HoviError
+from hovi.errors import HoviError, HoviWarning
 from hovi.system.files import reason
 
 BAD_INPUT = 2
@@ -72,6 +73,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     arguments: those after `hovi` on the command line; from sys.argv by default.
     """
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", HoviWarning)
+        warnings.showwarning = _with_own_warnings(warnings.showwarning)
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     stdout, stderr = sys.stdout, sys.stderr
     try:
         code = app(args=arguments, prog_name="hovi", standalone_mode=False)
@@ -94,6 +102,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         return _report_error(f"the operating system reports: {reason(error)}.")
     return code if isinstance(code, int) else 0
+
+
+def _with_own_warnings(others: Callable[..., None]) -> Any:
+    """How warnings are shown: those of hovi as a sentence, each once."""
+    told = set()
+
+    def show(message: Warning | str, category: type[Warning], *where: Any) -> None:
+        if not issubclass(category, HoviWarning):
+            return others(message, category, *where)
+        if str(message) not in told:
+            told.add(str(message))
+            with suppress(OSError):  # stderr may be closed
+                print(f"warning: {message}", file=sys.stderr)
+
+    return show
 
 
 def _has_no_reader(stream: TextIO) -> bool:

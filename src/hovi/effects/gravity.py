@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class Gravity(Effect):
     """The generalized gravity g(q) of RNEA, for a uniform field.
 
-    acceleration: in [m/s^2]. direction: of the field in the world frame, any nonzero vector.
+    acceleration: 0 or more, in [m/s^2]. direction: of the field in the world frame, any nonzero
+        vector.
     """
 
     acceleration: float = 9.81
@@ -29,11 +30,16 @@ class Gravity(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for a non-finite acceleration and an invalid direction."""
+        """Raise SceneError for an acceleration that is no size, and an invalid direction."""
         if not np.isfinite(self.acceleration):
             raise SceneError(
                 f"effect 'gravity': acceleration must be finite, got {self.acceleration}; "
                 "leave the effect out for a scene without gravity."
+            )
+        if self.acceleration < 0:
+            raise SceneError(
+                f"effect 'gravity': acceleration must be 0 or more, got {self.acceleration} m/s^2, "
+                "which pulls upwards; where it pulls is the `direction`, (0, 0, -1) by default."
             )
         if len(self.direction) != 3 or not 0 < np.linalg.norm(self.direction) < np.inf:
             raise SceneError(

@@ -14,7 +14,8 @@ from hovi.robot.mimic_model import couplings_of
 from hovi.robot.mimic_tags import held_values
 from hovi.robot.model import couplings_in
 from hovi.robot.source import RobotSource
-from hovi.robot.space.joint_kinds import FLOATING, kind_of
+from hovi.robot.space.angle_ranges import ranges_in_degrees
+from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
 from hovi.robot.urdf.check import checked_urdf
 from hovi.robot.urdf.spelling import passed_over
 
@@ -113,6 +114,7 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"nq and nv differ at {_some(manifold)}: a continuous joint takes (cos, sin) of its "
             "angle, an orientation a unit quaternion (x, y, z, w)"
         )
+    yield from _suspicious_ranges(pairs, model)
     for what, limit in (("velocity", model.velocityLimit), ("effort", model.effortLimit)):
         zero = np.flatnonzero(np.asarray(limit) == 0.0)
         if len(zero):
@@ -178,6 +180,21 @@ def _is_movable(joint: ElementTree.Element | None, source: RobotSource) -> bool:
 def _end(joint: ElementTree.Element, tag: str) -> str:
     element = joint.find(tag)
     return "" if element is None else element.get("link", "")
+
+
+def _suspicious_ranges(
+    pairs: Sequence[tuple[pin.JointModel, str]], model: pin.Model
+) -> Iterator[str]:
+    """A note on ranges of angles that look like degrees."""
+    single = [(joint, name) for joint, name in pairs if joint.nq == joint.nv == 1]
+    index = [joint.idx_q for joint, _ in single]
+    angles = np.array([kind_of(joint).units == (ANGLE,) for joint, _ in single], dtype=bool)
+    lower, upper = (
+        np.array(bound)[index] for bound in (model.lowerPositionLimit, model.upperPositionLimit)
+    )
+    note = ranges_in_degrees([name for _, name in single], angles, lower, upper)
+    if note:
+        yield note
 
 
 def _ranges_not_kept(model: pin.Model, robot: ElementTree.Element) -> Iterator[str]:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hovi.errors import InputError
+from hovi.cli.application import main
+from hovi.errors import HoviWarning, InputError
 from hovi.planning.problem.limits import Limits, as_limits, no_limits
+from hovi.planning.search.planner import plan
+from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+from samples.slider import SLIDER
 
 
 def test_a_name_selects_the_limits_of_the_urdf_or_none(ur5: Robot) -> None:
@@ -83,3 +89,63 @@ def test_empty_ranges_are_refused(two_link: Robot) -> None:
         Limits(np.zeros((4, 2)), np.zeros((4, 2)))
     with pytest.raises(InputError, match="not a number"):
         Limits(np.full((4, 2), np.nan), free.upper)
+
+
+@pytest.mark.parametrize(
+    ("q", "words"),
+    [
+        (
+            {"elbow": [-170, 170]},
+            "elbow, -170 to 170 rad, looks like degrees: .* -2.967 to",
+        ),
+        ({"elbow": 170.0}, "range of elbow, -170 to 170 rad"),
+        (180.0, "range of shoulder and of 1 more, -180 to 180 rad"),
+        ({"elbow": [0.0, 45.0]}, "range of elbow, 0 to 45 rad, .* 0 to 0.7854 rad"),
+    ],
+)
+def test_ranges_that_look_like_degrees_are_told(two_link: Robot, q: Any, words: str) -> None:
+    with pytest.warns(HoviWarning, match=words) as told:
+        limits = as_limits(two_link, {"base": "none", "q": q})
+    assert str(told[0].message).endswith("; limits are in radians.")
+    assert limits.bounded[0].any()
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        *({"base": "none", "q": {"elbow": x}} for x in (2.9, 6.3, 25.0, 1000.0, 1e6)),
+        *({"base": "none", kind: 170.0} for kind in ("v", "a", "tau")),
+    ],
+    ids=str,
+)
+def test_other_ranges_are_taken_without_a_word(two_link: Robot, limits: Any) -> None:
+    as_limits(two_link, limits)
+
+
+def test_a_rail_may_be_long(tmp_path: Path) -> None:
+    (tmp_path / "slider.urdf").write_text(SLIDER)
+    as_limits(load_robot(tmp_path / "slider.urdf"), {"base": "none", "q": {"rail": [-170, 170]}})
+
+
+def test_degrees_in_a_urdf_are_told_by_plan_and_by_the_description(models: Path, tmp_path) -> None:
+    text = (models / "two_link.urdf").read_text()
+    path = tmp_path / "degrees.urdf"
+    path.write_text(text.replace('lower="-1000" upper="1000"', 'lower="-170" upper="170"'))
+    robot = load_robot(path)
+    note = "the position range of shoulder and of 1 more, -170 to 170 rad, looks like degrees"
+    assert note in robot.describe()
+    assert note not in load_robot(models / "two_link.urdf").describe()
+    with pytest.warns(HoviWarning, match=note):
+        plan(Scene(robot), [0.0, 0.0], [0.1, 0.1], 1.0, intervals=4)
+
+
+def test_the_command_tells_it_in_one_line(models: Path, tmp_path: Path, capsys) -> None:
+    scene = (models / "two_link_reach.toml").read_text().replace('limits = "none"', "")
+    path = tmp_path / "scene.toml"
+    path.write_text(scene + '\n[limits]\nbase = "none"\nq = { elbow = [-170, 170] }\n')
+    (tmp_path / "two_link.urdf").write_text((models / "two_link.urdf").read_text())
+    assert main(["plan", str(path), "--starts", "3"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    told = [line for line in lines if line.startswith("warning: ")]
+    assert len(told) == 1
+    assert told[0].startswith("warning: the position range of elbow, -170 to 170 rad, looks like")

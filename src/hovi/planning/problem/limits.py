@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,8 +12,9 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.errors import InputError, nearest
+from hovi.errors import HoviWarning, InputError, nearest
 from hovi.robot.robot import Robot
+from hovi.robot.space.angle_ranges import ranges_in_degrees
 
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
@@ -144,12 +146,13 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
         "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or a list of
         numbers x for -x and x, a list of pairs (lower, upper), or a mapping from joint names to
         either.
-    Raises InputError for unknown keys or joints and for bounds that do not fit the robot.
+    Raises InputError for unknown keys or joints and for bounds that do not fit the robot. Warns of
+    ranges of angles that look like degrees.
     """
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _by_name(robot, limits)
+        return _with_word(robot, _by_name(robot, limits))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
@@ -161,7 +164,16 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
             lower[row, i], upper[row, i] = low, high
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
-    return chosen.with_margin(_number(limits, "margin", 0.0))
+    return _with_word(robot, chosen.with_margin(_number(limits, "margin", 0.0)))
+
+
+def _with_word(robot: Robot, limits: Limits) -> Limits:
+    """The limits, with a warning if the ranges of angles look like degrees."""
+    given = limits.lower[0], limits.upper[0]
+    suspicion = ranges_in_degrees(robot.coordinate_names, ~robot.sliding, *given)
+    if suspicion:
+        warnings.warn(f"{suspicion}; limits are in radians.", HoviWarning, stacklevel=3)
+    return limits
 
 
 def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
