@@ -92,7 +92,8 @@ class Call:
 
     def __call__(self) -> Any:
         """Call it, without what it prints."""
-        with contextlib.redirect_stdout(io.StringIO()):
+        inside = contextlib.chdir(folder())  # "x" may be the path of a file to write
+        with contextlib.redirect_stdout(io.StringIO()), inside:
             return self.function(*self.arguments, **dict(self.keywords))
 
 
