@@ -20,7 +20,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import UNUSABLE_RATIO, whirl
+from hovi.planning.refinement.whirling import (
+    UNUSABLE_RATIO,
+    whirl,
+    whirl_without_minimum,
+)
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
@@ -76,6 +80,20 @@ def resolved(solution: Solution) -> Solution:
     assert solution.error_estimate is not None
     passed = Resolution(solution.trajectory.path, solution.error_estimate)
     return dataclasses.replace(solution, check=passed)
+
+
+def told_as_whirling(solution: Solution) -> Solution:
+    """A motion at its iteration limit as an unresolved one, if a light joint whirls in it."""
+    whirling = whirl_without_minimum(solution)
+    if whirling is None:
+        return solution
+    metadata = {**solution.trajectory.metadata, "status": str(Status.UNRESOLVED)}
+    return dataclasses.replace(
+        solution,
+        status=Status.UNRESOLVED,
+        message=f"{solution.message.rstrip('.')}: {whirling}.",
+        trajectory=dataclasses.replace(solution.trajectory, metadata=metadata),
+    )
 
 
 @dataclass(frozen=True, eq=False)

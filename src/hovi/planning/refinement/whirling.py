@@ -15,6 +15,7 @@ import numpy.typing as npt
 from hovi.discrete.motion_error import sample_points
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
 from hovi.robot.mass_matrix import MassMatrix
 
 WHIRLING_RATIO = 10.0
@@ -76,6 +77,15 @@ def whirl(solution: Solution) -> Whirl | None:
         return None
     name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
     return Whirl(name, speed, float(ratio[worst]), inertia)
+
+
+def whirl_without_minimum(solution: Solution) -> Whirl | None:
+    """The joint that whirls most in a motion at its iteration limit; None if none is hopeless."""
+    problem = solution.problem
+    if solution.status is not Status.ITERATION_LIMIT or problem is None or problem.limited:
+        return None
+    found = whirl(solution)
+    return None if found is None or not found.is_hopeless(False, 0) else found
 
 
 def _unlimited_angles(problem: TrajectoryProblem) -> npt.NDArray[np.bool_]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.refinement.resolution import resolved
+from hovi.planning.refinement.resolution import resolved, told_as_whirling
+from hovi.planning.refinement.whirling import whirl_without_minimum
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
@@ -116,7 +117,8 @@ class Search:
                 return [_with_costlier(checked), *found[i + 1 :]]
             if self.deadline.passed or interrupted():
                 break
-        return checked[:1]
+        best = checked[0]
+        return [best if self.fine.tolerance is None else told_as_whirling(best)]
 
     def _coarse(self) -> Job:
         """The job on the grid of the exploration."""
@@ -147,6 +149,10 @@ class Search:
         options = self.fine.options
         if interrupted() or not options.continuation or not may_help(found[0]):
             return found
+        if self.fine.tolerance is not None:
+            known = dataclasses.replace(found[0], problem=on_grid_of(job.problem(), found[0]))
+            if whirl_without_minimum(known) is not None:  # no easier problem leads to an answer
+                return found
         return [solve_by_continuation(job, found[0], options.guess, self.deadline, self.progress)]
 
     def _stages(self, job: Job, found: list[Solution]) -> Iterator[list[Solution]]:
