@@ -62,12 +62,15 @@ def whirl(solution: Solution) -> Whirl | None:
     """The light joint without a velocity limit that whirls most; None if none does."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
-    joints = np.flatnonzero(_unlimited_angles(problem))
+    joints, q = np.flatnonzero(_unlimited_angles(problem)), trajectory.q
     if len(joints) == 0:
         return None
-    q, v = trajectory.q, np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
     distance = np.abs(problem.robot.difference(q[:-1], q[1:]).sum(axis=0))  # with full turns
-    ratio = v.max(axis=0) * trajectory.duration / (np.pi + distance)
+    plain = (np.pi + distance) / trajectory.duration
+    if np.max(np.abs(trajectory.v) / plain) < WHIRLING_RATIO / 2:  # nor between the nodes
+        return None
+    v = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
+    ratio = v.max(axis=0) / plain
     worst = int(joints[np.argmax(ratio[joints])])
     if ratio[worst] <= WHIRLING_RATIO:
         return None
