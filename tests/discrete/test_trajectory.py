@@ -24,7 +24,7 @@ from hovi.discrete.state import State
 from hovi.discrete.stored_torque import StoredTorque, chebyshev_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
-from hovi.errors import InputError, TrajectoryFileError
+from hovi.errors import HoviWarning, InputError, TrajectoryFileError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.loading import load_robot
@@ -286,6 +286,16 @@ BROKEN: dict[str, tuple[Callable[[Entries], object], str]] = {
     ),
     "steps of no length": (array("steps", lambda x: 0 * x + 1e-300), "between 1e-12 and"),
     "metadata of another kind": (edited("metadata", []), "metadata is not a table"),
+    "other momenta": (array("momenta", lambda x: x + 1e-9), "contents do not match"),
+    "momenta of another sign": (array("momenta", np.negative), "contents do not match"),
+    "other inner modes": (array("inner", lambda x: 1.001 * x), "contents do not match"),
+    "another scheme": (
+        edited("schemes", [["galerkin-1", 7]]),
+        "contents do not match",
+    ),
+    "another cost": (edited("metadata", {"cost": 0.5}), "contents do not match"),
+    "another hash of the contents": (edited("sha256", "0" * 64), "contents do not match"),
+    "a hash of another kind": (edited("sha256", None), "contents do not match"),
 }
 
 
@@ -331,7 +341,28 @@ def test_a_flipped_byte_is_refused_or_harmless(motion: Trajectory, saved: Path) 
             loaded = Trajectory.load(saved)
         except TrajectoryFileError:
             continue
-        np.testing.assert_array_equal(loaded.q, motion.q)  # a byte that says nothing
+        for name in ("q", "v", "momenta", "t"):  # a byte that says nothing
+            np.testing.assert_array_equal(getattr(loaded, name), getattr(motion, name))
+
+
+def test_a_file_without_a_hash_of_its_contents_loads_with_a_warning(
+    motion: Trajectory, saved: Path
+) -> None:
+    contents = entries(saved)
+    del contents["header"]["sha256"]  # as by an earlier version
+    rewrite(saved, contents)
+    with pytest.warns(HoviWarning, match="no SHA-256 of its contents"):
+        loaded = Trajectory.load(saved)
+    np.testing.assert_array_equal(loaded.momenta, motion.momenta)
+
+
+def test_metadata_that_json_changes_are_those_of_the_hash(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    metadata = {"a": {10: (1, 2), 2: -0.0, None: 1e300, "\u20ac": 2**70}, "b": "\ud800"}
+    dataclasses.replace(motion, metadata=metadata).save(tmp_path / "motion.npz")
+    loaded = Trajectory.load(tmp_path / "motion.npz")
+    assert loaded.metadata["a"] == {"10": [1, 2], "2": 0.0, "null": 1e300, "\u20ac": 2**70}
 
 
 def replace_entry(path: Path, name: str, data: bytes) -> None:

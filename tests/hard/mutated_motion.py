@@ -6,6 +6,7 @@ and loading it again.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import io
 import json
@@ -83,9 +84,12 @@ def mutate(random: Random) -> Mutant:
     if kind < 0.75:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(entries, random)
+        _rehash(entries, random)
         return Mutant(_packed(entries, random))
-    change = random.choice(_INVALIDATING_CHANGES)
+    change = random.choice(_INVALIDATING_CHANGES + _UNNOTICEABLE_CHANGES)
     change(entries, random)
+    if change not in _UNNOTICEABLE_CHANGES:
+        _rehash(entries, random)
     return Mutant(_packed(entries, random), (change.__doc__ or "").split("\n")[0])
 
 
@@ -152,6 +156,25 @@ def _update_hashes(header: dict[str, Any]) -> None:
     robot["sha256"] = hashlib.sha256(robot["urdf"].encode()).hexdigest()
     text = json.dumps(header["scene"], sort_keys=True)
     header["scene_sha256"] = hashlib.sha256(text.encode()).hexdigest()
+
+
+def _rehash(entries: Entries, random: Random) -> None:
+    """Remove the hash of the contents, or recompute it, or leave the one of the original."""
+    kind = random.random()
+    if kind < 0.3:
+        _edit(entries, lambda header: header.pop("sha256"))
+    elif kind < 0.7:
+        with contextlib.suppress(Exception):  # an array cannot be read
+            arrays = {name: _array_of(entries, name) for name in entries if name != "header"}
+            _edit(entries, lambda header: header.update(sha256=_contents_hash(header, arrays)))
+
+
+def _contents_hash(header: dict[str, Any], arrays: dict[str, Any]) -> str:
+    rest = {key: value for key, value in header.items() if key != "sha256"}
+    content = json.dumps(rest, sort_keys=True).encode()
+    for name, array in sorted(arrays.items()):
+        content += f"{name} {array.shape}".encode() + array.tobytes()
+    return hashlib.sha256(content).hexdigest()
 
 
 # Changes after which the file may or may not be valid
@@ -285,3 +308,29 @@ def _number(entries: Entries, random: Random) -> None:
 _INVALIDATING_CHANGES: tuple[Change, ...] = (
     *(_not_finite, _steps, _jump, _type, _pickle, _bomb, _scene, _number),
 )
+
+# Changes to another motion, which only the hash of the contents shows; the docstring is the reason
+
+
+def _momenta(entries: Entries, random: Random) -> None:
+    """the momenta or the inner modes are edited"""
+    name = random.choice(("momenta", "momenta", "inner"))
+    array = _array_of(entries, name)
+    array.flat[random.randrange(array.size)] += random.choice((1e-9, 0.1, -3.0, 1e6))
+    entries[name] = _npy(array)
+
+
+def _other_scheme(entries: Entries, random: Random) -> None:
+    """the scheme is another one"""
+    schemes = ("galerkin-0", "galerkin-1", "hermite-simpson", "taylor-midpoint")
+    name = random.choice(schemes)
+    _edit(entries, lambda header: header.update(schemes=[[name, 4]]))
+
+
+def _metadata(entries: Entries, random: Random) -> None:
+    """the cost or the status is edited"""
+    key, value = random.choice((("cost", 1.0), ("cost", -1), ("status", "x"), ("status", 7)))
+    _edit(entries, lambda header: header["metadata"].update({key: value}))
+
+
+_UNNOTICEABLE_CHANGES: tuple[Change, ...] = (_momenta, _momenta, _other_scheme, _metadata)

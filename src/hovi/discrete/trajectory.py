@@ -21,7 +21,7 @@ from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.stored_torque import StoredTorque
-from hovi.discrete.trajectory_file import read_arrays, write_arrays
+from hovi.discrete.trajectory_file import read_arrays, require_unchanged, write_arrays
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.robot.robot import Robot
 from hovi.robot.space.chart import Chart
@@ -257,6 +257,7 @@ class Trajectory:
                 torque=StoredTorque(arrays[_TORQUE]) if scene is None else None,
             )
             require_continuous(loaded.path, loaded.grid, loaded.space)
+            require_unchanged(header, arrays)
             return loaded
         except KeyError as error:
             raise TrajectoryFileError(

@@ -3,15 +3,18 @@
 The file is a plain npz that `numpy.load(path, allow_pickle=False)` reads. It is written without
 compression and with fixed time stamps, so that the same motion gives the same bytes on every
 machine. Files are untrusted input: sizes are checked before memory is allocated, and pickles are
-never decoded.
+never decoded. The header holds the SHA-256 of the file's contents, which shows changes by accident
+or by hand; it is no signature.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import math
 import os
+import warnings
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -20,7 +23,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import TrajectoryFileError
+from hovi.errors import HoviWarning, InputError, TrajectoryFileError
 from hovi.system.files import reason, require_file, whole_file
 
 Array = npt.NDArray[np.float64]
@@ -35,6 +38,7 @@ MAX_EXPANSION = 50
 """Maximum ratio of unpacked to packed size; real data compresses less."""
 _MARGIN = 2**16  # overhead of zip and npy
 _HEADER = "header"
+_HASH = "sha256"
 _DOUBLES = np.dtype("<f8")
 _BYTES = np.dtype("u1")
 
@@ -49,13 +53,14 @@ def write_arrays(
     arrays: finite doubles of any shape, by name.
     Raises TrajectoryFileError.
     """
-    entries = {_HEADER: _encode_header(header)}
+    doubles = {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
+    entries: dict[str, npt.NDArray[Any]] = {_HEADER: _encode_header(header, doubles)}
     if entries[_HEADER].nbytes > MAX_HEADER_BYTES:
         raise TrajectoryFileError(
             f"the scene and metadata take {entries[_HEADER].nbytes} bytes, but a trajectory file "
             f"can have at most {MAX_HEADER_BYTES}."
         )
-    entries |= {name: np.ascontiguousarray(array, _DOUBLES) for name, array in arrays.items()}
+    entries |= doubles
     size = sum(entry.nbytes for entry in entries.values())
     if size > MAX_BYTES:
         raise TrajectoryFileError(
@@ -108,6 +113,28 @@ def read_arrays(
     return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
 
 
+def require_unchanged(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
+    """Raise InputError if a header and arrays of `read_arrays` are not those that were written.
+
+    Warns about a file of an earlier version of hovi, which has no hash.
+    """
+    if _HASH not in header:
+        message = "the file has no SHA-256 of its contents, so a change of them would not show."
+        warnings.warn(message, HoviWarning, stacklevel=3)
+    elif header[_HASH] != _digest(header, arrays):
+        raise InputError("its contents do not match their stored SHA-256")
+
+
+def _digest(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:
+    """SHA-256 of a decoded header without its hash, and of the arrays, in hexadecimal."""
+    rest = {key: value for key, value in header.items() if key != _HASH}
+    digest = hashlib.sha256(json.dumps(rest, sort_keys=True).encode())
+    for name in sorted(arrays):
+        digest.update(f"{name} {arrays[name].shape}".encode())
+        digest.update(np.ascontiguousarray(arrays[name], _DOUBLES).tobytes())
+    return digest.hexdigest()
+
+
 def _check_members(members: Mapping[str, zipfile.ZipInfo], names: list[str], label: str) -> None:
     missing = [name for name in names if f"{name}.npy" not in members]
     if missing:
@@ -132,10 +159,12 @@ def _check_expansion(
         )
 
 
-def _encode_header(header: Mapping[str, Any]) -> npt.NDArray[np.uint8]:
+def _encode_header(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> npt.NDArray[np.uint8]:
     marked = {"format": FORMAT, "version": VERSION, **header}
     try:
-        text = json.dumps(marked, sort_keys=True, allow_nan=False, separators=(",", ":"))
+        decoded = json.loads(json.dumps(marked, allow_nan=False))  # keys become strings
+        decoded[_HASH] = _digest(decoded, arrays)
+        text = json.dumps(decoded, sort_keys=True, separators=(",", ":"))
     except (TypeError, ValueError) as error:
         raise TrajectoryFileError(f"the metadata cannot be written as JSON: {error}.") from error
     return np.frombuffer(text.encode(), np.uint8)
