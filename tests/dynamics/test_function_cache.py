@@ -6,8 +6,10 @@ import contextlib
 import hashlib
 import os
 import pickle
+import shutil
 import stat
 import subprocess
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -28,9 +30,12 @@ from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
 from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from oracles.opened_files import opened_files
 from samples.compiled_functions import compile_and_evaluate, function, value_at_one
 
 Array = npt.NDArray[np.float64]
+
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
 
 EFFECTS = [Gravity(9.8), JointLimitPotential({"elbow": (0.0, np.radians(170.0))})]
 
@@ -140,23 +145,80 @@ def test_read_permission_of_others_is_removed() -> None:
     assert stat.S_IMODE(library_folder().stat().st_mode) == 0o700
 
 
+@pytest.mark.parametrize("suffix", ["", ".sha256"])
+@pytest.mark.parametrize("change", ["mode", pytest.param("owner", marks=needs_root)])
+def test_a_library_that_others_could_have_written_is_built_again(
+    cache: Path, suffix: str, change: str
+) -> None:
+    compiled(function())
+    (library,) = libraries(cache)
+    before, file = library.stat().st_ino, Path(f"{library}{suffix}")
+    if change == "mode":
+        file.chmod(0o620)
+    else:
+        os.chown(file, 12345, -1)
+    assert value_at_one(compiled(function())) == 2.0
+    assert library.stat().st_ino != before
+    for each in (library, Path(f"{library}.sha256")):
+        assert (stat.S_IMODE(each.stat().st_mode), each.stat().st_uid) == (0o600, os.geteuid())
+
+
 @pytest.mark.parametrize("name", ["hovi", "hovi/compiled"])
 @pytest.mark.parametrize("mode", [0o770, 0o720, 0o702, 0o1777])
 def test_a_folder_writable_by_others_is_refused(cache: Path, name: str, mode: int) -> None:
     library_folder()
     (cache / name).chmod(mode)
-    with pytest.raises(CompilationError, match=rf"{name} may be written to by others.*chmod 700"):
+    with pytest.raises(CompilationError, match=rf"{name} may be written to by others.*chmod go-w"):
         compiled(function())
     assert libraries(cache) == []
 
 
-def test_a_cache_writable_by_everyone_is_refused(cache: Path) -> None:
+@pytest.mark.parametrize("mode", [0o777, 0o770, 0o720, 0o702])
+@pytest.mark.parametrize("above", ["a cache", "."])
+def test_a_folder_above_that_others_can_write_to_is_refused(
+    cache: Path, above: str, mode: int
+) -> None:
     cache.mkdir()
-    cache.chmod(0o777)
-    with pytest.raises(CompilationError, match="by everyone"):
+    folder = cache.parent / above
+    folder.chmod(mode)
+    with pytest.raises(CompilationError, match="may be written to by others"):
         compiled(function())
-    cache.chmod(0o1777)  # as /tmp: entries can be replaced by their owners only
+    folder.chmod(0o1777)  # as /tmp: entries can be replaced by their owners only
     assert value_at_one(compiled(function())) == 2.0
+
+
+@needs_root
+@pytest.mark.parametrize("above", ["a cache", "."])
+def test_a_folder_above_that_belongs_to_somebody_else_is_refused(cache: Path, above: str) -> None:
+    cache.mkdir()
+    os.chown(cache.parent / above, 12345, -1)
+    with pytest.raises(CompilationError, match="belongs to another user"):
+        compiled(function())
+
+
+@pytest.mark.parametrize("change", ["chmod 777 {0}/..", "mv {0} {0}-old; ln -s {0}-old {0}"])
+def test_folders_are_checked_again_after_a_build(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    """The compiler stands for whoever changes a folder while it runs."""
+    folder, compiler = library_folder(), shutil.which(COMPILERS[0])
+    run = f'{compiler} "$@" && case "$1" in -O*) ' + change.format(f"'{folder}'") + ";; esac"
+    made = a_compiler(tmp_path / "bin", run)
+    monkeypatch.setenv("PATH", f"{made}:{os.environ['PATH']}")
+    with pytest.raises(CompilationError, match=r"others|symbolic link|cannot be written"):
+        compiled(function())
+
+
+def test_nothing_is_built_in_the_folder_for_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library_folder()
+    (tmp_path / "shared").mkdir()
+    monkeypatch.setenv("TMPDIR", str(tmp_path / "shared"))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    with opened_files(tmp_path / "shared") as opened:
+        compiled(function(7.0))
+    assert opened == set()
 
 
 @pytest.mark.parametrize("name", ["hovi", "hovi/compiled"])
@@ -168,9 +230,11 @@ def test_a_symbolic_link_as_folder_is_refused(cache: Path, tmp_path: Path, name:
         compiled(function())
 
 
-def test_a_folder_of_another_user_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+@needs_root
+@pytest.mark.parametrize("name", ["hovi", "hovi/compiled"])
+def test_a_folder_of_another_user_is_refused(cache: Path, name: str) -> None:
     library_folder()
-    monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+    os.chown(cache / name, 12345, -1)
     with pytest.raises(CompilationError, match="belongs to another user"):
         compiled(function())
 

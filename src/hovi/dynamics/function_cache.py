@@ -2,7 +2,8 @@
 
 The folder is `hovi/compiled` in $XDG_CACHE_HOME or ~/.cache. The name of a library is the SHA-256
 of its source and compiler, and its own SHA-256 is stored beside it and checked before it is loaded.
-No library is loaded from anywhere else, nor while another user could write to the folder.
+No library is loaded from anywhere else, nor while another user could change the folder or one above
+it; this is checked immediately before a library is loaded, since it may take seconds to build.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ import hashlib
 import os
 import platform
 import shutil
-import stat
 import subprocess
 import tempfile
 from pathlib import Path
@@ -21,6 +21,7 @@ import casadi as ca
 
 from hovi.errors import HoviError
 from hovi.system.files import reason, whole_file
+from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
 from hovi.version import __version__
 
 COMPILERS = ("cc", "gcc")
@@ -56,6 +57,10 @@ def compiled(function: ca.Function) -> ca.Function:
     library = folder / f"{source_hash}-{_digest(_identity(compiler))}.so"
     if not _is_intact(library):
         _build(compiler, function.name(), code, library)
+        if library_folder() != folder:
+            raise CompilationError(
+                f"{folder} was exchanged while a library was built: compile again, {_OTHERWISE}"
+            )
     return _load(function.name(), library)
 
 
@@ -69,19 +74,18 @@ def c_code(function: ca.Function) -> str:
 def library_folder() -> Path:
     """The folder of the compiled libraries, created with mode 0700 if necessary.
 
-    Raises CompilationError if others can write to it or to its parent folder.
+    Raises CompilationError if others can change it or a folder above it.
     """
     home = _cache_home()
     try:
-        home.mkdir(mode=0o700, parents=True, exist_ok=True)
-        mode = home.stat().st_mode
-        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
-            raise _unsafe(home, "may be written to by everyone")
-        folder = home
-        for name in ("hovi", "compiled"):
-            folder = folder / name
-            _require_own(folder)
+        folder = private_folder(home, ("hovi", "compiled"))
         folder.chmod(0o700)
+    except UnsafeFolderError as error:
+        raise CompilationError(
+            "compile=True loads libraries only from a folder that nobody else can change, but "
+            f"{error.folder} {error.fault}: remove it or correct it (chmod go-w), set "
+            f"XDG_CACHE_HOME to a folder of yours, {_OTHERWISE}"
+        ) from error
     except OSError as error:
         raise CompilationError(
             f"compile=True keeps libraries in {home / 'hovi' / 'compiled'}, which cannot be made "
@@ -104,27 +108,6 @@ def _cache_home() -> Path:
         ) from error
 
 
-def _require_own(folder: Path) -> None:
-    """Create a folder, or raise CompilationError if an existing one is unsafe."""
-    try:
-        folder.mkdir(mode=0o700)
-    except FileExistsError:
-        found = folder.lstat()
-        if not stat.S_ISDIR(found.st_mode):
-            raise _unsafe(folder, "is a symbolic link or a file") from None
-        if found.st_uid != os.geteuid():
-            raise _unsafe(folder, "belongs to another user") from None
-        if found.st_mode & 0o022:
-            raise _unsafe(folder, "may be written to by others") from None
-
-
-def _unsafe(folder: Path, fault: str) -> CompilationError:
-    return CompilationError(
-        f"compile=True loads libraries only from a folder that nobody else can change, but "
-        f"{folder} {fault}: remove it or correct it (chmod 700), {_OTHERWISE}"
-    )
-
-
 def _platform() -> tuple[str, ...]:
     return platform.system(), platform.machine(), *platform.libc_ver()
 
@@ -138,15 +121,15 @@ def _identity(compiler: str) -> str:
 def _build(compiler: str, name: str, code: str, library: Path) -> None:
     """Compile in a private folder, then move the library and its hash into place."""
     try:
-        with tempfile.TemporaryDirectory(prefix="hovi-") as scratch:
+        # Not in /tmp: whoever can change that folder could exchange what is built there.
+        with tempfile.TemporaryDirectory(prefix="build-", dir=library.parent) as scratch:
             source, result = Path(scratch, "function.c"), Path(scratch, "function.so")
             source.write_text(code)
-            _run(name, [compiler, *FLAGS, "-o", str(result), str(source), "-lm"])
+            command = [compiler, *FLAGS, "-o", str(result), str(source), "-lm"]
+            _run(name, command, TMPDIR=scratch)
             binary = result.read_bytes()
-        with whole_file(library) as stream:
-            stream.write(binary)
-        with whole_file(_hash_file(library)) as stream:
-            stream.write(hashlib.sha256(binary).hexdigest().encode())
+        _write(library, binary)
+        _write(_hash_file(library), hashlib.sha256(binary).hexdigest().encode())
     except OSError as error:
         raise CompilationError(
             f"the compiled function {name!r} cannot be written to {library.parent} "
@@ -154,7 +137,13 @@ def _build(compiler: str, name: str, code: str, library: Path) -> None:
         ) from error
 
 
-def _run(what: str, command: list[str]) -> str:
+def _write(path: Path, content: bytes) -> None:
+    with whole_file(path) as stream:
+        os.fchmod(stream.fileno(), 0o600)
+        stream.write(content)
+
+
+def _run(what: str, command: list[str], **environment: str) -> str:
     """Output of the compiler. Raises CompilationError with its first error message."""
     run = subprocess.run(
         command,
@@ -162,7 +151,7 @@ def _run(what: str, command: list[str]) -> str:
         text=True,
         errors="replace",
         stdin=subprocess.DEVNULL,
-        env={**os.environ, "LC_ALL": "C"},
+        env={**os.environ, "LC_ALL": "C", **environment},
         check=False,
     )
     if run.returncode != 0:
@@ -174,11 +163,20 @@ def _run(what: str, command: list[str]) -> str:
 
 
 def _is_intact(library: Path) -> bool:
+    """Whether a library and its hash are files of this user, and the hash is right."""
     try:
-        written = _hash_file(library).read_text()
-        return written == hashlib.sha256(library.read_bytes()).hexdigest()
-    except (OSError, UnicodeDecodeError):
+        written = _own_file(_hash_file(library))
+        return written == hashlib.sha256(_own_file(library)).hexdigest().encode()
+    except OSError:
         return False
+
+
+def _own_file(path: Path) -> bytes:
+    """The content of a file; raises OSError if somebody else could change it."""
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as stream:
+        if not is_private_file(stream.fileno()):
+            raise OSError("it is not a file of this user alone")
+        return stream.read()
 
 
 def _hash_file(library: Path) -> Path:
