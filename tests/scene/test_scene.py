@@ -50,14 +50,15 @@ def with_armature(robot: Robot) -> Robot:
 
 
 @pytest.mark.parametrize("name", ["two_link", "ur5", "panda"])
-@pytest.mark.parametrize("gravity", [None, 9.8, 9.81, -1.62])
+@pytest.mark.parametrize("gravity", [None, 9.8, 9.81, -1.62])  # the last one pulls upwards
 @pytest.mark.parametrize("armature", [False, True])
 def test_inverse_dynamics_is_rnea(
     request: pytest.FixtureRequest, name: str, gravity: float | None, armature: bool
 ) -> None:
     robot: Robot = request.getfixturevalue(name)
     robot = with_armature(robot) if armature else robot
-    effects = [] if gravity is None else [Gravity(gravity)]
+    up = (0.0, 0.0, float(np.sign(-(gravity or 0.0))))
+    effects = [] if gravity is None else [Gravity(abs(gravity), direction=up)]
     q, v, a = random_points(robot.model)
     tau = Scene(robot, effects).inverse_dynamics(q, v, a)
     expected = rnea(robot, gravity or 0.0, q, v, a)

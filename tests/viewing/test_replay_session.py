@@ -398,7 +398,10 @@ def test_a_missing_browser_raises_and_stops_the_server(
     monkeypatch.setattr(replay_session, "_BROWSER_TIMEOUT", 0.1)
     with pytest.raises(DisplayError, match="no browser showed the page"):
         replay(motion, open_browser=True, announce=quiet)
-    assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]
+    for thread in threading.enumerate():  # those of other tests may be ending, too
+        if thread.name == "hovi-viewer":
+            thread.join(timeout=30.0)
+            assert not thread.is_alive()
 
 
 def test_a_notebook_shows_the_page(motion: Trajectory, tmp_path: Path) -> None:
