@@ -94,7 +94,11 @@ class Call:
         """Call it, without what it prints."""
         inside = contextlib.chdir(folder())  # "x" may be the path of a file to write
         with contextlib.redirect_stdout(io.StringIO()), inside:
-            return self.function(*self.arguments, **dict(self.keywords))
+            result = self.function(*self.arguments, **dict(self.keywords))
+            close = getattr(result, "close", None)  # of a session with a server
+            if callable(close):
+                close()
+            return result
 
 
 def call(function: Callable[..., Any], *arguments: Any, **keywords: Any) -> Call:

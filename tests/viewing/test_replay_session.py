@@ -352,15 +352,21 @@ def test_loop_plays_until_interrupted(motion: Trajectory, monkeypatch: pytest.Mo
     assert len(starts) == 3
 
 
+def servers() -> set[threading.Thread]:
+    """The threads of servers; other tests may have left some."""
+    return {thread for thread in threading.enumerate() if thread.name == "hovi-viewer"}
+
+
 def test_a_live_page_is_served_on_the_loopback_interface_only(motion: Trajectory) -> None:
-    addresses: list[str] = []
+    addresses, before = list[str](), servers()
     with replay(motion, speed=100, announce=addresses.append) as shown:
         assert addresses == [shown.url]
+        assert len(servers() - before) == 1
         found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/view/", shown.url)
         assert found is not None
         with socket.socket() as other:  # free unless the server listens everywhere
             other.bind(("127.0.0.2", int(found[1])))
-    assert not [thread for thread in threading.enumerate() if thread.name == "hovi-viewer"]
+    assert not servers() - before
     shown.close()
 
 
@@ -391,6 +397,7 @@ def test_an_unavailable_or_invalid_port_raises(motion: Trajectory) -> None:
 def test_a_missing_browser_raises_and_stops_the_server(
     motion: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    before = servers()
     monkeypatch.setattr(webbrowser, "open", lambda url, new: False)
     with pytest.raises(DisplayError, match="no browser could be started; open http"):
         replay(motion, open_browser=True, announce=quiet)
@@ -398,10 +405,7 @@ def test_a_missing_browser_raises_and_stops_the_server(
     monkeypatch.setattr(replay_session, "_BROWSER_TIMEOUT", 0.1)
     with pytest.raises(DisplayError, match="no browser showed the page"):
         replay(motion, open_browser=True, announce=quiet)
-    for thread in threading.enumerate():  # those of other tests may be ending, too
-        if thread.name == "hovi-viewer":
-            thread.join(timeout=30.0)
-            assert not thread.is_alive()
+    assert not servers() - before
 
 
 def test_a_notebook_shows_the_page(motion: Trajectory, tmp_path: Path) -> None:
