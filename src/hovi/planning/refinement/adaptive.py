@@ -38,6 +38,8 @@ MAX_FIRST_INTERVALS = 60
 """Maximum number of intervals of the first grid."""
 RESTART_ERROR = 0.05
 """Relative error of the first cost above which the refinement begins again with more points."""
+RESTART_ERROR_WHIRLING = 0.02
+"""The same for a motion in which a joint whirls."""
 MAX_ROUNDS = 14
 """Maximum number of grids."""
 MAX_STALLED_ROUNDS = 2
@@ -263,9 +265,10 @@ class _Search:
 
 
 def _hides(candidate: Candidate) -> bool:
-    """Whether a motion on few points is not near a finer one, or whirls, so that it may hide."""
+    """Whether a motion on few points is not near a finer one, so that its torque may hide."""
     known = candidate.error_of_cost
-    return known is None or known > RESTART_ERROR or candidate.whirl is not None
+    most = RESTART_ERROR if candidate.whirl is None else RESTART_ERROR_WHIRLING
+    return known is None or known > most
 
 
 def _solved_nearby(finer: FinerSolution, problem: TrajectoryProblem) -> Solution | None:

@@ -27,7 +27,7 @@ LIGHT_SHARE = 0.03
 """Inertia of a joint that may whirl, relative to that of the heaviest."""
 HOPELESS_RATIO = 40.0
 """That ratio above which finer grids are not tried for a motion that its grid does not resolve."""
-UNUSABLE_RATIO = 80.0
+UNUSABLE_RATIO = 60.0
 """That ratio above which no grid is trusted: what one finds to be a minimum a finer one leaves."""
 
 
