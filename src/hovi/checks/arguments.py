@@ -53,6 +53,16 @@ def unchecked(function: Checked) -> Checked:
     return function
 
 
+def without_checks(function: Checked) -> Checked:
+    """A function or bound method whose arguments are not checked, for the steps of an optimiser.
+
+    Where nothing is checked it is the function itself.
+    """
+    if isinstance(function, types.MethodType):
+        return types.MethodType(inspect.unwrap(function.__func__), function.__self__)  # type: ignore[return-value]
+    return inspect.unwrap(function)  # type: ignore[return-value]
+
+
 def _checking(checked: Checked, names: Collection[str]) -> Checked:
     parameters = functools.cache(lambda: _Parameters.of(checked, names))
 

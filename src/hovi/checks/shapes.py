@@ -31,6 +31,8 @@ def numbers_of(name: str, value: npt.ArrayLike, *shape: int | None) -> Array:
 
 def require_shape(name: str, array: npt.NDArray[Any], *shape: int | None) -> None:
     """Raise InputError unless an array has a shape, in which None stands for any length."""
+    if array.shape == shape:
+        return
     same = len(shape) == array.ndim
     if same and all(size in (None, n) for size, n in zip(shape, array.shape, strict=True)):
         return

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import without_checks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import with_ends_of_nodes
@@ -68,6 +69,10 @@ class ActionObjective(Objective[DiscretePath]):
         if algebra == "tree" and not problem.plain:
             raise InputError("algebra 'tree' needs fixed ends without conditions; use 'band'.")
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
+        self._integrate = without_checks(problem.robot.integrate)
+        self._expand = without_checks(self.ld.expand)
+        self._jets = without_checks(self.ld.jets)
+        self._predict = without_checks(self.ld.predict)
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
         self._outputs: tuple[DiscretePath, list[Array]] | None = None
@@ -162,7 +167,7 @@ class ActionObjective(Objective[DiscretePath]):
     def jets(self, x: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points; cached for the last path."""
         if self._last is None or self._last[0] is not x:
-            self._last = x, self.ld.jets(x)
+            self._last = x, self._jets(x)
         return self._last[1]
 
     def model(
@@ -180,7 +185,7 @@ class ActionObjective(Objective[DiscretePath]):
         if self.moments is not None:
             outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
             return [self.output_slope(y, i) for i, y in enumerate(outputs)]
-        slopes = self.ld.predict(expansion, step, self.coordinates)
+        slopes = self._predict(expansion, step, self.coordinates)
         if self.multipliers is None:
             return slopes
         return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
@@ -198,7 +203,7 @@ class ActionObjective(Objective[DiscretePath]):
         known = self.multipliers
         if known is not None:
             terms = self._at_points(x, known).added_to(terms)
-        self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
+        self._expansion = self._expand(x, self.coordinates, curvatures, terms, self.jets(x))
         if known is not None:
             self._add_conditions(x, self._expansion, known)
         if known is not None and self.moments is not None:
@@ -254,7 +259,7 @@ class ActionObjective(Objective[DiscretePath]):
         """The path moved by a step: nodes by `integrate`, everything else added."""
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
-        path = DiscretePath(self.problem.robot.integrate(x.q, dq), *moved)
+        path = DiscretePath(self._integrate(x.q, dq), *moved)
         if self.ld.chart is None:
             return path
         return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
