@@ -335,8 +335,10 @@ class DiscreteLagrangian:
 
     def _check_terms(self, terms: list[PointTerms] | None) -> None:
         """Raise InputError for terms that are not one per batch, at its points."""
+        if terms is None:
+            return
         points = [len(batch.t) for batch in self.batches]
-        if terms is not None and [len(term.jet_gradient) for term in terms] != points:
+        if [len(term.jet_gradient) for term in terms] != points:
             raise InputError(f"terms are one per batch, at {points} points.")
 
     def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:

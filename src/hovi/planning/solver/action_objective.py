@@ -25,6 +25,7 @@ from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
+from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +40,13 @@ CHART_TORQUE_FLOOR = 2e-5
 it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
+
+# called at each step
+_expand = without_checks(DiscreteLagrangian.expand)
+_jets = without_checks(DiscreteLagrangian.jets)
+_predict = without_checks(DiscreteLagrangian.predict)
+_integrate = without_checks(Robot.integrate)
+_new_path = without_checks(DiscretePath)
 
 
 class ActionObjective(Objective[DiscretePath]):
@@ -69,10 +77,6 @@ class ActionObjective(Objective[DiscretePath]):
         if algebra == "tree" and not problem.plain:
             raise InputError("algebra 'tree' needs fixed ends without conditions; use 'band'.")
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
-        self._integrate = without_checks(problem.robot.integrate)
-        self._expand = without_checks(self.ld.expand)
-        self._jets = without_checks(self.ld.jets)
-        self._predict = without_checks(self.ld.predict)
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
         self._outputs: tuple[DiscretePath, list[Array]] | None = None
@@ -167,7 +171,7 @@ class ActionObjective(Objective[DiscretePath]):
     def jets(self, x: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points; cached for the last path."""
         if self._last is None or self._last[0] is not x:
-            self._last = x, self._jets(x)
+            self._last = x, _jets(self.ld, x)
         return self._last[1]
 
     def model(
@@ -185,7 +189,7 @@ class ActionObjective(Objective[DiscretePath]):
         if self.moments is not None:
             outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
             return [self.output_slope(y, i) for i, y in enumerate(outputs)]
-        slopes = self._predict(expansion, step, self.coordinates)
+        slopes = _predict(self.ld, expansion, step, self.coordinates)
         if self.multipliers is None:
             return slopes
         return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
@@ -203,7 +207,8 @@ class ActionObjective(Objective[DiscretePath]):
         known = self.multipliers
         if known is not None:
             terms = self._at_points(x, known).added_to(terms)
-        self._expansion = self._expand(x, self.coordinates, curvatures, terms, self.jets(x))
+        jets = self.jets(x)
+        self._expansion = _expand(self.ld, x, self.coordinates, curvatures, terms, jets)
         if known is not None:
             self._add_conditions(x, self._expansion, known)
         if known is not None and self.moments is not None:
@@ -259,7 +264,7 @@ class ActionObjective(Objective[DiscretePath]):
         """The path moved by a step: nodes by `integrate`, everything else added."""
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
-        path = DiscretePath(self._integrate(x.q, dq), *moved)
+        path = _new_path(_integrate(self.problem.robot, x.q, dq), *moved)
         if self.ld.chart is None:
             return path
         return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)

@@ -98,9 +98,7 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     return search.solve(outcome.x, start)
 
 
-def _solved_on_halves(
-    search: BoundedSearch, outcome: Bounded, sides: Array
-) -> tuple[Bounded, str]:
+def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> tuple[Bounded, str]:
     """Solve again with those intervals halved in which a limit is exceeded, and their neighbours.
 
     From the motion, if its excess is within WARM_EXCESS and that succeeds; else from the initial
