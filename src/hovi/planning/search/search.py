@@ -15,6 +15,7 @@ from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
     FinalStages,
+    ended_early,
     has_few_points,
     on_grid_of,
     with_more_points,
@@ -25,13 +26,14 @@ from hovi.planning.search.multistart import Exploration, Pool, default_processes
 from hovi.planning.solver.solver import Solution, guess_path
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
 COARSE_INTERVALS = 60
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""
 EXPLORATION_SHARE = 0.7
 """Share of the time limit for the exploration, if its minima are refined afterwards."""
+_NOT_REACHED = "the requested grid or the best duration was reached"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,16 @@ class Search:
                 found = better
         except KeyboardInterrupt:
             record_interrupt()
-            found = _interrupted(found[0])
+            found = [
+                ended_early(found[0], Status.INTERRUPTED, f"interrupted before {_NOT_REACHED}")
+            ]
+        except OutOfTimeError:
+            found = [
+                ended_early(
+                    found[0], Status.TIME_LIMIT, f"{OutOfTimeError()} before {_NOT_REACHED}"
+                )
+            ]
+        self.progress("comparing with a finer grid", 0.95)
         found = self._resolved(found)
         best = self._with_ending(found[0], explored)
         return best, tuple(s.cost for s in found if s.success)
@@ -147,7 +158,9 @@ class Search:
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
         options = self.fine.options
-        if interrupted() or not options.continuation or not may_help(found[0]):
+        if interrupted() or self.deadline.passed or not options.continuation:
+            return found
+        if not may_help(found[0]):
             return found
         if self.fine.tolerance is not None:
             known = dataclasses.replace(found[0], problem=on_grid_of(job.problem(), found[0]))
@@ -175,14 +188,15 @@ class Search:
 
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
         """The best solution, with a note in its message if the search ended early."""
-        starts = self.fine.options.starts
-        if explored.done < starts:
-            ended = f"The search ended after {explored.done} of {starts} starts."
+        starts, lost = self.fine.options.starts, len(explored.lost)
+        if explored.done + lost < starts:
+            best = _with_note(best, f"The search ended after {explored.done} of {starts} starts.")
         elif interrupted() and best.success:
-            ended = "The search was interrupted."
-        else:
-            return best
-        return _with_note(best, ended)
+            best = _with_note(best, "The search was interrupted.")
+        if lost > 0:
+            causes = " or ".join(dict.fromkeys(explored.lost))
+            best = _with_note(best, f"Lost {lost} of {starts} starts: {causes}.")
+        return best
 
 
 def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
@@ -207,15 +221,3 @@ def _with_costlier(checked: list[Solution]) -> Solution:
 def _with_note(best: Solution, sentence: str) -> Solution:
     """The solution with one more sentence in its message."""
     return dataclasses.replace(best, message=f"{best.message} {sentence}")
-
-
-def _interrupted(best: Solution) -> list[Solution]:
-    """The best solution so far, after an interrupt before the last stage."""
-    grid = best.trajectory.grid
-    message = (
-        "interrupted before the requested grid or the best duration was reached; the motion is the "
-        f"best so far, on {grid.intervals} intervals of {grid.duration:.6g} s, of cost "
-        f"{best.cost:.10g}."
-    )
-    status = Status.INTERRUPTED
-    return [dataclasses.replace(best, success=False, status=status, message=message)]
