@@ -78,7 +78,7 @@ def choices(
         times: list[float] = []
         while len(times) <= repeats and budget.allows(max(times, default=0.0)):
             watch = Stopwatch(clock)
-            solution = solve_to_tolerance(coarse, tolerance, path, time_limit=budget.left)
+            solution = solve_to_tolerance(coarse, tolerance, path, time_limit=budget.seconds_left)
             times.append(watch.seconds)
         if times:
             found.append(_choice(size, solution, times, reference))

@@ -23,7 +23,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import (
     interrupted,
     interruptible,
@@ -126,7 +126,10 @@ class _Search:
         """Refine until the error is within the tolerance, or no further progress is possible."""
         self.best = Candidate(solution, self.tolerance)
         try:
-            reason = self._refine(solution)
+            with self.deadline.in_force():
+                reason = self._refine(solution)
+        except OutOfTimeError as late:
+            reason = str(late)
         except KeyboardInterrupt:
             record_interrupt()
             reason = "it was interrupted"

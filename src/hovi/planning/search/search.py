@@ -33,7 +33,8 @@ COARSE_INTERVALS = 60
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""
 EXPLORATION_SHARE = 0.7
 """Share of the time limit for the exploration, if its minima are refined afterwards."""
-_NOT_REACHED = "the requested grid or the best duration was reached"
+SOLVING_SHARE = 0.9
+"""Share of the time limit for solving, if the best motion is compared with a finer grid after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,25 +103,20 @@ class Search:
         try:
             for better in self._stages(job, found):
                 found = better
-        except KeyboardInterrupt:
-            record_interrupt()
-            found = [
-                ended_early(found[0], Status.INTERRUPTED, f"interrupted before {_NOT_REACHED}")
-            ]
-        except OutOfTimeError:
-            found = [
-                ended_early(
-                    found[0], Status.TIME_LIMIT, f"{OutOfTimeError()} before {_NOT_REACHED}"
-                )
-            ]
-        self.progress("comparing with a finer grid", 0.95)
-        found = self._resolved(found)
+        except (KeyboardInterrupt, OutOfTimeError) as stopped:
+            found = _ended(found, stopped, "the requested grid or the best duration was reached")
+        try:
+            found = self._resolved(found)
+        except KeyboardInterrupt as stopped:
+            found = _ended(found, stopped, "the motion was compared with one on a finer grid")
         best = self._with_ending(found[0], explored)
         return best, tuple(s.cost for s in found if s.success)
 
     def _resolved(self, found: list[Solution]) -> list[Solution]:
         """The minima from the cheapest resolved one on; the cheapest one if none is resolved."""
         checked: list[Solution] = []
+        if found[0].success:
+            self.progress("comparing with a finer grid", 0.95)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
             checked.append(resolved(dataclasses.replace(solution, problem=problem)))
@@ -150,7 +146,7 @@ class Search:
         """The minima from all starts; uses a share of the time if they are refined afterwards."""
         options = job.options
         whole = job is self.fine and job.tolerance is None and self.free is None
-        deadline = self.deadline if whole else self.deadline.part(EXPLORATION_SHARE)
+        deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline)
         first = guess_path(job.problem(), options.guess)
         return explore(pool, first, options.starts, options.seed, self.progress)
@@ -173,7 +169,8 @@ class Search:
 
         Raises KeyboardInterrupt if an interrupt came before the last stage.
         """
-        stages = FinalStages(self.fine, self.deadline, self.progress)
+        share = SOLVING_SHARE if self.fine.tolerance is None else 1.0
+        stages = FinalStages(self.fine, self.deadline.part(share), self.progress)
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
@@ -205,6 +202,14 @@ def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
     if found.success or found.status not in UNUSABLE:
         return (0 if found.success else 1), 0.0
     return 2, -fine.grid.duration
+
+
+def _ended(found: list[Solution], stopped: BaseException, what: str) -> list[Solution]:
+    """The best solution as no success: an interrupt or the time limit came before `what`."""
+    if isinstance(stopped, KeyboardInterrupt):
+        record_interrupt()
+        return [ended_early(found[0], Status.INTERRUPTED, f"interrupted before {what}")]
+    return [ended_early(found[0], Status.TIME_LIMIT, f"{stopped} before {what}")]
 
 
 def _with_costlier(checked: list[Solution]) -> Solution:
