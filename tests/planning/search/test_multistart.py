@@ -11,6 +11,7 @@ import pytest
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
+from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import (
     SAME_COST,
@@ -145,6 +146,19 @@ def test_an_exploration_ends_with_a_round_that_every_process_dies_of(
     assert (found.done, len(found.lost)) == (1, STARTS_PER_ROUND)
     assert found.minima[0].success
     assert not found.interrupted
+
+
+def test_minima_stay_as_they_are_if_every_process_dies_that_refines_them(
+    job: Job, guesses: list
+) -> None:
+    found = [solve_on_grid(job.problem(), guess) for guess in guesses[:2]]
+    options = job.options.with_changes(processes=2)
+    deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, options)
+    best, *others = FinalStages(deadly, Deadline(), silent).to_requested_grid(found)
+    assert others == []
+    assert (best.success, best.status) == (False, Status.INTERRUPTED)
+    assert best.trajectory is found[0].trajectory
+    assert "the requested grid was not reached, since a worker process was ended" in best.message
 
 
 def test_there_is_at_least_one_processor(job: Job) -> None:
