@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import numpy.typing as npt
@@ -371,21 +372,42 @@ def test_the_iteration_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert_fits(problem, stopped)
 
 
-@pytest.mark.parametrize("kind", ["plain", "limited", "constrained"])
-def test_a_deadline_of_the_caller_ends_a_solve(arm_scene: Scene, kind: str) -> None:
-    problem = problem_on(arm_scene, goal=State(REACH_Q))
+KINDS = ("plain", "limited", "constrained")
+
+
+def problem_of(kind: str, scene: Scene) -> TrajectoryProblem:
+    problem = problem_on(scene, goal=State(REACH_Q))
     if kind == "limited":
-        limits = as_limits(arm_scene.robot, {"tau": 400.0})
-        problem = dataclasses.replace(problem, limits=limits)
-    elif kind == "constrained":
-        problem = dataclasses.replace(problem, via=(Via(0.5, State(REACH_Q)),))
-    assert solve_on_grid(problem).success
+        return dataclasses.replace(problem, limits=as_limits(scene.robot, {"tau": 400.0}))
+    return problem if kind == "plain" else dataclasses.replace(problem, via=(HALFWAY,))
+
+
+HALFWAY = Via(0.5, State(REACH_Q))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_deadline_of_the_caller_ends_a_solve(arm_scene: Scene, kind: str) -> None:
+    problem = problem_of(kind, arm_scene)
     with Deadline(-1.0).in_force():
         late = solve_on_grid(problem)
     assert (late.success, late.status, late.nit) == (False, Status.TIME_LIMIT, 0)
     assert "the time limit was reached" in late.message
     assert_fits(problem, late)
     assert solve_on_grid(problem).success
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_time_limit_ends_a_solve_between_two_steps(arm_scene: Scene, kind: str) -> None:
+    problem, limit = problem_of(kind, arm_scene), 1.0
+
+    def wait(step: int, cost: float) -> None:
+        if step == 2:
+            time.sleep(limit)
+
+    late = solve_on_grid(problem, time_limit=limit, report=wait)
+    assert (late.success, late.status) == (False, Status.TIME_LIMIT)
+    assert late.nit <= 2
+    assert_fits(problem, late)
 
 
 def test_a_deadline_ends_an_evaluation_of_many_intervals(arm_scene: Scene) -> None:
