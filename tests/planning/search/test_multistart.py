@@ -108,6 +108,7 @@ def test_guesses_are_solved_here_if_no_worker_starts(
     monkeypatch.setattr(sys, "executable", program)
     found = Pool(job, 2).solve_all(guesses[:2])
     assert found.lost == []
+    assert len(found.solutions) == 2
     assert [each.cost for each in found.solutions] == [each.cost for each in alone.solutions]
 
 
