@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.cli.reports.limit_margins import least_distance, limit_margins
+from hovi.cli.reports.limit_margins import Margins, least_distance, limit_margins
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.solver.solver import Solution
+from hovi.system.deadline import Deadline
 from hovi.viewing.recorded_limits import imposed_limits
 
 ENDS = ([-np.pi / 2, 0.0], [0.3, 0.7], 1.5)
@@ -88,3 +89,12 @@ def test_a_motion_without_limits_and_obstacles_has_no_margins(arm_scene: hovi.Sc
     solution = planned(arm_scene, limits="none")
     assert limit_margins(solution) is None
     assert least_distance(solution) is None
+
+
+def test_margins_that_no_time_is_left_for_are_missing(limited: Solution) -> None:
+    known = Margins.of(limited, Deadline())
+    assert known.missing == ""
+    assert known.limits is not None
+    assert known.distance == least_distance(limited)
+    late = Margins.of(limited, Deadline(-1.0))
+    assert late == Margins(None, None, "the time limit was reached")

@@ -19,7 +19,6 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 from hovi.dynamics import function_cache as module
 from hovi.dynamics.function_cache import COMPILERS, CompilationError, compiled, library_folder
@@ -30,6 +29,7 @@ from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
 from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.workers.pool import end_idle_workers
 from oracles.opened_files import opened_files
 from samples.compiled_functions import compile_and_evaluate, function, value_at_one
 
@@ -55,9 +55,9 @@ def libraries(cache: Path) -> list[Path]:
 @contextlib.contextmanager
 def new_workers() -> Iterator[None]:
     """Worker processes with the environment of the test, which end with it."""
-    get_reusable_executor().shutdown(wait=True)
+    end_idle_workers()
     yield
-    get_reusable_executor().shutdown(wait=True)
+    end_idle_workers()
 
 
 def without_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ SOURCE = TOP / "src" / "hovi"
 # From the ground up: a package imports only packages of the floors below its own.
 FLOORS = [
     {"_native", "errors", "system", "version"},
-    {"checks"},
+    {"checks", "workers"},
     {"optimize", "robot", "schemes"},
     {"dynamics"},
     {"effects"},

@@ -1,16 +1,16 @@
-"""A wall-time budget: work that is expected to exceed it is not started."""
+"""A deadline of known length: work that is expected to end after it is not started."""
 
 from __future__ import annotations
 
 import math
-import time
 
 from hovi.errors import InputError
+from hovi.system.deadline import Deadline
 from hovi.system.interruption import raise_if_interrupted
 
 
-class Budget:
-    """A wall-time budget that starts at construction.
+class Budget(Deadline):
+    """A deadline with shares.
 
     seconds: its length, positive, in [s]. Raises InputError otherwise.
     """
@@ -18,17 +18,8 @@ class Budget:
     def __init__(self, seconds: float) -> None:
         if not (math.isfinite(seconds) and seconds > 0):
             raise InputError(f"the budget must be a positive number of seconds, not {seconds}.")
-        self._began, self.seconds = time.monotonic(), seconds
-
-    @property
-    def spent(self) -> float:
-        """Time since construction, in [s]."""
-        return time.monotonic() - self._began
-
-    @property
-    def left(self) -> float:
-        """Remaining time, at least 0, in [s]."""
-        return max(self.seconds - self.spent, 0.0)
+        super().__init__(seconds)
+        self.seconds = seconds
 
     @property
     def fraction(self) -> float:
@@ -45,4 +36,4 @@ class Budget:
         Raises KeyboardInterrupt after an interrupt.
         """
         raise_if_interrupted()
-        return self.spent + seconds <= share * self.seconds
+        return super().allows(seconds + (1.0 - share) * self.seconds)

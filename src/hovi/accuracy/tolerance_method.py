@@ -106,7 +106,7 @@ class ChoiceTimer:
     @property
     def left(self) -> float:
         """Remaining time, positive, in [s]."""
-        return max(self.budget.left, 1e-3)
+        return max(self.budget.left_of(1.0), 1e-3)
 
     def first(self, tolerance: float, solve: Callable[[], Solution]) -> TimedChoice:
         """The choice of a tolerance, solved once."""

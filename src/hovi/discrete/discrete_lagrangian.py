@@ -24,6 +24,7 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 from hovi.schemes.scheme import regular_from_nodal
+from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -115,6 +116,8 @@ class DiscreteLagrangian:
         known = jets or self.jets(path)
         charts = self._charts(path)
         for i, batch in enumerate(self.batches):
+            if i > 0:
+                raise_if_late()
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
             point = self.lagrangian.expand(*known[i], t=batch.t, multiplier=multiplier, terms=term)

@@ -197,9 +197,12 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
     tables: dict[bytes, Scheme] = {}
     keys: dict[int, bytes] = {}
     for i, scheme in enumerate(schemes):
-        key = keys.setdefault(id(scheme), scheme.key)
-        members.setdefault(key, []).append(i)
-        tables.setdefault(key, scheme)
+        key = keys.get(id(scheme))
+        if key is None:
+            key = keys[id(scheme)] = scheme.key
+            tables.setdefault(key, scheme)
+            members.setdefault(key, [])
+        members[key].append(i)
     return tuple((tables[key], np.array(index)) for key, index in members.items())
 
 

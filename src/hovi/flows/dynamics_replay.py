@@ -21,6 +21,7 @@ from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 
@@ -84,6 +85,7 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
 
     def rates(s: float, y: Array) -> Array:
         x, hv = y.reshape(2, N, n)
+        raise_if_late()
         tau = trajectory.sample_intervals(k, np.full(N, s)).tau
         t = trajectory.t[:-1] + s * trajectory.grid.steps
         a = forward(robot.integrate(start, x), hv / h, tau, t)

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from hovi.system.deadline import raise_if_late
+
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 System = Callable[[Array], tuple[Array, Array]]
@@ -58,6 +60,7 @@ def roots(system: System, u: Array) -> Roots:
     residual, lost = np.full(B, np.inf), np.zeros(B, dtype=bool)
     step, before = np.zeros_like(u), (u, np.zeros((B, u.shape[1], u.shape[1])))
     for _ in range(MAX_STEPS):
+        raise_if_late()
         F, J = system(u)
         searched = (residual > SEARCHED_STEP) & np.isfinite(residual) & ~lost
         if searched.any():

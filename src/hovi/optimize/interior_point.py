@@ -34,7 +34,7 @@ from hovi.optimize.trust_region import (
     next_shift,
     solve_subproblem,
 )
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
@@ -158,7 +158,10 @@ def minimize_bounded(
         outcome.stop = Stop.DIVERGED
         return outcome
     try:
-        _Iteration(objective, outcome, options, density, report).run()
+        with Deadline(options.time_limit).in_force():
+            _Iteration(objective, outcome, options, density, report).run()
+    except OutOfTimeError:
+        outcome.stop = Stop.TIME_LIMIT
     except KeyboardInterrupt:
         record_interrupt()
         outcome.stop = Stop.INTERRUPTED
@@ -191,13 +194,11 @@ class _Iteration(Generic[X]):
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
         raise_if_interrupted()
-        deadline = Deadline(self.options.time_limit)
+        raise_if_late()
         model = self._model()
         while self.outcome.iterations < self.options.max_iterations:
             raise_if_interrupted()
-            if deadline.passed:
-                self.outcome.stop = Stop.TIME_LIMIT
-                return
+            raise_if_late()
             step = self._step(model)
             accepted = self._try(step, model)
             if accepted and self._reduce_mu(step):

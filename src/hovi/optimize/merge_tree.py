@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
+from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 
@@ -247,6 +248,7 @@ def _descend(level: MergeLevel, x: Array, Y: Array) -> Array:
 def _chunks(count: int) -> Iterator[slice]:
     """Parts of a level that fit in the processor's cache."""
     for first in range(0, count, CHUNK):
+        raise_if_late()
         yield slice(first, min(first + CHUNK, count))
 
 

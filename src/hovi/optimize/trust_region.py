@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 Array = npt.NDArray[np.float64]
@@ -159,7 +159,10 @@ def minimize(
         outcome.stop = Stop.DIVERGED
         return outcome
     try:
-        _iterate(objective, outcome, options, report)
+        with Deadline(options.time_limit).in_force():
+            _iterate(objective, outcome, options, report)
+    except OutOfTimeError:
+        outcome.stop = Stop.TIME_LIMIT
     except KeyboardInterrupt:
         record_interrupt()
         outcome.stop = Stop.INTERRUPTED
@@ -175,14 +178,12 @@ def _iterate(
     report: Callable[[int, float], None] | None,
 ) -> None:
     raise_if_interrupted()
-    deadline = Deadline(options.time_limit)
+    raise_if_late()
     radius, shift = options.radius, 0.0
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
         raise_if_interrupted()
-        if deadline.passed:
-            outcome.stop = Stop.TIME_LIMIT
-            return
+        raise_if_late()
         trial = solve_subproblem(model, radius, shift)
         stationary = _is_stationary(objective, outcome, model, trial, options)
         if stationary and trial.along_negative_curvature and not options.escape_saddles:

@@ -296,3 +296,24 @@ def test_a_certificate_of_one_tip_is_not_that_of_all(exact: Solution) -> None:
     assert left is not None
     assert left.frame == "left_gripper"
     assert 0 < left.largest_tip < 0.9 * exact.accuracy.error  # type: ignore[union-attr]
+
+
+def test_a_certificate_ends_at_its_time_limit_and_names_what_is_missing(two_link: Robot) -> None:
+    """Forward simulation with such friction takes steps of nanoseconds."""
+    stiff, v = Scene(two_link, [ViscousFriction(1e9)]), np.array([0.5, 0.3])
+    ends = State(HANG, v), State(HANG + v, v)
+    solution = plan(stiff, *ends, 1.0, limits="none", intervals=16)
+    assert solution.success
+    names: list[str] = []
+    found = certify(solution, time_limit=2.0, progress=names.append)
+    assert found.missing == {"replay": "the time limit was reached"}
+    assert found.replay is None
+    assert found.errors is not None
+    assert names == ["bound", "errors", "hamiltonian", "residual", "replay"]
+
+
+def test_a_certificate_without_time_has_what_needs_none(fine: Solution) -> None:
+    found = certify(fine, time_limit=-1.0)
+    assert set(found.missing) == {"bound", "errors", "hamiltonian", "residual", "replay"}
+    assert set(found.missing.values()) == {"the time limit was reached"}
+    assert found.integral == pytest.approx(certify(fine).integral)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,15 @@ import pytest
 import hovi
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import Grid
-from hovi.planning.refinement.resolution import NEARBY, RESOLVED
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.refinement.resolution import NEARBY, RESOLVED, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from hovi.system.deadline import Deadline
+from samples.paper_arm import HANG, REACH_Q
 
 FAST: dict[str, Any] = {"limits": "none", "processes": 1}
 PANDA_START = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7]
@@ -173,3 +177,39 @@ def test_every_success_has_an_error_estimate() -> None:
         assert found.success, found.message
         assert found.error_estimate is not None
         assert 0 < found.error_estimate <= RESOLVED
+
+
+LATE = "the time limit was reached before it was compared with one on a finer grid"
+
+
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+def test_a_minimum_that_no_time_is_left_to_check_is_not_called_one(
+    arm_scene: Scene, limits: str
+) -> None:
+    problem = hovi.TrajectoryProblem(
+        hovi.DiscreteLagrangian(
+            arm_scene.effort_lagrangian(), Grid.uniform(1.0, 16, by_name("galerkin-2"))
+        ),
+        hovi.State(HANG),
+        hovi.State(REACH_Q),
+        limits=as_limits(arm_scene.robot, limits),
+    )
+    found = solve_on_grid(problem)
+    assert found.success
+    with Deadline(-1.0).in_force():
+        late = resolved(found)
+    assert (late.success, late.status, late.minima) == (False, Status.TIME_LIMIT, ())
+    assert LATE in late.message
+    assert late.trajectory.metadata["status"] == "time_limit"
+    assert resolved(found).success
+
+
+@pytest.mark.parametrize("scheme", ["galerkin-2", "galerkin-2x8", "taylor-midpoint"])
+@pytest.mark.parametrize("name", ["two_link_reach", "panda_reach", "cart_pole_swing_up"])
+def test_a_motion_of_half_an_hour_on_few_intervals_is_no_minimum(name: str, scheme: str) -> None:
+    """As where milliseconds were meant: between the points the arm whirls or falls."""
+    task = hovi.load_task(hovi.example(name))
+    options = {"scheme": scheme, "tolerance": None, "intervals": 16, **FAST}
+    found = hovi.plan_task(dataclasses.replace(task, duration=2000.0), **options, starts=1)
+    assert not found.success
+    assert found.status in (Status.UNRESOLVED, Status.DIVERGED)

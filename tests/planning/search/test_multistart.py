@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
 
-from hovi.discrete.grid import Grid
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
+from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.job import Job
-from hovi.planning.search.multistart import SAME_COST, Pool, default_processes, distinct, explore
+from hovi.planning.search.multistart import (
+    SAME_COST,
+    STARTS_PER_ROUND,
+    Pool,
+    default_processes,
+    distinct,
+    explore,
+)
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -19,6 +28,7 @@ from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.deadline import Deadline
+from hovi.workers.pool import end_idle_workers
 from samples.paper_arm import HANG
 
 
@@ -67,7 +77,7 @@ def test_solutions_come_in_the_order_of_the_guesses(
     job: Job, guesses: list, processes: int
 ) -> None:
     problem = job.problem()
-    found = Pool(job, processes).solve_all(guesses)
+    found = Pool(job, processes).solve_all(guesses).solutions
     assert len(found) == len(guesses)
     for guess, solution in zip(guesses, found, strict=True):
         alone = solve_on_grid(problem, guess)
@@ -77,14 +87,79 @@ def test_solutions_come_in_the_order_of_the_guesses(
 
 
 def test_no_guess_is_no_solution(job: Job) -> None:
-    assert Pool(job, 2).solve_all([]) == []
+    assert Pool(job, 2).solve_all([]).solutions == []
 
 
-def test_a_pool_past_its_deadline_gives_every_guess_back(job: Job, guesses: list) -> None:
-    found = Pool(job, 1, Deadline(-1.0)).solve_all(guesses)
-    assert [solution.status for solution in found] == [Status.TIME_LIMIT] * len(guesses)
-    for guess, solution in zip(guesses, found, strict=True):
-        np.testing.assert_array_equal(solution.trajectory.q, guess.q)
+@pytest.mark.parametrize("processes", [1, 2])
+def test_a_pool_past_its_deadline_gives_the_first_guess_back(
+    job: Job, guesses: list, processes: int
+) -> None:
+    found = Pool(job, processes, Deadline(-1.0)).solve_all(guesses).solutions
+    assert [solution.status for solution in found] == [Status.TIME_LIMIT]
+    np.testing.assert_array_equal(found[0].trajectory.q, guesses[0].q)
+
+
+@pytest.mark.parametrize("program", ["/bin/false", "/nowhere/python"])
+def test_guesses_are_solved_here_if_no_worker_starts(
+    job: Job, guesses: list, program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    alone = Pool(job, 1).solve_all(guesses[:2])
+    end_idle_workers()
+    monkeypatch.setattr(sys, "executable", program)
+    found = Pool(job, 2).solve_all(guesses[:2])
+    assert found.lost == []
+    assert len(found.solutions) == 2
+    assert [each.cost for each in found.solutions] == [each.cost for each in alone.solutions]
+
+
+KILL = "__import__('os').kill(__import__('os').getpid(), 9)"
+
+
+class DeadlyPath(DiscretePath):
+    """A guess that kills the process to which it is sent."""
+
+    def __reduce__(self) -> tuple:
+        return eval, (KILL,)
+
+
+class DeadlyJob(Job):
+    """A job that kills the process to which it is sent."""
+
+    def __reduce__(self) -> tuple:
+        return eval, (KILL,)
+
+
+def test_a_worker_that_is_killed_loses_its_guess_only(job: Job, guesses: list) -> None:
+    deadly = DeadlyPath(*guesses[1].arrays)
+    alone = [solve_on_grid(job.problem(), guess).cost for guess in (guesses[0], guesses[2])]
+    found = Pool(job, 2).solve_all([guesses[0], deadly, guesses[2]])
+    assert [solution.cost for solution in found.solutions] == alone
+    assert len(found.lost) == 1
+    assert "SIGKILL" in found.lost[0]
+    assert not found.interrupted
+
+
+def test_an_exploration_ends_with_a_round_that_every_process_dies_of(
+    job: Job, guesses: list
+) -> None:
+    deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, job.options)
+    found = explore(Pool(deadly, 2), guesses[0], 1000, 0, silent)
+    assert (found.done, len(found.lost)) == (1, STARTS_PER_ROUND)
+    assert found.minima[0].success
+    assert not found.interrupted
+
+
+def test_minima_stay_as_they_are_if_every_process_dies_that_refines_them(
+    job: Job, guesses: list
+) -> None:
+    found = [solve_on_grid(job.problem(), guess) for guess in guesses[:2]]
+    options = job.options.with_changes(processes=2)
+    deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, options)
+    best, *others = FinalStages(deadly, Deadline(), silent).to_requested_grid(found)
+    assert others == []
+    assert (best.success, best.status) == (False, Status.INTERRUPTED)
+    assert best.trajectory is found[0].trajectory
+    assert "the requested grid was not reached, since a worker process was ended" in best.message
 
 
 def test_there_is_at_least_one_processor(job: Job) -> None:

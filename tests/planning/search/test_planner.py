@@ -240,6 +240,15 @@ def test_a_time_limit_leaves_time_for_the_requested_grid(arm_scene: Scene) -> No
     assert found.status in (Status.MINIMUM, Status.TIME_LIMIT)
 
 
+def test_a_grid_that_takes_longer_than_the_limit_is_not_begun(arm_scene: Scene) -> None:
+    found = swing_up(arm_scene, intervals=1_000_000, time_limit=1.0)
+    assert (found.success, found.status) == (False, Status.TIME_LIMIT)
+    assert "too little time" in found.message
+    assert "1,000,000 intervals" in found.message
+    assert found.trajectory.grid.intervals == COARSE_INTERVALS
+    np.testing.assert_array_equal(found.trajectory.q[-1], -HANG)
+
+
 def test_without_time_the_guess_is_returned_with_its_status(arm_scene: Scene) -> None:
     found = swing_up(arm_scene, time_limit=1e-9)
     assert (found.success, found.status) == (False, Status.TIME_LIMIT)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +12,13 @@ import pytest
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import check_path, regularized
+from hovi.discrete.interval_batch import CHUNK
 from hovi.discrete.state import State
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects import Gravity
 from hovi.errors import InputError
+from hovi.planning.problem.goals import Via
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.non_finite import non_finite_sentence
@@ -27,6 +31,7 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
+from hovi.system.deadline import Deadline, OutOfTimeError
 from oracles.finite_differences import derivative
 from oracles.ipopt_oracle import least_action
 from samples.paper_arm import HANG, REACH_COST, REACH_Q, REACH_V, REST, extremal
@@ -365,6 +370,57 @@ def test_the_iteration_limit_gives_the_best_so_far(arm_scene: Scene) -> None:
     assert "iteration limit was reached after 2 steps" in stopped.message
     assert stopped.minima == ()
     assert_fits(problem, stopped)
+
+
+KINDS = ("plain", "limited", "constrained")
+
+
+def problem_of(kind: str, scene: Scene) -> TrajectoryProblem:
+    problem = problem_on(scene, goal=State(REACH_Q))
+    if kind == "limited":
+        return dataclasses.replace(problem, limits=as_limits(scene.robot, {"tau": 400.0}))
+    return problem if kind == "plain" else dataclasses.replace(problem, via=(HALFWAY,))
+
+
+HALFWAY = Via(0.5, State(REACH_Q))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_deadline_of_the_caller_ends_a_solve(arm_scene: Scene, kind: str) -> None:
+    problem = problem_of(kind, arm_scene)
+    with Deadline(-1.0).in_force():
+        late = solve_on_grid(problem)
+    assert (late.success, late.status, late.nit) == (False, Status.TIME_LIMIT, 0)
+    assert "the time limit was reached" in late.message
+    assert_fits(problem, late)
+    assert solve_on_grid(problem).success
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_time_limit_ends_a_solve_between_two_steps(arm_scene: Scene, kind: str) -> None:
+    problem, limit = problem_of(kind, arm_scene), 1.0
+
+    def wait(step: int, cost: float) -> None:
+        if step == 2:
+            time.sleep(limit)
+
+    late = solve_on_grid(problem, time_limit=limit, report=wait)
+    assert (late.success, late.status) == (False, Status.TIME_LIMIT)
+    assert late.nit <= 2
+    assert_fits(problem, late)
+
+
+def test_a_deadline_ends_an_evaluation_of_many_intervals(arm_scene: Scene) -> None:
+    several = problem_on(arm_scene, intervals=CHUNK + 1)
+    path = guess_path(several, "cubic")
+    model = ActionObjective(several).model(path, None, None)
+    with Deadline(-1.0).in_force():
+        with pytest.raises(OutOfTimeError):
+            several.ld.expand(path)
+        with pytest.raises(OutOfTimeError):
+            model.factor(0.0)
+        one = problem_on(arm_scene)
+        one.ld.expand(guess_path(one, "cubic"))
 
 
 def test_another_newton_step_changes_nothing(arm_scene: Scene) -> None:

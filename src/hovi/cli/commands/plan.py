@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from hovi.cli.reports.limit_margins import Margins
     from hovi.discrete.trajectory import Trajectory
     from hovi.planning.refinement.certificate import Certificate
+    from hovi.planning.search.job import Progress
     from hovi.planning.solver.solver import Solution
     from hovi.planning.task_file.task import Task
+    from hovi.system.deadline import Deadline
 
 GUESSES = ("cubic", "minimum-jerk")
 LIMITS = ("urdf", "none")
 MAX_CERTIFIED_INTERVALS = 2000
 """Largest number of intervals for which a certificate is computed."""
+CERTIFICATE_SECONDS = 30.0
+"""Time in [s] after which a certificate ends without the rest, if there is no time limit."""
+
+MARGIN_SECONDS = 1.0
+"""Time in [s] that the margins to limits and obstacles have in any case."""
 
 
 def plan(
@@ -129,7 +137,9 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     from hovi.cli.reports.progress import progress
     from hovi.errors import TrajectoryFileError
     from hovi.planning.task_file.task_plan import plan_task
+    from hovi.system.deadline import Deadline
 
+    deadline = Deadline(task.options.time_limit_seconds)
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
     written, save_error = out, None
@@ -138,24 +148,49 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
             solution.trajectory.save(written)
         except TrajectoryFileError as error:
             written, save_error = None, error  # the report is printed all the same
-    certificate = _certificate(solution) if certified else None
+    with progress(quiet=json) as report:
+        certificate = _certificate(solution, deadline, report) if certified else None
+        margins = _margins(solution, deadline, report)
     if json:
-        print(as_json(solution, task, written, certificate))
+        print(as_json(solution, task, written, margins, certificate))
     else:
-        print_report(solution, task, written, certificate)
+        print_report(solution, task, written, margins, certificate)
     if save_error is not None:
         raise save_error
     return 0 if solution.success else 1
 
 
-def _certificate(solution: Solution) -> Certificate | None:
-    """The certificate of a minimum; None without a minimum or for too many intervals."""
+def _margins(solution: Solution, deadline: Deadline, report: Progress | None) -> Margins:
+    """The margins of the report, for which there is a second after the deadline, too."""
+    from hovi.cli.reports.limit_margins import Margins
+    from hovi.system.deadline import Deadline
+
+    if report is not None:
+        report("margins to limits and obstacles", 1.0)
+    left = deadline.seconds_left
+    return Margins.of(solution, Deadline(None if left is None else max(left, MARGIN_SECONDS)))
+
+
+def _certificate(
+    solution: Solution, deadline: Deadline, report: Progress | None
+) -> Certificate | None:
+    """The certificate of a minimum; None without a minimum or for too many intervals.
+
+    It ends at the deadline, or after CERTIFICATE_SECONDS if there is none.
+    """
     from hovi.planning.refinement.certificate import certify
 
     problem = solution.problem
     if problem is None or not solution.success or problem.grid.intervals > MAX_CERTIFIED_INTERVALS:
         return None
+    left = deadline.seconds_left
+    seconds = CERTIFICATE_SECONDS if left is None else left
     try:
-        return certify(solution, estimate=not (problem.limited or problem.constrained))
+        return certify(
+            solution,
+            estimate=not (problem.limited or problem.constrained),
+            time_limit=seconds,
+            progress=None if report is None else lambda name: report(f"certificate: {name}", 1.0),
+        )
     except KeyboardInterrupt:  # the report is printed without it
         return None

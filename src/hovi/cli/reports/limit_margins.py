@@ -15,6 +15,7 @@ from hovi.planning.problem.limit_violation import AT_LIMIT
 from hovi.planning.problem.limit_violation import closeness as margins_along
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 
 Array = npt.NDArray[np.float64]
@@ -81,6 +82,30 @@ def least_distance(motion: Solution | Trajectory) -> float | None:
     clearance, distances = kept
     approach = approach_along(_trajectory_of(motion), distances, clearance.margin)
     return float(approach.distance.min())
+
+
+@dataclass(frozen=True)
+class Margins:
+    """The margins to limits and obstacles that a report shows.
+
+    limits, distance: as limit_margins and least_distance; None without limits or obstacles.
+    missing: why the rest is not known; "" if all is.
+    """
+
+    limits: LimitMargins | None = None
+    distance: float | None = None
+    missing: str = ""
+
+    @classmethod
+    def of(cls, solution: Solution, deadline: Deadline) -> Margins:
+        """The margins that are known by a deadline; distances of long motions take minutes."""
+        limits = None
+        try:
+            with deadline.in_force():
+                limits = limit_margins(solution)
+                return cls(limits, least_distance(solution))
+        except OutOfTimeError as late:
+            return cls(limits, missing=str(late))
 
 
 def _trajectory_of(motion: Solution | Trajectory) -> Trajectory:

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines
-from hovi.cli.reports.limit_margins import LimitMargins, least_distance, limit_margins
+from hovi.cli.reports.limit_margins import LimitMargins, Margins
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.terminal_table import print_table, terminal_table
 from hovi.planning.refinement.certificate import Certificate
@@ -22,11 +22,15 @@ from hovi.system.files import finite
 
 
 def as_json(
-    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+    solution: Solution,
+    task: Task,
+    out: Path | None,
+    margins: Margins,
+    certificate: Certificate | None = None,
 ) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
     trajectory = solution.trajectory
-    margins = limit_margins(solution)
+    limits = margins.limits
     fields = {
         "success": bool(solution.success),
         "status": str(solution.status),
@@ -43,9 +47,9 @@ def as_json(
         "seed": task.options.seed,
         "minima": list(solution.minima),
         "peaks": _peaks_json(peaks(trajectory)),
-        "limits": None if margins is None else margins.by_kind(),
-        "excess": None if margins is None else margins.excess,
-        "least_distance": least_distance(solution),
+        "limits": None if limits is None else limits.by_kind(),
+        "excess": None if limits is None else limits.excess,
+        "least_distance": margins.distance,
         "out": None if out is None else str(out),
         **accuracy_json(solution, task),
         "certificate": None if certificate is None else certificate_json(certificate),
@@ -54,23 +58,30 @@ def as_json(
 
 
 def print_report(
-    solution: Solution, task: Task, out: Path | None, certificate: Certificate | None = None
+    solution: Solution,
+    task: Task,
+    out: Path | None,
+    margins: Margins,
+    certificate: Certificate | None = None,
 ) -> None:
     """Print a summary, the peaks of the motion, the certificate and the output file."""
     for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
-    extremes, margins = peaks(solution.trajectory), limit_margins(solution)
-    if margins is not None:
-        print_table(_margins_table(extremes, margins), width=120)
-        print(_margins_note(margins))
+    extremes = peaks(solution.trajectory)
+    if margins.limits is not None:
+        print_table(_margins_table(extremes, margins.limits), width=120)
+        print(_margins_note(margins.limits))
     else:
         print_table(_peaks_table(extremes), width=120)
         if any(each.any() for each in extremes.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
-    distance = least_distance(solution)
-    if distance is not None:
+    if margins.missing:
+        print(f"margins  none: {margins.missing}")
+    if margins.distance is not None:
         kept = task.options.clearance.margin
-        print(f"distance {distance:.4g} m at the nearest approach, the margin is {kept:g} m")
+        print(
+            f"distance {margins.distance:.4g} m at the nearest approach, the margin is {kept:g} m"
+        )
     if certificate is not None:
         for label, text in certificate_lines(certificate):
             print(f"{label:9s}{text}")

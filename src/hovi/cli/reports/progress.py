@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hovi.planning.search.job import Progress
 
-BAR_DELAY = 1.0  # [s] before the bar appears
-LINE_PERIOD = 10.0  # [s] between plain lines
+BAR_DELAY = 1.0
+"""Time in [s] before the bar appears."""
+LINE_PERIOD = 10.0
+"""Time in [s] between plain lines."""
 
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Progress | None]:
-    """The `progress` argument of `hovi.plan`; None when quiet."""
+    """The `progress` argument of `hovi.plan`; None when quiet.
+
+    What was reported last is shown with the time since the beginning, also while nothing new is.
+    """
     if quiet:
         yield None
-    elif sys.stderr.isatty():
-        with _progress_bar() as report:
-            yield _harmless(report)
-    else:
-        yield _harmless(_plain_lines())
+        return
+    shown = _progress_bar() if sys.stderr.isatty() else _plain_lines()
+    with shown as report:
+        yield _harmless(report)
 
 
 def _harmless(report: Progress) -> Progress:
@@ -46,27 +51,49 @@ def _progress_bar() -> Iterator[Progress]:
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     bar = Bar(*columns, console=Console(stderr=True), transient=True)
     line = bar.add_task("", total=1.0)
-    began = time.monotonic()
 
     def report(text: str, fraction: float) -> None:
-        if time.monotonic() - began >= BAR_DELAY:
-            bar.start()
         bar.update(line, description=text.replace("[", r"\["), completed=fraction)
 
-    try:
-        yield report
-    finally:
-        with suppress(OSError):
-            bar.stop()
+    with _every(BAR_DELAY, bar.start):  # again and again, which does nothing
+        try:
+            yield report
+        finally:
+            with suppress(OSError):
+                bar.stop()
 
 
-def _plain_lines() -> Progress:
-    last = time.monotonic()
+@contextmanager
+def _plain_lines() -> Iterator[Progress]:
+    began, last = time.monotonic(), ("planning", 0.0)
 
     def report(text: str, fraction: float) -> None:
         nonlocal last
-        if time.monotonic() - last >= LINE_PERIOD:
-            last = time.monotonic()
-            print(f"{100 * fraction:3.0f} % {text}", file=sys.stderr, flush=True)
+        last = text, fraction
 
-    return report
+    def show() -> None:
+        text, fraction = last
+        seconds = time.monotonic() - began
+        print(f"{100 * fraction:3.0f} % {text} ({seconds:.0f} s)", file=sys.stderr, flush=True)
+
+    with _every(LINE_PERIOD, show):
+        yield report
+
+
+@contextmanager
+def _every(seconds: float, action: Callable[[], None]) -> Iterator[None]:
+    """Call an action in a thread of its own, again and again until the context ends."""
+    ended = threading.Event()
+
+    def repeat() -> None:
+        while not ended.wait(seconds):
+            with suppress(OSError):  # stderr may be closed
+                action()
+
+    thread = threading.Thread(target=repeat, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()

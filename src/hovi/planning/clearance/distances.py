@@ -22,6 +22,7 @@ from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.robot.mimic_model import column_sums
 from hovi.robot.robot import Robot
 from hovi.robot.srdf import checked_pairs
+from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 
@@ -98,6 +99,7 @@ class Distances:
         self._reset_solvers()
         distances = np.empty((len(q), len(self.pairs)))
         for row, one in zip(distances, q, strict=True):
+            raise_if_late()
             self._measure(one)
             row[:] = [result.min_distance for result in self._results]
         return distances
@@ -111,6 +113,7 @@ class Distances:
         distances = np.empty((len(q), len(self.pairs)))
         contacts = _Contacts.none(len(q), len(self.pairs), self.robot.model.nvExtended)
         for p, one in enumerate(q):
+            raise_if_late()
             self._measure(one)
             distances[p] = [result.min_distance for result in self._results]
             self._record(contacts, p, np.flatnonzero(distances[p] < reach))
@@ -136,6 +139,7 @@ class Distances:
         self._reset_solvers()
         contacts = _Contacts.none(len(moved), len(self.pairs), self.robot.model.nvExtended)
         for i, one in enumerate(moved):
+            raise_if_late()
             chosen = pairs[i // (1 + nv)]
             self._place(one)
             for k in chosen:

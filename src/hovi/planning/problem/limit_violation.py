@@ -10,6 +10,7 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
 from hovi.robot.robot import Robot
+from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 
@@ -53,12 +54,14 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     Every interval is sampled, and again more densely around all extremes that are near a bound:
     a motion along a bound has several, and the highest sample need not be next to the highest one.
     """
+    raise_if_late()
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     s = np.linspace(0.0, 1.0, SAMPLES)
     outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
     outputs = outputs.reshape(N, SAMPLES, 4, nv)
     sides = []
     for sign, bound in ((-1.0, limits.lower), (1.0, limits.upper)):
+        raise_if_late()
         outside = sign * (outputs - bound) / limits.ranges
         index = np.argmax(outside, axis=1)  # (N, 4, nv)
         largest = np.take_along_axis(outside, index[:, None], axis=1)[:, 0]

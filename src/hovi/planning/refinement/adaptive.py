@@ -23,7 +23,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import (
     interrupted,
     interruptible,
@@ -128,15 +128,18 @@ class _Search:
         """Refine until the error is within the tolerance, or no further progress is possible."""
         self.best = Candidate(solution, self.tolerance)
         try:
-            reason = self._refine(solution)
+            self.best = self._evaluated(solution)  # also without time for another grid
+            with self.deadline.in_force():
+                reason = self._refine(self.best)
+        except OutOfTimeError as late:
+            reason = str(late)
         except KeyboardInterrupt:
             record_interrupt()
             reason = "it was interrupted"
         return self._finished(self.best, reason)
 
-    def _refine(self, solution: Solution) -> str:
-        """Run the rounds; returns why they ended early, or ""."""
-        candidate = self.best = self._evaluated(solution)
+    def _refine(self, candidate: Candidate) -> str:
+        """Run the rounds after the first; returns why they ended early, or ""."""
         if self.restart is not None and _hides(candidate):
             candidate = self.best = self._evaluated(self.restart())
         stalled = 0

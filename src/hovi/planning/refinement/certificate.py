@@ -21,6 +21,7 @@ from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import interruptible
 
 Array = npt.NDArray[np.float64]
@@ -83,12 +84,21 @@ class Certificate:
 
 @check_arguments_except("solution")
 @interruptible
-def certify(solution: Solution, frame: str | None = None, *, estimate: bool = True) -> Certificate:
+def certify(
+    solution: Solution,
+    frame: str | None = None,
+    *,
+    estimate: bool = True,
+    time_limit: float | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> Certificate:
     """The certificate of a solution.
 
     frame: whose errors are reported, by default that of the tolerance, or else the one of the
         robot's tip_frames with the largest error. estimate: whether errors are estimated if the
         solution has no estimate, which takes another solve.
+    time_limit: in [s]. Checks that it ends, or that it leaves no time for, are missing.
+    progress: called with the name of each check that may take long, before it begins.
     Raises InputError if the solution has no problem, or for a frame that is unknown or does not
     move.
     """
@@ -98,11 +108,15 @@ def certify(solution: Solution, frame: str | None = None, *, estimate: bool = Tr
         raise InputError("this solution has no problem; call plan again instead.")
     problem.robot.measured_frames(frame)  # raises for a frame that is unknown or fixed
     missing: dict[str, str] = {}
+    deadline, report = Deadline(time_limit), progress or (lambda name: None)
 
     def checked(name: str, statement: Callable[[], T]) -> T | None:
+        report(name)
         try:
-            return statement()
-        except InputError as reason:
+            with deadline.in_force():
+                raise_if_late()
+                return statement()
+        except (InputError, OutOfTimeError) as reason:
             missing[name] = str(reason).removesuffix(".")
             return None
 
@@ -162,6 +176,7 @@ def _errors(solution: Solution, frame: str | None, estimate: bool) -> MotionErro
         raise InputError("not estimated, as it takes another solve; plan with a tolerance")
     found = estimate_error(solution, frame)
     if found is None:
+        raise_if_late()
         raise InputError("no nearby solution was found on a finer grid")
     return found
 

@@ -15,6 +15,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, minimum_at
+from hovi.system.deadline import raise_if_late
 
 MAX_HESSIANS = 5
 """Maximum number of Hessians that are factored."""
@@ -63,6 +64,7 @@ class NearbyMinimum:
         model: QuadraticModel | None = self.model if self.distance <= MAX_REUSE_DISTANCE else None
         factor, steps, length = self.factor, self.steps, np.inf
         for _ in range(MAX_POLISHING_STEPS):
+            raise_if_late()
             if model is None:
                 model, last = objective.model(x, None, None), np.inf
                 renewed = model.factor(0.0)
@@ -104,6 +106,7 @@ def nearby_minimum(
     """
     began, longest, steps, before = time.perf_counter(), 0.0, 0, np.inf
     for _ in range(MAX_HESSIANS):
+        raise_if_late()
         factor = model.factor(0.0)
         if factor is None:
             return None

@@ -29,6 +29,7 @@ from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.deadline import OutOfTimeError, is_late
 from hovi.system.interruption import interruptible
 
 RESOLVED = 0.01
@@ -65,21 +66,32 @@ def resolved(solution: Solution) -> Solution:
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
     and if no light joint without limits whirls so fast that no grid can be trusted.
-    Solutions of another status are returned unchanged.
+    Solutions of another status are returned unchanged. If the deadline in force passes before
+    (a) to (c) are known, the status is TIME_LIMIT.
     """
     if not solution.success or solution.problem is None:
         return solution
-    reason = _difference_along(solution)
-    if not reason and solution.error_estimate is None:
-        solution, reason = _compared(solution)
-    elif not reason:
-        reason = _estimate_sentence(solution.error_estimate)
-    reason = reason or _whirling_sentence(solution)
+    try:
+        solution, reason = _checked(solution)
+    except OutOfTimeError:
+        return _not_checked(solution)
+    if reason and is_late():  # perhaps only as the finer solve was ended
+        return _not_checked(solution)
     if reason:
         return _unresolved(solution, reason)
     assert solution.error_estimate is not None
     passed = Resolution(solution.trajectory.path, solution.error_estimate)
     return dataclasses.replace(solution, check=passed)
+
+
+def _checked(solution: Solution) -> tuple[Solution, str]:
+    """The solution with an estimate, and why it is no minimum along its way, or ""."""
+    reason = _difference_along(solution)
+    if not reason and solution.error_estimate is None:
+        solution, reason = _compared(solution)
+    elif not reason:
+        reason = _estimate_sentence(solution.error_estimate)
+    return solution, reason or _whirling_sentence(solution)
 
 
 def told_as_whirling(solution: Solution) -> Solution:
@@ -199,13 +211,27 @@ def _with_estimate(solution: Solution, estimate: float) -> Solution:
 
 
 def _unresolved(solution: Solution, reason: str) -> Solution:
-    """The solution with the status, and a message with the figures and what to do."""
-    problem, status = solution.problem, Status.UNRESOLVED
-    assert problem is not None
+    """The solution as no success, with the figures and what to do."""
+    assert solution.problem is not None
     message = (
-        f"the motion is a minimum on {problem.grid.intervals} intervals, but not along its whole "
-        f"way: {reason}; {_remedy(solution)}."
+        f"the motion is a minimum on {solution.problem.grid.intervals} intervals, but not along "
+        f"its whole way: {reason}; {_remedy(solution)}."
     )
+    return _failed(solution, Status.UNRESOLVED, message)
+
+
+def _not_checked(solution: Solution) -> Solution:
+    """The solution as no success, since it is not known what lies between its points."""
+    assert solution.problem is not None
+    message = (
+        f"the motion is a minimum on {solution.problem.grid.intervals} intervals, of cost "
+        f"{solution.cost:.10g}, but the time limit was reached before it was compared with one on "
+        "a finer grid; allow more time."
+    )
+    return _failed(solution, Status.TIME_LIMIT, message)
+
+
+def _failed(solution: Solution, status: Status, message: str) -> Solution:
     metadata = {**solution.trajectory.metadata, "status": str(status)}
     trajectory = dataclasses.replace(solution.trajectory, metadata=metadata)
     return dataclasses.replace(

@@ -35,6 +35,8 @@ MAX_CHART_ROUNDS = 4
 """Maximum number of rounds that halve intervals in which an orientation turns too far."""
 MAX_REFINED = 6
 """Maximum number of coarse minima that are refined and ranked."""
+LEAST_STEPS = 2
+"""Number of steps on the requested grid without time for which it is not tried."""
 _Each = TypeVar("_Each")
 
 
@@ -50,13 +52,29 @@ class FinalStages:
     progress: Progress
 
     def to_requested_grid(self, found: list[Solution]) -> list[Solution]:
-        """The best minima on the requested grid, ranked there."""
+        """The best minima on the requested grid, ranked there.
+
+        If the time left is too short for a few steps there, the best motion so far.
+        """
+        if not self.deadline.allows(LEAST_STEPS * self._step_seconds(found[0])):
+            reached = f"the requested grid of {self.fine.grid.intervals:,} intervals was reached"
+            why = f"the time limit leaves too little time for a solve before {reached}"
+            return [ended_early(found[0], Status.TIME_LIMIT, why)]
         problem = self.fine.problem()
         guesses = [guess_path(problem, s.trajectory) for s in found[:MAX_REFINED]]
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
         processes = self.fine.options.processes or default_processes()
         pool = Pool(self.fine, processes if len(guesses) > 1 else 1, self.deadline)
-        return distinct(pool.solve_all(guesses))
+        solved = pool.solve_all(guesses)
+        if not solved.solutions:
+            why = f"the requested grid was not reached, since {solved.lost[0]}"
+            return [ended_early(found[0], Status.INTERRUPTED, why)]
+        return distinct(solved.solutions)
+
+    def _step_seconds(self, coarse: Solution) -> float:
+        """Estimated time of a step on the requested grid, from that on a coarser one, in [s]."""
+        step = coarse.solve_seconds / max(coarse.nit, 1)
+        return step * self.fine.grid.intervals / coarse.trajectory.grid.intervals
 
     def to_tolerance(self, tolerance: Tolerance, found: list[Solution]) -> list[Solution]:
         """The best minima to a tolerance, each on its own grid."""
@@ -151,6 +169,15 @@ class FinalStages:
     def _solve(self, job: Job, guess: Trajectory) -> Solution:
         left, most = self.deadline.seconds_left, job.options.max_iterations
         return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
+
+
+def ended_early(best: Solution, status: Status, why: str) -> Solution:
+    """The best motion so far, without success. why: a clause."""
+    message = (
+        f"{why}; the motion is the best so far, on {best.trajectory.grid.intervals} intervals of "
+        f"{best.trajectory.duration:.6g} s, of cost {best.cost:.10g}."
+    )
+    return dataclasses.replace(best, success=False, status=status, message=message)
 
 
 def has_few_points(job: Job) -> bool:

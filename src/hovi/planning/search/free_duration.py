@@ -22,6 +22,7 @@ from hovi.errors import InputError
 from hovi.planning.search.continuation import STOPPED
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
 SolveFor = Callable[[float, Trajectory], Solution]
@@ -234,6 +235,8 @@ class _Search:
                 self._take(self._at(T, self.here))
         except _StoppedError as stopped:
             return self._best().unfinished(stopped.status, stopped.reason)
+        except OutOfTimeError:
+            return self._best().unfinished(Status.TIME_LIMIT, _reason(Status.TIME_LIMIT))
         except KeyboardInterrupt:  # between two solves, which handle their own
             record_interrupt()
             return self._best().unfinished(Status.INTERRUPTED, _reason(Status.INTERRUPTED))

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import signal
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
-from multiprocessing.resource_tracker import ensure_running
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,7 @@ from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
+from hovi.workers.lost import Lost
 
 Array = npt.NDArray[np.float64]
 
@@ -36,6 +37,19 @@ PERTURBED_MINIMA = 4
 """Number of minima that a round perturbs."""
 SAME_COST = 1e-6
 """Relative difference in cost up to which two minima count as the same."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """The results of solves from several guesses.
+
+    solutions: in the order of the guesses. lost: why others have none, as their process died.
+    interrupted: whether Ctrl-C ended them.
+    """
+
+    solutions: list[Solution]
+    lost: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
 
 @dataclass(eq=False)
@@ -49,53 +63,60 @@ class Pool:
     processes: int
     deadline: Deadline = field(default_factory=Deadline)
 
-    def solve_all(self, guesses: Sequence[DiscretePath]) -> list[Solution]:
-        """The solutions, in the order of the guesses."""
-        left = self.deadline.seconds_left
-        count = min(self.processes, len(guesses))
-        if count <= 1:
-            return _solve_chunk(self.job, guesses, left)
-        import joblib  # takes 60 ms to import, and is not needed for one process
+    def solve_all(self, guesses: Sequence[DiscretePath]) -> Solved:
+        """The solutions from the guesses, without those whose process died.
 
-        solve_chunk = joblib.delayed(_solve_chunk)
-        chunks = [guesses[i::count] for i in range(count)]
-        with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
-            _start_workers(count)
-            parts = joblib.Parallel(n_jobs=count)(solve_chunk(self.job, c, left) for c in chunks)
-        solutions: list[Solution | None] = [None] * len(guesses)
-        for i, part in enumerate(parts):
-            solutions[i : i + count * len(part) : count] = part
-        return [solution for solution in solutions if solution is not None]
+        If worker processes cannot be started, the guesses are solved in this one. Raises
+        KeyboardInterrupt after an interrupt if there is no solution yet.
+        """
+        results: dict[int, Solution | Lost] = {}
+        try:
+            if min(self.processes, len(guesses)) > 1:
+                self._in_workers(guesses, results)
+            self._here(guesses, results)
+        except KeyboardInterrupt:
+            record_interrupt()
+            if not results:
+                raise
+            return _solved(results, interrupted=True)
+        return _solved(results)
+
+    def _in_workers(
+        self, guesses: Sequence[DiscretePath], results: dict[int, Solution | Lost]
+    ) -> None:
+        """Add the results of worker processes."""
+        from hovi.workers.pool import results_in_workers  # not needed for one process
+
+        work = partial(_solve, self.job)
+        found = results_in_workers(work, guesses, self.processes, self.deadline)
+        with closing(found):
+            results.update(found)
+
+    def _here(self, guesses: Sequence[DiscretePath], results: dict[int, Solution | Lost]) -> None:
+        """Add the results that are missing; none of them if the time limit is why."""
+        for i, guess in enumerate(guesses):
+            if i in results:
+                continue
+            if results and self.deadline.passed:
+                return
+            results[i] = solution = _solve(self.job, guess, self.deadline.seconds_left)
+            if solution.status is Status.INTERRUPTED:
+                return
 
 
-def _start_workers(count: int) -> None:
-    """Start worker processes that ignore Ctrl-C; the main process handles it and ends them.
-
-    A terminal sends SIGINT to all processes; a worker that is still importing would print an error.
-    """
-    import joblib
-
-    ensure_running()  # otherwise Python does so later and unblocks SIGINT
-    previous = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        joblib.Parallel(n_jobs=count)(joblib.delayed(abs)(i) for i in range(count))
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, previous)
+def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> Solved:
+    ordered = [results[i] for i in sorted(results)]
+    lost = [each.reason for each in ordered if isinstance(each, Lost)]
+    solutions = [each for each in ordered if not isinstance(each, Lost)]
+    ended = interrupted or any(each.status is Status.INTERRUPTED for each in solutions)
+    return Solved(solutions, lost, ended)
 
 
-def _solve_chunk(
-    job: Job, guesses: Sequence[DiscretePath], time_limit: float | None
-) -> list[Solution]:
-    problem, most = job.problem(), job.options.max_iterations
-    deadline = Deadline(time_limit)
-    solutions = []
-    for guess in guesses:
-        left = deadline.seconds_left
-        solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=left)
-        solutions.append(dataclasses.replace(solution, problem=None))
-        if solution.status is Status.INTERRUPTED:
-            break
-    return solutions
+def _solve(job: Job, guess: DiscretePath, time_limit: float | None) -> Solution:
+    """The solution from one guess, without the problem, which is not sent."""
+    most = job.options.max_iterations
+    solution = solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=time_limit)
+    return dataclasses.replace(solution, problem=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +125,13 @@ class Exploration:
 
     minima: distinct minima by ascending cost; the best other solution if there are none.
     done: number of starts that were solved. interrupted: whether Ctrl-C ended the exploration.
+    lost: why starts have no solution, as the process that solved them died, one reason for each.
     """
 
     minima: list[Solution]
     done: int
     interrupted: bool
+    lost: tuple[str, ...] = ()
 
 
 def explore(
@@ -117,34 +140,29 @@ def explore(
     """Solve from many starts, beginning with the first guess.
 
     starts: number of solves. seed: of the random bumps.
-    KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far.
+    KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far, and so
+    does a round of which every process dies.
     """
-    interrupted = False
-    solutions: list[Solution] = []
+    one = pool.solve_all([first])
+    solutions, lost = one.solutions, one.lost
+    ended = stopped = one.interrupted
     try:
-        solutions += pool.solve_all([first])
-        while len(solutions) < starts and not _ended(pool, solutions):
-            guesses = _round(pool.job, distinct(solutions), first, len(solutions), starts, seed)
-            solutions += pool.solve_all(guesses)
+        while not (ended or pool.deadline.passed):
+            tried = len(solutions) + len(lost)
+            if tried >= starts:
+                break
+            guesses = _round(pool.job, distinct(solutions), first, tried, starts, seed)
+            found = pool.solve_all(guesses)
+            solutions, lost = solutions + found.solutions, lost + found.lost
+            stopped = found.interrupted
+            ended = stopped or not found.solutions
             best = min(solution.cost for solution in solutions)
-            progress(
-                f"{len(solutions)} of {starts} starts, least cost {best:.6g}",
-                len(solutions) / starts,
-            )
+            text = f"{len(solutions)} of {starts} starts, least cost {best:.6g}"
+            progress(text, (len(solutions) + len(lost)) / starts)
     except KeyboardInterrupt:
-        if not solutions:
-            raise
         record_interrupt()
-        interrupted = True
-    interrupted = interrupted or any(s.status is Status.INTERRUPTED for s in solutions)
-    return Exploration(distinct(solutions), len(solutions), interrupted)
-
-
-def _ended(pool: Pool, solutions: Sequence[Solution]) -> bool:
-    """Whether the deadline has passed or a solve was interrupted."""
-    if any(solution.status is Status.INTERRUPTED for solution in solutions):
-        return True
-    return pool.deadline.passed
+        stopped = True
+    return Exploration(distinct(solutions), len(solutions), stopped, tuple(lost))
 
 
 def _round(

@@ -102,16 +102,18 @@ def plan(
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = options.with_changes(**changes).on(scene.robot)
+    deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
     grid = _grid(T, chosen, scene.robot, free is not None)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
     for bound in () if free is None else (free.lower, free.upper):
         grid.stretched(bound)  # raises for steps that are too short or too long
-    search = Search(job, Deadline(chosen.time_limit_seconds), progress or _silent, free)
+    search = Search(job, deadline, progress or _silent, free)
     problem = job.problem()  # raises for invalid input before the search
     started = time.perf_counter()
-    best, minima = search.run()
+    with deadline.in_force():
+        best, minima = search.run()
     return dataclasses.replace(
         best,
         problem=best.problem or on_grid_of(problem, best),

@@ -15,6 +15,7 @@ from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve
 from hovi.planning.search.final_stages import (
     MAX_REFINED,
     FinalStages,
+    ended_early,
     has_few_points,
     on_grid_of,
     with_more_points,
@@ -25,13 +26,15 @@ from hovi.planning.search.multistart import Exploration, Pool, default_processes
 from hovi.planning.solver.solver import Solution, guess_path
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
 COARSE_INTERVALS = 60
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""
 EXPLORATION_SHARE = 0.7
 """Share of the time limit for the exploration, if its minima are refined afterwards."""
+SOLVING_SHARE = 0.9
+"""Share of the time limit for solving, if the best motion is compared with a finer grid after."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +103,20 @@ class Search:
         try:
             for better in self._stages(job, found):
                 found = better
-        except KeyboardInterrupt:
-            record_interrupt()
-            found = _interrupted(found[0])
-        found = self._resolved(found)
+        except (KeyboardInterrupt, OutOfTimeError) as stopped:
+            found = _ended(found, stopped, "the requested grid or the best duration was reached")
+        try:
+            found = self._resolved(found)
+        except KeyboardInterrupt as stopped:
+            found = _ended(found, stopped, "the motion was compared with one on a finer grid")
         best = self._with_ending(found[0], explored)
         return best, tuple(s.cost for s in found if s.success)
 
     def _resolved(self, found: list[Solution]) -> list[Solution]:
         """The minima from the cheapest resolved one on; the cheapest one if none is resolved."""
         checked: list[Solution] = []
+        if found[0].success:
+            self.progress("comparing with a finer grid", 0.95)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
             checked.append(resolved(dataclasses.replace(solution, problem=problem)))
@@ -139,7 +146,7 @@ class Search:
         """The minima from all starts; uses a share of the time if they are refined afterwards."""
         options = job.options
         whole = job is self.fine and job.tolerance is None and self.free is None
-        deadline = self.deadline if whole else self.deadline.part(EXPLORATION_SHARE)
+        deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline)
         first = guess_path(job.problem(), options.guess)
         return explore(pool, first, options.starts, options.seed, self.progress)
@@ -147,7 +154,9 @@ class Search:
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
         options = self.fine.options
-        if interrupted() or not options.continuation or not may_help(found[0]):
+        if interrupted() or self.deadline.passed or not options.continuation:
+            return found
+        if not may_help(found[0]):
             return found
         if self.fine.tolerance is not None:
             known = dataclasses.replace(found[0], problem=on_grid_of(job.problem(), found[0]))
@@ -160,7 +169,8 @@ class Search:
 
         Raises KeyboardInterrupt if an interrupt came before the last stage.
         """
-        stages = FinalStages(self.fine, self.deadline, self.progress)
+        share = SOLVING_SHARE if self.fine.tolerance is None else 1.0
+        stages = FinalStages(self.fine, self.deadline.part(share), self.progress)
         yield (found := self._continued(job, found))
         if self.fine.tolerance is not None and self.free is None:
             raise_if_interrupted()
@@ -175,14 +185,15 @@ class Search:
 
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
         """The best solution, with a note in its message if the search ended early."""
-        starts = self.fine.options.starts
-        if explored.done < starts:
-            ended = f"The search ended after {explored.done} of {starts} starts."
+        starts, lost = self.fine.options.starts, len(explored.lost)
+        if explored.done + lost < starts:
+            best = _with_note(best, f"The search ended after {explored.done} of {starts} starts.")
         elif interrupted() and best.success:
-            ended = "The search was interrupted."
-        else:
-            return best
-        return _with_note(best, ended)
+            best = _with_note(best, "The search was interrupted.")
+        if lost > 0:
+            causes = " or ".join(dict.fromkeys(explored.lost))
+            best = _with_note(best, f"Lost {lost} of {starts} starts: {causes}.")
+        return best
 
 
 def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
@@ -191,6 +202,14 @@ def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
     if found.success or found.status not in UNUSABLE:
         return (0 if found.success else 1), 0.0
     return 2, -fine.grid.duration
+
+
+def _ended(found: list[Solution], stopped: BaseException, what: str) -> list[Solution]:
+    """The best solution as no success: an interrupt or the time limit came before `what`."""
+    if isinstance(stopped, KeyboardInterrupt):
+        record_interrupt()
+        return [ended_early(found[0], Status.INTERRUPTED, f"interrupted before {what}")]
+    return [ended_early(found[0], Status.TIME_LIMIT, f"{stopped} before {what}")]
 
 
 def _with_costlier(checked: list[Solution]) -> Solution:
@@ -207,15 +226,3 @@ def _with_costlier(checked: list[Solution]) -> Solution:
 def _with_note(best: Solution, sentence: str) -> Solution:
     """The solution with one more sentence in its message."""
     return dataclasses.replace(best, message=f"{best.message} {sentence}")
-
-
-def _interrupted(best: Solution) -> list[Solution]:
-    """The best solution so far, after an interrupt before the last stage."""
-    grid = best.trajectory.grid
-    message = (
-        "interrupted before the requested grid or the best duration was reached; the motion is the "
-        f"best so far, on {grid.intervals} intervals of {grid.duration:.6g} s, of cost "
-        f"{best.cost:.10g}."
-    )
-    status = Status.INTERRUPTED
-    return [dataclasses.replace(best, success=False, status=status, message=message)]

@@ -18,17 +18,18 @@ from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.optimize.trust_region import Iteration, Options
+from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
-from hovi.planning.solver.status import Status
+from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interruptible, record_interrupt
 
 MAX_CORRECTIONS = 6
@@ -169,10 +170,13 @@ def solve_on_grid(
     )
     started = time.perf_counter()
     try:
-        result = method.minimize(problem, path, options, report)
+        with Deadline(time_limit).in_force():
+            result = method.minimize(problem, path, options, report)
     except KeyboardInterrupt:  # outside the iterations, which return their current point
         record_interrupt()
-        result = _interrupted(problem, path)
+        result = _the_guess(problem, path, Stop.INTERRUPTED)
+    except OutOfTimeError:
+        result = _the_guess(problem, path, Stop.TIME_LIMIT)
     return _solution(result, started - began, time.perf_counter() - started)
 
 
@@ -225,10 +229,11 @@ def minimum_at(
     return _solution(result, 0.0, seconds)
 
 
-def _interrupted(problem: TrajectoryProblem, path: DiscretePath) -> MethodResult:
-    """The guess, if an interrupt came before any step."""
-    value, message = problem.ld.action(path), "the solve was interrupted; the motion is the guess."
-    return MethodResult(problem, path, value, Status.INTERRUPTED, message)
+def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> MethodResult:
+    """The guess, if a solve was stopped before any step."""
+    status, reason = unfinished(stop)
+    message = f"{reason}; the motion is the guess."
+    return MethodResult(problem, path, problem.ld.action(path), status, message)
 
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:

@@ -26,7 +26,7 @@ from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOut
 from hovi.planning.solver.methods.method import Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
-from hovi.system.deadline import Deadline
+from hovi.system.deadline import Deadline, raise_if_late
 
 Array = npt.NDArray[np.float64]
 Bounded = BoundedOutcome[DiscretePath]
@@ -113,6 +113,7 @@ class BoundedSearch:
     def _minimized(
         self, objective: BoundedAction, path: DiscretePath, options: Options, start: Barrier | None
     ) -> Bounded:
+        raise_if_late()  # the outputs at the guess alone may take seconds
         outcome = minimize_bounded(objective, path, options, self.report, start)
         self.iterations += outcome.iterations
         self.history += outcome.history

@@ -15,6 +15,7 @@ from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.non_finite import non_finite_sentence
 from hovi.planning.solver.status import Status, diverged, unfinished
+from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
 
@@ -47,7 +48,9 @@ class InteriorPoint(Method):
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own
             record_interrupt()
-            return _interrupted(search)
+            return _ended(search, Stop.INTERRUPTED)
+        except OutOfTimeError:
+            return _ended(search, Stop.TIME_LIMIT)
 
 
 def _searched(search: BoundedSearch) -> MethodResult:
@@ -74,11 +77,11 @@ def _searched(search: BoundedSearch) -> MethodResult:
     return MethodResult(problem, x, value, status, message, nit, n_neg, search.history, forces)
 
 
-def _interrupted(search: BoundedSearch) -> MethodResult:
+def _ended(search: BoundedSearch, stop: Stop) -> MethodResult:
     """The motion of the last solve."""
     problem, path = search.last
     value, nit = problem.ld.action(path), search.iterations
-    status, message = _unfinished(Stop.INTERRUPTED, nit, value)
+    status, message = _unfinished(stop, nit, value)
     return MethodResult(problem, path, value, status, message, nit, history=search.history)
 
 

@@ -12,6 +12,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.status import chart_sentence, status_of
+from hovi.system.deadline import OutOfTimeError
 
 
 class TrustRegion(Method):
@@ -47,8 +48,11 @@ class TrustRegion(Method):
 
 
 def negative_eigenvalues(objective: ActionObjective, outcome: Outcome[DiscretePath]) -> int:
-    """n_neg of the exact Hessian; -1 if the value is not finite."""
+    """n_neg of the exact Hessian; -1 if the value is not finite, or if time runs out."""
     if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
         return -1
-    definite = objective.model(outcome.x, None, None).factor(0.0) is not None
-    return 0 if definite else objective.negative_eigenvalues(outcome.x)
+    try:
+        definite = objective.model(outcome.x, None, None).factor(0.0) is not None
+        return 0 if definite else objective.negative_eigenvalues(outcome.x)
+    except OutOfTimeError:
+        return -1

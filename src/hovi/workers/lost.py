@@ -1,0 +1,12 @@
+"""What is left of work whose process died."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Lost:
+    """An item without a result, since its worker died. reason: what became of the worker."""
+
+    reason: str

@@ -1,0 +1,272 @@
+"""A pool of worker processes that loses one item, and no result, when a worker dies.
+
+The workers are sessions of their own with pipes of their own: Ctrl-C in a terminal does not reach
+them, they hold none of this process's streams open, and they end when this process does, whatever
+ends it. Idle ones are kept for the next call.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import suppress
+from typing import Any, Generic, TypeVar
+
+import cloudpickle
+
+from hovi.system.deadline import Deadline
+from hovi.workers.frames import ClosedPipeError, Receiver, send
+from hovi.workers.lost import Lost
+from hovi.workers.serving import IDLE_SECONDS
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+GRACE = 1.0
+"""Time in [s] beyond the deadline after which busy workers are ended."""
+MAX_PARKED_SECONDS = 0.8 * IDLE_SECONDS
+"""Time without work after which a worker is not used again, as it is about to end."""
+_ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "BLIS_NUM_THREADS"), "1"
+)
+_BOOTSTRAP = (
+    "import sys; sys.path[:] = eval(sys.argv[1]); from hovi.workers.serving import serve; serve()"
+)
+
+
+def results_in_workers(
+    work: Callable[[Item, float | None], Result],
+    items: Sequence[Item],
+    processes: int,
+    deadline: Deadline,
+) -> Generator[tuple[int, Result | Lost], None, None]:
+    """The number of each item and its result or loss, as they come.
+
+    work: called in a worker with an item and the time that is left, in [s]. Pickled by cloudpickle,
+        so that it may be defined anywhere.
+    processes: largest number of workers.
+    deadline: no item is begun after it, and what is not done soon after it is given up.
+    Items are missing if they were not begun, or if no worker could be started: whoever needs them
+    can do without workers. To be closed, as by contextlib.closing, where it is left early.
+    Raises what `work` raises.
+    """
+    crew = _Crew[Item, Result](work, items, min(processes, len(items)), deadline)
+    try:
+        yield from crew.results()
+    finally:
+        crew.dismiss()
+
+
+class _Worker:
+    """A worker process, and what it was sent."""
+
+    def __init__(self) -> None:
+        self.environment = dict(os.environ)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", _BOOTSTRAP, repr(sys.path)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            bufsize=0,
+            env=self.environment | _ONE_THREAD,
+            start_new_session=True,
+        )
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.requests, self.answers = self.process.stdin.fileno(), self.process.stdout.fileno()
+        self.receiver = Receiver(self.answers)
+        self.work = b""
+        self.item: int | None = None
+        self.is_ready = False
+        self.parked = time.monotonic()
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether a parked worker is alive and has this process's environment."""
+        fresh = time.monotonic() - self.parked < MAX_PARKED_SECONDS
+        return fresh and self.environment == dict(os.environ) and self.process.poll() is None
+
+    def begin(self, work: bytes, number: int, item: bytes, left: float | None) -> None:
+        """Send an item, and the work if it is not the last one. Raises ClosedPipeError."""
+        self.item = number
+        if self.work != work:
+            send(self.requests, "work", work)
+            self.work = work
+        send(self.requests, "item", item, left)
+
+    def end(self) -> int:
+        """End the process; returns its exit code."""
+        with suppress(ProcessLookupError):
+            self.process.kill()
+        self.close()
+        return self.process.wait()
+
+    def close(self) -> None:
+        """Close the pipes."""
+        for stream in (self.process.stdin, self.process.stdout):
+            assert stream is not None
+            stream.close()
+
+
+_parked: list[_Worker] = []
+"""Idle workers, for the next call."""
+
+
+class _Crew(Generic[Item, Result]):
+    """The workers of one call. waiting: numbers of the items that are not begun."""
+
+    def __init__(
+        self,
+        work: Callable[[Item, float | None], Result],
+        items: Sequence[Item],
+        count: int,
+        deadline: Deadline,
+    ) -> None:
+        self.work, self.items, self.deadline = cloudpickle.dumps(work), items, deadline
+        self.waiting = deque(range(len(items)))
+        self.selector = selectors.DefaultSelector()
+        self.hands: list[_Worker] = []
+        for _ in range(count):
+            self._hire()
+
+    def results(self) -> Iterator[tuple[int, Result | Lost]]:
+        """See results_in_workers."""
+        while True:
+            yield from self._hand_out()
+            if not any(worker.item is not None or not worker.is_ready for worker in self.hands):
+                return
+            if self.deadline.passed and not self._is_busy:
+                return
+            ready = self.selector.select(self._patience)
+            if not ready and self.deadline.passed:
+                return
+            for key, _ in ready:
+                yield from self._heard(key.data)
+
+    def dismiss(self) -> None:
+        """Keep idle workers for the next call, and end the others."""
+        self.selector.close()
+        for worker in self.hands:
+            if worker.is_ready and worker.item is None:
+                worker.parked = time.monotonic()
+                _parked.append(worker)
+            else:
+                worker.end()
+        self.hands = []
+
+    @property
+    def _is_busy(self) -> bool:
+        return any(worker.item is not None for worker in self.hands)
+
+    @property
+    def _patience(self) -> float | None:
+        left = self.deadline.seconds_left
+        return None if left is None else left + GRACE
+
+    def _hire(self) -> None:
+        """One more worker, unless the system refuses one."""
+        worker = _idle_worker()
+        if worker is None:
+            try:
+                worker = _Worker()
+            except OSError:  # no more processes, memory or descriptors
+                return
+        self.hands.append(worker)
+        self.selector.register(worker.answers, selectors.EVENT_READ, worker)
+
+    def _hand_out(self) -> Iterator[tuple[int, Lost]]:
+        """Give items to idle workers."""
+        for worker in list(self.hands):
+            if not worker.is_ready or worker.item is not None:
+                continue
+            if not self.waiting or self.deadline.passed:
+                return
+            number = self.waiting.popleft()
+            item = cloudpickle.dumps(self.items[number])
+            try:
+                worker.begin(self.work, number, item, self.deadline.seconds_left)
+            except ClosedPipeError:
+                yield from self._bury(worker)
+
+    def _heard(self, worker: _Worker) -> Iterator[tuple[int, Result | Lost]]:
+        """What a worker has to say: that it is ready or done, or, by a closed pipe, dead."""
+        try:
+            worker.receiver.read()
+        except ClosedPipeError:
+            yield from self._bury(worker)
+            return
+        while (message := worker.receiver.message()) is not None:
+            number, worker.item = worker.item, None
+            worker.is_ready = True
+            yield from _result(number, *message)
+
+    def _bury(self, worker: _Worker) -> Iterator[tuple[int, Lost]]:
+        """Replace a dead worker; its item is lost. One that died before any item is not replaced.
+
+        Otherwise processes would be started for ever where none can run.
+        """
+        self.selector.unregister(worker.answers)
+        self.hands.remove(worker)
+        code = worker.end()
+        if worker.item is None:
+            return
+        if self.waiting and not self.deadline.passed:
+            self._hire()
+        yield worker.item, Lost(_cause(code))
+
+
+def _result(number: int | None, kind: str, content: bytes = b"") -> Iterator[tuple[int, Any]]:
+    """An answer as a result. Raises the exception that the work ended in."""
+    if number is None:  # it has only become ready
+        return
+    found = pickle.loads(content)
+    if kind == "failed":
+        raise found
+    yield number, Lost(found) if kind == "lost" else found
+
+
+def _idle_worker() -> _Worker | None:
+    """A worker of an earlier call."""
+    while _parked:
+        worker = _parked.pop()
+        if worker.is_usable:
+            return worker
+        worker.end()
+    return None
+
+
+def _cause(code: int) -> str:
+    """What became of a worker, by its exit code."""
+    if code >= 0:
+        return f"a worker process ended with exit code {code}"
+    with suppress(ValueError):
+        name = signal.Signals(-code).name
+        often = ", as the system does when memory runs out" if -code == signal.SIGKILL else ""
+        return f"a worker process was ended by {name}{often}"
+    return f"a worker process was ended by signal {-code}"
+
+
+@atexit.register
+def end_idle_workers() -> None:
+    """End the workers that wait for the next call."""
+    while _parked:
+        _parked.pop().end()
+
+
+def _forget() -> None:
+    """In a forked child: drop its copies of the pipes, which would keep the workers alive."""
+    for worker in _parked:
+        worker.close()
+        worker.process.returncode = 0  # it is no child of this process
+    _parked.clear()
+
+
+os.register_at_fork(after_in_child=_forget)

@@ -1,0 +1,34 @@
+"""Progress on stderr: what was reported last, also while nothing new is."""
+
+from __future__ import annotations
+
+import pytest
+
+from hovi.cli.reports import progress as reports
+from oracles.processes import wait_until
+
+
+def test_the_last_line_is_repeated_while_work_is_silent(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reports, "LINE_PERIOD", 0.05)
+    shown = ""
+
+    def shows(text: str, times: int) -> bool:
+        nonlocal shown
+        shown += capfd.readouterr().err
+        return shown.count(text) >= times
+
+    with reports.progress(quiet=False) as report:
+        assert report is not None
+        wait_until(lambda: shows("  0 % planning (0 s)\n", 1))
+        report("refining 2 minima", 0.5)
+        wait_until(lambda: shows(" 50 % refining 2 minima (", 3))
+    capfd.readouterr()
+    assert capfd.readouterr().err == ""
+
+
+def test_quiet_progress_is_none(capfd: pytest.CaptureFixture[str]) -> None:
+    with reports.progress(quiet=True) as report:
+        assert report is None
+    assert capfd.readouterr().err == ""
