@@ -20,9 +20,9 @@ import re
 import sys
 import time
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
-import joblib
 import numpy as np
 import pinocchio as pin
 from measuring import print_machine, print_table
@@ -207,8 +207,9 @@ def main() -> None:
     args = parser.parse_args()
     arms, kinds = args.arms or list(ARMS), [args.limits] if args.limits else ["urdf", "none"]
     jobs = [(arm, kind, i) for kind in kinds for arm in arms for i in range(args.count)]
-    measured = joblib.delayed(measure)
-    rows = joblib.Parallel(n_jobs=args.jobs)(measured(*job, args.count, args.seed) for job in jobs)
+    with ProcessPoolExecutor(args.jobs) as pool:
+        futures = [pool.submit(measure, *job, args.count, args.seed) for job in jobs]
+        rows = [future.result() for future in futures]
     for kind in kinds:
         print(f"\nLimits: {kind}\n")
         _print(kind, arms, rows)

@@ -12,7 +12,7 @@ import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from hovi.checks.kinds import Kind, MismatchError, kind_of, resolved
 from hovi.errors import HoviError, InputError
@@ -59,15 +59,15 @@ def without_checks(checked: Checked) -> Checked:
     For the steps of an optimiser, whose arguments are known to be right.
     """
     if not isinstance(checked, type):
-        return inspect.unwrap(checked)  # type: ignore[return-value]
-    initialize = inspect.unwrap(checked.__init__)
+        return cast(Checked, inspect.unwrap(checked))
+    initialize = inspect.unwrap(vars(checked)["__init__"])
 
     def make(*args: Any) -> Any:
-        made = checked.__new__(checked)
+        made = object.__new__(cast(type[Any], checked))
         initialize(made, *args)
         return made
 
-    return make  # type: ignore[return-value]
+    return cast(Checked, make)
 
 
 def _checking(checked: Checked, names: Collection[str]) -> Checked:
