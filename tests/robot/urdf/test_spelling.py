@@ -12,7 +12,7 @@ import pytest
 from hovi.errors import ModelError
 from hovi.robot.loading import load_robot
 from hovi.robot.urdf.check import check_urdf
-from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, HOMES, attributes_of
+from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, PARENTS, attributes_of
 from hovi.robot.urdf.planar_chain import chain
 from hovi.robot.urdf.spelling import MAX_UNKNOWN, is_near
 
@@ -103,7 +103,7 @@ def known_beside(number: int, attribute: str | None) -> set[str]:
 def test_a_urdf_with_every_name_is_accepted() -> None:
     check_urdf(FULL)
     robot = ElementTree.fromstring(FULL)
-    assert {element.tag for element in robot.iter()} >= {*CHILDREN, *HOMES}
+    assert {element.tag for element in robot.iter()} >= {*CHILDREN, *PARENTS}
     for element in list(robot.iter()):
         assert set(element.attrib) <= set(attributes_of(element.tag))
 
@@ -120,7 +120,7 @@ def test_every_misspelt_name_is_refused(number: int, attribute: str | None, edit
             check_urdf(renamed(number, attribute, wrong))
         quoted = f"<{wrong}>" if attribute is None else f"{wrong}="
         assert quoted in str(caught.value)
-        assert "did you mean" in str(caught.value) or wrong in HOMES
+        assert "did you mean" in str(caught.value) or wrong in PARENTS
 
 
 def distance(one: str, other: str) -> int:
@@ -182,7 +182,7 @@ def test_a_mistake_that_makes_another_robot_is_refused(mistake: str) -> None:
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize("tag", HOMES)
+@pytest.mark.parametrize("tag", PARENTS)
 @pytest.mark.parametrize("place", [*CHILDREN, "mass", "origin", "limit", "box"])
 def test_an_element_in_another_place_is_refused(tag: str, place: str) -> None:
     robot = ElementTree.fromstring(FULL)
@@ -190,7 +190,8 @@ def test_an_element_in_another_place_is_refused(tag: str, place: str) -> None:
     if tag in CHILDREN.get(place, ()):
         return
     ElementTree.SubElement(owner, tag)
-    with pytest.raises(ModelError, match=f"has <{tag}>, which belongs in <{HOMES[tag]}>: move it"):
+    words = f"has <{tag}>, which belongs in <{PARENTS[tag]}>: move it"
+    with pytest.raises(ModelError, match=words):
         check_urdf(ElementTree.tostring(robot, encoding="unicode"))
 
 
