@@ -1,4 +1,4 @@
-"""Misspelt and misplaced names of a URDF are refused; names of others are passed over and told."""
+"""Misspelt and misplaced names of a URDF are refused; unknown names are ignored and reported."""
 
 from __future__ import annotations
 
@@ -211,15 +211,15 @@ def with_extensions() -> str:
 
 
 def told(folder: Path, text: str) -> str:
-    """The lines of `hovi info` about what is passed over or without inertia."""
+    """The lines of `hovi info` about what is ignored or without inertia."""
     (folder / "robot.urdf").write_text(text)
     lines = load_robot(folder / "robot.urdf").describe().splitlines()
-    return "\n".join(line.strip() for line in lines if "passed over" in line or "without <" in line)
+    return "\n".join(line.strip() for line in lines if "ignored" in line or "without <" in line)
 
 
 def test_extensions_of_simulators_and_controllers_are_accepted_in_silence(tmp_path: Path) -> None:
     check_urdf(with_extensions())
-    assert "passed over" not in told(tmp_path, with_extensions())
+    assert "ignored" not in told(tmp_path, with_extensions())
 
 
 def test_other_names_are_accepted_and_told(tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def test_other_names_are_accepted_and_told(tmp_path: Path) -> None:
     text = text.replace("<limit ", '<limit current="3" ').replace("<link ", '<link kind="x" ')
     text = text.replace("</robot>", '<drake:joint xmlns:drake="d"/></robot>')
     assert told(tmp_path, text).startswith(
-        "passed over, since URDF has no such elements and attributes: kind= in <link> (3 times), "
+        "ignored, since URDF has no such elements and attributes: kind= in <link> (3 times), "
     )
     for name in ("<gravity> in <link>", "<origin> in <link>", "<drake:joint> in <robot>"):
         assert name in told(tmp_path, text.replace('kind="x"', "").replace('current="3"', ""))

@@ -55,7 +55,7 @@ def names_are_of_urdf(robot: Element) -> Iterator[str]:
             return
 
 
-def passed_over(robot: Element) -> list[str]:
+def ignored_names(robot: Element) -> list[str]:
     """The unknown names of a checked URDF, with their counts, the most frequent first."""
     counts = Counter((each.place, each.name[:40]) for each in unknown_names(robot))
     return [
