@@ -193,7 +193,7 @@ ENDINGS = {
 
 
 @pytest.mark.parametrize("name", ENDINGS)
-def test_an_ending_is_what_it_says(name: str) -> None:
+def test_status_message_and_duration_of_every_ending_agree(name: str) -> None:
     ending = ENDINGS[name]
     costs = ending.landscape()
     found = costs.search(*ending.free)
@@ -238,7 +238,7 @@ def test_a_first_motion_that_is_no_minimum_is_returned_as_it_is(status: Status) 
     assert "Time adds 3 to the cost" in found.message
 
 
-def test_a_search_that_comes_to_no_end_is_cut_short(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_durations_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_duration, "MAX_DURATIONS", 3)
     costs = Landscape()
     found = costs.search(0.1, 10.0, 1.0, 3.0)

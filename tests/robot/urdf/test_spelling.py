@@ -210,7 +210,7 @@ def with_extensions() -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def told(folder: Path, text: str) -> str:
+def notes(folder: Path, text: str) -> str:
     """The lines of `hovi info` about what is ignored or without inertia."""
     (folder / "robot.urdf").write_text(text)
     lines = load_robot(folder / "robot.urdf").describe().splitlines()
@@ -219,23 +219,23 @@ def told(folder: Path, text: str) -> str:
 
 def test_extensions_of_simulators_and_controllers_are_accepted_in_silence(tmp_path: Path) -> None:
     check_urdf(with_extensions())
-    assert "ignored" not in told(tmp_path, with_extensions())
+    assert "ignored" not in notes(tmp_path, with_extensions())
 
 
-def test_other_names_are_accepted_and_told(tmp_path: Path) -> None:
+def test_other_names_are_accepted_and_reported(tmp_path: Path) -> None:
     text = FULL.replace("</inertial>", "</inertial><gravity>1</gravity><origin/>")
     text = text.replace("<limit ", '<limit current="3" ').replace("<link ", '<link kind="x" ')
     text = text.replace("</robot>", '<drake:joint xmlns:drake="d"/></robot>')
-    assert told(tmp_path, text).startswith(
+    assert notes(tmp_path, text).startswith(
         "ignored, since URDF has no such elements and attributes: kind= in <link> (3 times), "
     )
     for name in ("<gravity> in <link>", "<origin> in <link>", "<drake:joint> in <robot>"):
-        assert name in told(tmp_path, text.replace('kind="x"', "").replace('current="3"', ""))
+        assert name in notes(tmp_path, text.replace('kind="x"', "").replace('current="3"', ""))
 
 
-def test_long_names_are_told_briefly(tmp_path: Path) -> None:
+def test_long_names_are_shortened(tmp_path: Path) -> None:
     text = FULL.replace("<limit ", f'<limit {"q" * 5000}="3" ')
-    assert len(told(tmp_path, text)) < 200
+    assert len(notes(tmp_path, text)) < 200
 
 
 def test_the_number_of_unknown_names_is_limited() -> None:
@@ -260,10 +260,10 @@ def chain_without(*links: str, shape: bool = True) -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def test_moving_links_without_inertia_are_told(tmp_path: Path) -> None:
-    assert told(tmp_path, chain_without()) == ""  # the tip is a frame, and the base does not move
+def test_moving_links_without_inertia_are_reported(tmp_path: Path) -> None:
+    assert notes(tmp_path, chain_without()) == ""  # the tip is a frame, and the base does not move
     for shape in (True, False):
-        assert told(tmp_path, chain_without("link1", "link3", shape=shape)) == (
+        assert notes(tmp_path, chain_without("link1", "link3", shape=shape)) == (
             "link1, link3: moving without <inertial>, so without mass and inertia"
         )
 
@@ -274,7 +274,7 @@ def test_a_shape_on_a_moving_frame_needs_an_inertia_too(tmp_path: Path) -> None:
     )
     text = chain_without().replace('<link name="tip" />', ball)
     assert text != chain_without()
-    assert told(tmp_path, text).startswith("tip: moving without")
+    assert notes(tmp_path, text).startswith("tip: moving without")
 
 
 def test_links_that_do_not_move_need_no_inertia(tmp_path: Path) -> None:
