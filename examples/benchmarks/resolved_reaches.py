@@ -5,10 +5,9 @@ configuration, among pairs that can be held with 0.9 of the torque limits. T is 
 time that the slowest joint needs at its velocity limit. A success is denied if
 - the integral of 1/2 |tau|^2 along its curve, with torques of pin.rnea from sampled (q, v, a) at 48
   Gauss points per interval, differs from its cost by more than 1 %;
-- a solve on a grid four times finer, started from it, differs in cost by more than 1 %, or ends
-  neither in a minimum nor at its iteration limit: with `galerkin-2` on four times as many equal
-  intervals, or, if that is unresolved itself, on its own intervals cut into four, without the
-  check of resolution;
+- a solve on a grid four times finer, started from it, is no minimum within 1 % of its cost: neither
+  with `galerkin-2` on four times as many equal intervals, which may resolve less of the motion than
+  its own, nor on its own intervals cut into four;
 - a limit is exceeded by more than 2e-6 of its range at one of 50,001 times.
 
     python resolved_reaches.py [ARM ...] [--count 25] [--seed 0] [--limits urdf|none] [--jobs 1]
@@ -30,6 +29,7 @@ from measuring import print_machine, print_table
 
 import hovi
 from hovi.planning.solver.solver import solve_on_grid
+from hovi.schemes import galerkin
 
 ALL_BUT_FINGERS = r"(?!.*(finger|[Gg]ripper)).*"
 ARMS = {
@@ -153,38 +153,38 @@ def excess(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
     return worst
 
 
-def denial(scene: hovi.Scene, ends: tuple, limits: str, plan: hovi.Solution) -> str:
-    """Why a success is denied, or "". ends: start, goal and duration."""
+def denial(scene: hovi.Scene, limits: str, plan: hovi.Solution) -> str:
+    """Why a success is denied, or ""."""
     difference = integral(scene, plan.trajectory) / plan.cost - 1
     if abs(difference) > MAX_DIFFERENCE:
         return f"integral {difference:+.1e}"
     beyond = excess(scene, plan.trajectory) if limits == "urdf" else 0.0
     if beyond > MAX_EXCESS:
         return f"limits {beyond:.1e}"
-    finer = hovi.plan(
-        scene,
-        *ends,
-        limits=limits,
-        guess=plan.trajectory,
-        scheme="galerkin-2",
-        intervals=4 * plan.trajectory.grid.intervals,
-        time_limit=8 * TIME_LIMIT,
-        continuation=False,
-    )
-    if finer.status is hovi.Status.UNRESOLVED:
-        finer = _on_quarters(plan)
-    difference = finer.cost / plan.cost - 1
-    stayed = finer.status in (hovi.Status.MINIMUM, hovi.Status.ITERATION_LIMIT)
-    agrees = stayed and abs(difference) <= MAX_DIFFERENCE
-    return "" if agrees else f"finer {finer.status} {difference:+.1e}"
-
-
-def _on_quarters(plan: hovi.Solution) -> hovi.Solution:
-    """A solve on the plan's own grid with every interval cut into four, from its motion."""
     grid = plan.trajectory.grid
+    finer = _solved(plan, hovi.Grid.uniform(grid.duration, 4 * grid.intervals, galerkin(2)))
+    if not _confirms(finer, plan):
+        finer = _solved(plan, _quarters(grid))
+    if _confirms(finer, plan):
+        return ""
+    return f"finer {finer.status} {finer.cost / plan.cost - 1:+.1e}"
+
+
+def _solved(plan: hovi.Solution, grid: hovi.Grid) -> hovi.Solution:
+    """A solve from the plan's motion on another grid."""
+    return solve_on_grid(plan.problem.on(grid), plan.trajectory, max_iterations=2000)
+
+
+def _confirms(finer: hovi.Solution, plan: hovi.Solution) -> bool:
+    """Whether a finer solution is a minimum of nearly the same cost."""
+    return finer.success and abs(finer.cost / plan.cost - 1) <= MAX_DIFFERENCE
+
+
+def _quarters(grid: hovi.Grid) -> hovi.Grid:
+    """The grid with every interval cut into four."""
     for _ in range(2):
         grid = grid.halved(np.ones(grid.intervals, dtype=bool))
-    return solve_on_grid(plan.problem.on(grid), plan.trajectory, max_iterations=2000)
+    return grid
 
 
 def measure(arm: str, limits: str, number: int, count: int, seed: int) -> Reach:
@@ -194,7 +194,7 @@ def measure(arm: str, limits: str, number: int, count: int, seed: int) -> Reach:
     began = time.process_time()
     plan = hovi.plan(scene, *ends, T, limits=limits, time_limit=TIME_LIMIT, processes=1)
     seconds = time.process_time() - began
-    denied = denial(scene, (*ends, T), limits, plan) if plan.success else ""
+    denied = denial(scene, limits, plan) if plan.success else ""
     velocity = np.abs(plan.trajectory.sample(np.linspace(0, T, 2001)).v).max(axis=0)
     unit = (np.pi + np.abs(scene.robot.difference(*ends))) / T
     whirl = float(np.max(velocity / unit))

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,14 +21,14 @@ import hovi.accuracy
 from hovi.accuracy import Run, Thresholds, work_precision
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
-from hovi.accuracy.measuring import INTERVALS, measure
-from hovi.accuracy.method import Answer, Method, Prepared, Stopwatch
+from hovi.accuracy.measuring import INTERVALS
+from hovi.accuracy.method import Stopwatch
 from hovi.accuracy.picture import work_precision_figure
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.tables import as_csv
 from hovi.cli.application import main
 from hovi.discrete.state import State
-from hovi.errors import InputError, UnmeasurableError
+from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
@@ -206,58 +205,6 @@ def test_the_front_is_the_pareto_front_of_valid_runs(reach: Diagram) -> None:
     assert diagram_of(reach, fast, accurate, beaten, wrong_minimum).front() == (fast, accurate)
 
 
-class FakeMethod(Method):
-    """A method with errors N^-4 against a motion of cost 1, and times proportional to N."""
-
-    order = 4
-
-    def __init__(self, name: str, seconds: float) -> None:
-        self.name, self.family, self.seconds = name, "nobody", seconds
-        self.solves = 0
-
-    def prepare(self, intervals: int) -> Prepared:
-        if intervals > 64:
-            raise UnmeasurableError("it has no more than 64 intervals.")
-
-        def solve() -> Answer:
-            self.solves += 1
-            error = float(intervals) ** -4
-
-            def away(t: Array) -> Array:
-                return np.full((len(t), 1), error)
-
-            return Answer(True, "", 1 + error, away, 1, self.seconds * intervals)
-
-        return Prepared(solve, 0.0)
-
-
-def measured(pendulum: Robot, budget: float, *methods: Method) -> Any:
-    reference = ReferenceMotion(pendulum, 1.0, lambda t: np.zeros((len(t), 1)), 1.0)
-    return measure(methods, reference, Budget(budget), lambda text, fraction: None)
-
-
-def test_a_method_that_raises_on_a_grid_keeps_its_runs_and_is_noted(pendulum: Robot) -> None:
-    found = measured(pendulum, 1e6, FakeMethod("short", 1e-9))
-    assert max(run.intervals for run in found.runs) == 64
-    assert found.notes == ("short: it has no more than 64 intervals.",)
-
-
-def test_a_solve_of_a_tenth_of_the_budget_is_the_last_of_its_method(
-    pendulum: Robot,
-) -> None:
-    slow = FakeMethod("slow", 1.0)  # one second per interval
-    found = measured(pendulum, 100.0, slow)
-    assert [run.intervals for run in found.runs] == [4, 6, 8, 12]
-    assert [len(run.repeats) for run in found.runs] == [2, 1, 1, 1]  # until they take 5 s
-    assert slow.solves == 4 + 5
-
-
-def test_a_dominated_method_is_not_refined(pendulum: Robot) -> None:
-    found = measured(pendulum, 1e9, FakeMethod("fast", 1.0), FakeMethod("slow", 40.0))
-    assert max(run.intervals for run in found.runs if run.method == "fast") == 64
-    assert [run.intervals for run in found.runs if run.method == "slow"] == [4]
-
-
 def test_processor_time_excludes_waiting_and_includes_children() -> None:
     watch = Stopwatch("processor")
     time.sleep(0.3)
@@ -318,10 +265,18 @@ def test_the_command_writes_a_figure_and_both_tables(
     assert any("cost" in run["front"] for run in found["runs"])
 
 
-def test_a_diagram_notes_that_limits_are_left_out() -> None:
-    task = load_task(example("ur5_reach_limited"))
-    diagram = work_precision(task, schemes=["galerkin-5"], budget=5.0, repeats=1)
-    assert any("has limits" in note for note in diagram.notes)
+def test_without_a_reference_motion_the_command_says_why_in_one_sentence(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["accuracy", "two_link_reach", "--budget", "1e-3"]) == 1
+    told = capsys.readouterr().err.strip().splitlines()[-1]
+    assert told.startswith("nothing was measured: no reference motion of two_link_reach was found")
+    assert told.endswith("A larger budget allows a longer search.")
+
+
+def test_the_table_ends_with_the_default(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["accuracy", "two_link_reach", "--budget", "3"]) == 0
+    assert "plan: galerkin-" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hovi.accuracy.budget import Budget
 from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
 from hovi.errors import UnmeasurableError
 from hovi.planning.search.planner import plan
@@ -19,7 +20,7 @@ def resolved(scene: str) -> tuple[ResolvedMotion, Solution]:
     task = load_task(example(scene))
     found = plan(task.scene, task.start, task.goal, task.duration, limits="none")
     assert found.problem is not None
-    return resolve(found.problem, found, lambda: False), found
+    return resolve(found.problem, found, Budget(600.0)), found
 
 
 @pytest.mark.parametrize(
@@ -49,4 +50,22 @@ def test_a_motion_of_zero_cost_raises(arm_scene: Scene) -> None:
     found = plan(arm_scene, hanging, hanging, 1.0, limits="none")
     assert found.problem is not None
     with pytest.raises(UnmeasurableError, match="errors are relative to its cost"):
-        resolve(found.problem, found, lambda: False)
+        resolve(found.problem, found, Budget(600.0))
+
+
+def test_without_time_the_error_is_that_which_plan_estimates(arm_scene: Scene) -> None:
+    found = plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.0, limits="none")
+    assert found.problem is not None
+    assert found.accuracy is not None
+    motion = resolve(found.problem, found, Budget(1e-9))
+    assert not motion.converged
+    assert motion.trajectory is found.trajectory
+    assert motion.uncertainty is found.accuracy.estimate
+
+
+def test_without_time_and_estimate_a_larger_budget_is_named(arm_scene: Scene) -> None:
+    ends, grid = ([-np.pi / 2, 0.0], [0.3, 0.7]), {"scheme": "galerkin-2", "intervals": 8}
+    found = plan(arm_scene, *ends, 1.0, limits="none", **grid)
+    assert found.problem is not None
+    with pytest.raises(UnmeasurableError, match="use a larger budget"):
+        resolve(found.problem, found, Budget(1e-9))

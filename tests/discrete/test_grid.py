@@ -116,3 +116,9 @@ def test_a_path_counts_its_intervals() -> None:
         np.zeros((4, 2)), np.zeros((4, 2)), np.zeros((3, 2, 2)), np.zeros((3, 0, 2))
     )
     assert path.intervals == 3
+
+
+def test_a_range_of_schemes_is_named_by_the_fewest_and_the_most_modes() -> None:
+    steps, few, some, many = np.full(3, 0.1), galerkin(2), galerkin(3), galerkin(10)
+    assert Grid.uniform(1.0, 4, few).scheme_range == "galerkin-2"
+    assert Grid(steps, (many, few, some)).scheme_range == "galerkin-2 to galerkin-10"

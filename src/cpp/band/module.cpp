@@ -47,15 +47,22 @@ Band shape_of(const char* name, const Input<2>& band, const Index& rows, std::si
   return {size, panels, stride, rows.data()};
 }
 
-// Throws unless run `run` has `length` numbers of an array of `size`, from `first` on.
-void require_run(const char* name, std::size_t run, std::int64_t first, std::int64_t length,
-                 std::size_t size) {
-  const bool fits = first >= 0 && length >= 0 && std::size_t(length) <= size &&
-                    std::size_t(first) <= size - std::size_t(length);
-  if (!fits)
-    refuse("run " + std::to_string(run) + " of " + std::to_string(length) + " numbers from " +
-           std::to_string(first) + " on does not lie within the " + std::to_string(size) + " of " +
-           name + ".");
+// Whether `length` numbers from `first` on do not lie within an array of `size`.
+bool is_outside(std::int64_t first, std::int64_t length, std::size_t size) {
+  const auto begin = std::uint64_t(first), count = std::uint64_t(length);  // negative: very large
+  return (count > size) | (begin > size - count);
+}
+
+// Throws unless all runs lie within an array of `size`.
+void require_runs(const char* name, std::size_t runs, const std::int64_t* first,
+                  const std::int64_t* length, std::size_t size) {
+  std::uint64_t outside = 0;  // no branches: this is checked at each step of an optimiser
+  for (std::size_t run = 0; run < runs; ++run) outside |= is_outside(first[run], length[run], size);
+  for (std::size_t run = 0; outside && run < runs; ++run)
+    if (is_outside(first[run], length[run], size))
+      refuse("run " + std::to_string(run) + " of " + std::to_string(length[run]) +
+             " numbers from " + std::to_string(first[run]) + " on does not lie within the " +
+             std::to_string(size) + " of " + name + ".");
 }
 
 void assemble(const Input<5>& hessian, const Index& starts, const Index& positions,
@@ -68,10 +75,8 @@ void assemble(const Input<5>& hessian, const Index& starts, const Index& positio
   lengths.require("lengths", {runs});
   const double *const numbers = hessian.data(), *const scale = data_or_null("scales", scales, {runs});
   const std::int64_t *start = starts.data(), *position = positions.data(), *length = lengths.data();
-  for (std::size_t run = 0; run < runs; ++run) {
-    require_run("hessian", run, start[run], length[run], hessian.size());
-    require_run("band", run, position[run], length[run], band.size());
-  }
+  require_runs("hessian", runs, start, length, hessian.size());
+  require_runs("band", runs, position, length, band.size());
   double* const entries = band.data();
   const nb::gil_scoped_release released;
   std::fill_n(entries, band.size(), 0.0);

@@ -10,13 +10,14 @@ from hovi.accuracy.measures import MEASURES, Thresholds
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
 from hovi.accuracy.tolerance_method import Choice
-from hovi.accuracy.variational_method import SCHEMES
+from hovi.accuracy.variational_method import LIMITED_SCHEMES, SCHEMES
 from hovi.accuracy.work_precision import Peer, Setting, work_precision
 
 if TYPE_CHECKING:
     from hovi.discrete.motion_error import MotionError as MotionError
 
 __all__ = [
+    "LIMITED_SCHEMES",
     "MEASURES",
     "SCHEMES",
     "Choice",

@@ -35,6 +35,10 @@ class Budget:
         """Fraction of the budget that is spent, at most 1."""
         return min(self.spent / self.seconds, 1.0)
 
+    def left_of(self, share: float) -> float:
+        """Remaining time of a share of the budget, at least 0, in [s]."""
+        return max(share * self.seconds - self.spent, 0.0)
+
     def allows(self, seconds: float, share: float = 1.0) -> bool:
         """Whether work of this length, in [s], ends within `share` of the budget.
 

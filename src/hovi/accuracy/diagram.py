@@ -18,7 +18,11 @@ class Diagram:
 
     scene: its name. guess: "near" or "cubic". resolved: the motion that errors refer to.
     runs: by method, then by intervals. choices: of `plan(tolerance=)`, ascending in accuracy.
-    notes: sentences on what was left out. complete: False if the time budget ran out.
+    default: what `plan` does if neither scheme, intervals nor tolerance are named; None if that
+        was not measured.
+    limited: whether all motions hold limits.
+    notes: sentences on the motion and on what was left out. complete: False if the time budget ran
+        out.
     seconds: duration of the measurement. clock: "wall" or "processor", used to time solves.
     """
 
@@ -27,6 +31,8 @@ class Diagram:
     resolved: ResolvedMotion
     runs: tuple[Run, ...] = field(repr=False)
     choices: tuple[Choice, ...] = ()
+    default: Choice | None = None
+    limited: bool = False
     notes: tuple[str, ...] = ()
     complete: bool = True
     seconds: float = 0.0
@@ -100,7 +106,9 @@ class Diagram:
                 "tip_frames": list(self.resolved.tip_frames),
                 "cost": self.resolved.cost,
                 "uncertainty": shown_sizes(self.resolved.uncertainty),
+                "limit_effect": self.resolved.limit_effect,
             },
+            "limited": self.limited,
             "complete": self.complete,
             "notes": list(self.notes),
             "seconds": self.seconds,
@@ -109,4 +117,5 @@ class Diagram:
                 for run in self.runs
             ],
             "choices": [choice.to_dict() for choice in self.choices],
+            "default": None if self.default is None else self.default.to_dict(),
         }

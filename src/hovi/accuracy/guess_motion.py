@@ -5,16 +5,21 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.guess import Curve, cubic, stretched
+from hovi.discrete.guess import Curve, cubic, stretched, with_turns
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
 GUESSES = ("near", "cubic")
 RESOLVED_SHARE = 0.9
 """Fraction of the resolved motion in the near guess; the rest is the cubic."""
+MAX_DISTANCE = 0.3
+"""Largest distance of the near guess from the resolved motion, in [rad] or [m]."""
+SAMPLES = 4001
+"""Times at which the distance is measured, and turns are counted."""
 NEARER_RESOLVED_SHARE = 0.99
 """The same for methods that converge to other minima from the near guess."""
 
@@ -24,22 +29,67 @@ def guess_curve(
 ) -> Curve:
     """The guess as a curve: times -> q, v and a.
 
-    name: "near" (nine tenths of the resolved motion and one tenth of the cubic between its ends,
-        so that all methods converge to the same minimum) or "cubic".
+    name: "near" (nine tenths of the resolved motion and one tenth of the cubic between its ends, at
+        most MAX_DISTANCE away, so that all methods converge to the same minimum) or "cubic".
     resolved: the motion to be found. share: its fraction in the near guess.
     Raises InputError for an unknown name.
     """
     robot, T = problem.robot, problem.grid.duration
-    cubic_curve = cubic(robot, problem.boundary, T)
+    plain = cubic(robot, problem.boundary, T)
     if name == "cubic":
-        return cubic_curve
+        return with_turns(plain, robot, T, problem.turns) if problem.turns.any() else plain
     if name != "near":
         raise InputError(f"there is no guess {name!r}: {nearest(name, GUESSES)}")
     motion = stretched(resolved, T)
+    turns = _Apart(robot, plain, motion, T).turns
+    base = with_turns(plain, robot, T, turns) if turns.any() else plain
+    apart = _Apart(robot, base, motion, T)
+    share = max(share, 1 - MAX_DISTANCE / max(apart.largest, MAX_DISTANCE))
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
-        (q1, v1, a1), (q0, v0, a0) = motion(t), cubic_curve(t)
-        q = robot.integrate(q0, share * robot.difference(q0, q1))
+        (q0, v0, a0), (_, v1, a1) = base(t), motion(t)
+        q = robot.integrate(q0, share * apart(t))
         return q, v0 + share * (v1 - v0), a0 + share * (a1 - a0)
 
     return curve
+
+
+class _Apart:
+    """The difference of two curves, continuous at half turns of continuous joints.
+
+    base, motion: the curves. duration: T, in [s].
+    """
+
+    def __init__(self, robot: Robot, base: Curve, motion: Curve, duration: float) -> None:
+        self._robot, self._base, self._motion = robot, base, motion
+        self._columns = [i for factor in robot.space.angles for i in _indices(factor.v)]
+        self._t = np.linspace(0.0, duration, SAMPLES)
+        self._sampled = self._modulo(self._t)
+        self._sampled[:, self._columns] = np.unwrap(self._sampled[:, self._columns], axis=0)
+
+    @property
+    def largest(self) -> float:
+        """The largest difference of a joint, in [rad] or [m]."""
+        return float(np.abs(self._sampled).max())
+
+    @property
+    def turns(self) -> Array:
+        """Full turns of each coordinate by which the motion is ahead at its end, shape (nv,)."""
+        turns = np.zeros(self._robot.nv)
+        turns[self._columns] = np.round(self._sampled[-1, self._columns] / (2 * np.pi))
+        return turns
+
+    def __call__(self, t: Array) -> Array:
+        """The difference at times (M,), shape (M, nv)."""
+        x = self._modulo(t)
+        for i in self._columns:
+            known = np.interp(t, self._t, self._sampled[:, i])
+            x[:, i] += 2 * np.pi * np.round((known - x[:, i]) / (2 * np.pi))
+        return x
+
+    def _modulo(self, t: Array) -> Array:
+        return np.array(self._robot.difference(self._base(t)[0], self._motion(t)[0]))
+
+
+def _indices(part: slice) -> range:
+    return range(part.start, part.stop)

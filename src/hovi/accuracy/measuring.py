@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.measures import Thresholds
@@ -20,8 +20,8 @@ SUFFICIENT_ERRORS = Thresholds(cost=1e-12, joints=1e-8, tip=1e-8)
 """Errors below which finer grids only show rounding."""
 REPEATS = 7
 """Timed solves of a run after the first."""
-FIRST_SOLVES_SHARE = 0.7
-"""Fraction of the budget for first solves."""
+FIRST_SOLVES_SHARE = 0.8
+"""Fraction of the time left for first solves."""
 MAX_SOLVE_SHARE = 0.1
 """A method stops after a first solve longer than this fraction of the budget; a run is no longer
 repeated when its repeats have taken half of it."""
@@ -56,61 +56,77 @@ def measure(
     repeats: int = REPEATS,
     enough: Thresholds = SUFFICIENT_ERRORS,
 ) -> Measured:
-    """Run every method on finer and finer grids until its errors are small or its time is up.
+    """Run every method on finer and finer grids until its errors are small or the time is up.
 
-    First solves share their part of the budget evenly among the methods. The repeats follow in
-    rounds over all runs, so that other load on the machine affects all runs alike.
+    The next grid is that of the method whose first solves took the least time so far. The repeats
+    follow in rounds over all runs, so that other load on the machine affects all runs alike.
 
     budget: of which `share` may be spent. repeats: of every valid run.
     enough: errors below which no finer grid is tried.
     """
-    all_solved: list[Solved] = []
-    notes, complete = [], True
-    for number, method in enumerate(methods):
-        part = (FIRST_SOLVES_SHARE * share - budget.fraction) / (len(methods) - number)
-        solved: Solved = []
-        all_solved.append(solved)
-        progress(method.name, budget.fraction)
+    last = budget.fraction + FIRST_SOLVES_SHARE * max(share - budget.fraction, 0.0)
+    refinements = [_Refinement(method) for method in methods]
+    notes, complete, going = [], True, list(refinements)
+    while going:
+        one = min(going, key=lambda each: each.spent)
+        progress(one.method.name, budget.fraction)
+        if not budget.allows(one.expected, last):
+            complete = False
+            going.remove(one)
+            continue
         try:
-            ended = _refine(method, all_solved, reference, budget, budget.fraction + part, enough)
-            complete = complete and ended
+            run = one.run_next(reference)
         except UnmeasurableError as error:
-            notes.append(f"{method.name}: {error}")
+            notes.append(f"{one.method.name}: {error}")
+            going.remove(one)
+            continue
+        slow = run.first_seconds > MAX_SOLVE_SHARE * budget.seconds
+        if slow or one.finished or enough.met_by(run.error) or _dominated(run, refinements):
+            going.remove(one)
+    all_solved = [each.solved for each in refinements]
     _repeat(all_solved, budget, progress, share, repeats)
     runs = tuple(run for solved in all_solved for _, run in solved)
     return Measured(runs, complete, tuple(notes))
 
 
-def _refine(
-    method: Method,
-    all_solved: list[Solved],
-    reference: ReferenceMotion,
-    budget: Budget,
-    share: float,
-    enough: Thresholds,
-) -> bool:
-    """Run one method on finer and finer grids; returns False if its time ran out.
+@dataclass(eq=False)
+class _Refinement:
+    """A method on finer and finer grids.
 
-    all_solved: runs of all methods so far; those of this method are the last entry.
+    solved: its runs so far. spent: time of their solves. expected: time of the next run, set-up
+    included. Both in [s].
     """
-    expected = 0.0
-    for intervals in [each for each in INTERVALS if each >= method.coarsest]:
-        if not budget.allows(expected, share):
-            return False
+
+    method: Method
+    solved: Solved = field(default_factory=list)
+    spent: float = 0.0
+    expected: float = 0.0
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last run was on the finest grid."""
+        return bool(self._done >= INTERVALS[-1])
+
+    def run_next(self, reference: ReferenceMotion) -> Run:
+        """The first run on the next finer grid. Raises UnmeasurableError."""
         watch = Stopwatch()
-        prepared = method.prepare(intervals)
-        run = _first_run(method, intervals, prepared, reference)
-        all_solved[-1].append((prepared, run))
-        slow = run.first_seconds > MAX_SOLVE_SHARE * budget.seconds
-        if slow or enough.met_by(run.error) or _dominated(run, all_solved):
-            break
-        expected = _MAX_TIME_RATIO * watch.seconds
-    return True
+        intervals = next(each for each in INTERVALS if each > self._done)
+        prepared = self.method.prepare(intervals)
+        run = _first_run(self.method, intervals, prepared, reference)
+        self.solved.append((prepared, run))
+        self.spent += run.first_seconds
+        self.expected = _MAX_TIME_RATIO * watch.seconds
+        return run
+
+    @property
+    def _done(self) -> int:
+        """Number of intervals of the last run; of limits it may be larger than that asked for."""
+        return self.solved[-1][1].intervals if self.solved else self.method.coarsest - 1
 
 
-def _dominated(run: Run, all_solved: list[Solved]) -> bool:
+def _dominated(run: Run, refinements: Sequence[_Refinement]) -> bool:
     """Whether a valid run of the same family was as accurate and much faster."""
-    runs = (other for solved in all_solved for _, other in solved)
+    runs = (other for each in refinements for _, other in each.solved)
     others = [other for other in runs if other.family == run.family and other.counts]
     return run.counts and any(
         other.error.cost <= run.error.cost and DOMINANCE * other.first_seconds <= run.first_seconds
@@ -126,7 +142,7 @@ def _first_run(
         method=method.name,
         family=method.family,
         order=method.order,
-        intervals=intervals,
+        intervals=answer.intervals or intervals,
         success=answer.success,
         message=answer.message,
         cost=answer.cost,

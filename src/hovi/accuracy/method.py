@@ -19,6 +19,7 @@ class Answer:
     cost: 1/2 integral |tau|^2 as the method computes it.
     configurations: the motion, by the method's own interpolant.
     steps: iterations. seconds: time of this solve alone, by the clock of the diagram.
+    intervals: of the final grid, if some were halved for limits or charts; None if as prepared.
     """
 
     success: bool
@@ -27,6 +28,7 @@ class Answer:
     configurations: Configurations
     steps: int
     seconds: float
+    intervals: int | None = None
 
 
 @dataclass(frozen=True, eq=False)

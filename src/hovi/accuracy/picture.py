@@ -7,11 +7,14 @@ import os
 from collections.abc import Callable, Sequence
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
-from hovi.accuracy import MEASURES, Diagram, Run
+from hovi.accuracy import MEASURES, Choice, Diagram, Run
 from hovi.accuracy.measures import shown_size
+from hovi.discrete.motion_error import MotionError
 from hovi.robot.tip_frame import names_in_words
 from hovi.viewing.figures import write_figure
 
@@ -25,7 +28,8 @@ _PEER_COLORS = ("#D55E00", "#E69F00", "#CC79A7", "#6b6b6b", "#009E73", "#8c510a"
 _MILLISECONDS = 1e3
 _ERROR_FLOOR = 1e-16  # drawn for smaller errors
 _COINCIDENT_DECADES = 0.3  # errors closer than this, in decades, share one label
-_MARKERS = "osD^vP*X<>"
+_MARKERS = "osD^vPhX<>"  # stars are choices of plan
+_CHOICE, _DEFAULT = "#d00000", "#ffb000"
 
 Time = Callable[[Run], float]
 
@@ -42,22 +46,29 @@ def work_precision_figure(diagram: Diagram, fastest: bool = False) -> Figure:
 
     One curve per scheme of hovi, with a point per number of intervals. For each family of reference
     tools, all points and their Pareto front. The Pareto front of all runs is shaded; the choices of
-    `plan(tolerance=)` are stars.
+    `plan(tolerance=)` are stars, and so is its default. Within limits points are not joined, dotted
+    lines show the error of the resolved motion, and a dashed one the effect of the limits'
+    tolerance on the cost.
 
     fastest: show the fastest repeat instead of the median, for a machine under other load.
     """
     warm = _fastest if fastest else _median
-    figure = Figure(figsize=(11.0, 8.6), layout="constrained")
+    figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     panels = figure.subplots(2, 2)
     for ax, measure in zip(panels.flat, MEASURES, strict=False):
         _panel(ax, diagram, measure, warm)
         _front(ax, diagram, measure, warm)
         _choices(ax, diagram, measure, fastest)
+        _default(ax, diagram, measure, fastest)
+        _least_errors(ax, diagram, measure)
         ax.set_xlabel("warm solve [ms]")
     _panel(panels[1, 1], diagram, "cost", _cold)
     panels[1, 1].set_xlabel("setup and first solve [ms]")
+    for ax in panels.flat:
+        if not np.isfinite(ax.dataLim.minpos).all():  # nothing to show, and no range of a log axis
+            ax.set(xlim=(1.0, 10.0), ylim=(1e-3, 1.0))
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle(_title(diagram), fontsize="medium")
     return figure
 
@@ -77,7 +88,11 @@ def _cold(run: Run) -> float:
 def _title(diagram: Diagram) -> str:
     start = {"near": "a guess near the motion", "cubic": "the cubic guess"}[diagram.guess]
     clock = "" if diagram.clock == "wall" else ", in processor time"
-    return f"{diagram.scene}: error against time, from {start}{clock}"
+    limits = "within limits, " if diagram.limited else ""
+    title = f"{diagram.scene}: error against time, {limits}from {start}{clock}"
+    if diagram.default is None or diagram.default.counts:
+        return title
+    return f"{title}\nplan's default found {diagram.default.found}, and has no star"
 
 
 def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
@@ -89,8 +104,13 @@ def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     _own_schemes(ax, diagram, measure, time)
     ax.set_xscale("log")
     ax.set_yscale("log")
+    ax.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("{x:g}")
+    ax.tick_params(axis="x", which="both", labelsize="small")
     tips = names_in_words(diagram.resolved.tip_frames)
     ax.set_ylabel(_LABELS[measure].format(tips=tips))
+    ax.margins(y=0.08)  # for labels below stars
     ax.grid(color="0.9", linewidth=0.6)
     ax.spines[["top", "right"]].set_visible(False)
 
@@ -100,9 +120,11 @@ def _own_schemes(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     shades = matplotlib.colormaps["viridis"]
     for i, name in enumerate(own):
         runs = [run for run in diagram.of(name) if run.counts]
-        x, y = _points(runs, measure, time)
+        x, y = _points(diagram, runs, measure, time)
         order = next((f", order {run.order}" for run in runs if run.order), "")
-        (line,) = ax.plot(x, y, linewidth=1.3, label=f"{name}{order}")
+        order, width = ("", 0.0) if diagram.limited else (order, 1.3)  # kinks set the order
+        label = f"{name}{order}" if runs else None
+        (line,) = ax.plot(x, y, linewidth=width, label=label)
         line.set(color=shades(0.92 * i / max(len(own) - 1, 1)), marker=_MARKERS[i % 10], ms=4)
 
 
@@ -110,32 +132,55 @@ def _peer_family(
     ax: Axes, diagram: Diagram, family: str, measure: str, time: Time, color: str
 ) -> None:
     runs = [run for run in diagram.runs if run.family == family and run.counts]
-    x, y = _points(runs, measure, time)
+    x, y = _points(diagram, runs, measure, time)
     ax.plot(x, y, ".", color=color, markersize=4, alpha=0.6)
     best = diagram.front(measure, lambda run: run.family == family, time)
-    x, y = _points(best, measure, time)
+    x, y = _points(diagram, best, measure, time)
     ax.plot(x, y, "--", color=color, linewidth=1.6, label=family)
 
 
 def _front(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
-    x, y = _points(diagram.front(measure, time=time), measure, time)
+    x, y = _points(diagram, diagram.front(measure, time=time), measure, time)
     ax.plot(x, y, color="black", linewidth=3.5, alpha=0.25, label="cheapest", zorder=1)
 
 
 def _choices(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
     """Draw a star per tolerance, labelled in the panel of the cost."""
-    chosen = diagram.choices
+    chosen = [choice for choice in diagram.choices if choice.counts]
     x = [_MILLISECONDS * (c.best_seconds if fastest else c.seconds) for c in chosen]
-    y = [max(shown_size(choice.error, measure), _ERROR_FLOOR) for choice in chosen]
+    y = [_height(diagram, choice.error, measure) for choice in chosen]
     style = {"linestyle": "none", "marker": "*", "markersize": 12.0, "zorder": 9.0}
     if chosen:
-        (stars,) = ax.plot(x, y, color="#d00000", label="chosen by a tolerance")
+        (stars,) = ax.plot(x, y, color=_CHOICE, label="chosen by a tolerance")
         stars.set(**style)
     if measure == "cost":
-        _label_tolerances(ax, diagram, x, y)
+        _label_tolerances(ax, chosen, x, y)
 
 
-def _label_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]) -> None:
+def _default(ax: Axes, diagram: Diagram, measure: str, fastest: bool) -> None:
+    """Draw the star of plan's default."""
+    choice = diagram.default
+    if choice is None or not choice.counts:
+        return
+    x = _MILLISECONDS * (choice.best_seconds if fastest else choice.seconds)
+    y = _height(diagram, choice.error, measure)
+    label = f"plan's default, {choice.tolerance:.0e}"
+    (star,) = ax.plot([x], [y], linestyle="none", color=_DEFAULT, label=label)
+    star.set(marker="*", markersize=17.0, markeredgecolor="black", zorder=10.0)
+
+
+def _least_errors(ax: Axes, diagram: Diagram, measure: str) -> None:
+    """Draw the errors below which differences mean nothing, within limits."""
+    if not diagram.limited:
+        return
+    own = shown_size(diagram.resolved.uncertainty, measure)
+    ax.axhline(own, color="0.4", linestyle=":", linewidth=1.2, label="error of the reference")
+    if measure == "cost":
+        effect, label = diagram.resolved.limit_effect, "effect of the limits' tolerance"
+        ax.axhline(effect, color="0.4", linestyle="--", linewidth=1.2, label=label)
+
+
+def _label_tolerances(ax: Axes, chosen: Sequence[Choice], x: list[float], y: list[float]) -> None:
     """Write the tolerance beside each star; stars of nearly equal error share one label."""
     groups: list[list[int]] = []
     for i, error in enumerate(y):
@@ -144,17 +189,26 @@ def _label_tolerances(ax: Axes, diagram: Diagram, x: list[float], y: list[float]
         else:
             groups.append([i])
     for group in groups:
-        ends = (diagram.choices[i].tolerance for i in (group[0], group[-1]))
+        ends = (chosen[i].tolerance for i in (group[0], group[-1]))
         ax.annotate(
             " to ".join(dict.fromkeys(f"{tolerance:.0e}" for tolerance in ends)),
             (max(x[i] for i in group), y[group[0]]),
-            xytext=(8, -3),
+            xytext=(0, -15),
             textcoords="offset points",
-            color="#d00000",
+            ha="center",
+            color=_CHOICE,
             fontsize="small",
         )
 
 
-def _points(runs: Sequence[Run], measure: str, time: Time) -> tuple[list[float], list[float]]:
+def _points(
+    diagram: Diagram, runs: Sequence[Run], measure: str, time: Time
+) -> tuple[list[float], list[float]]:
     x = [_MILLISECONDS * time(run) for run in runs]
-    return x, [max(shown_size(run.error, measure), _ERROR_FLOOR) for run in runs]
+    return x, [_height(diagram, run.error, measure) for run in runs]
+
+
+def _height(diagram: Diagram, error: MotionError, measure: str) -> float:
+    """The error as drawn: within limits not below that of the reference."""
+    known = shown_size(diagram.resolved.uncertainty, measure) if diagram.limited else 0.0
+    return max(shown_size(error, measure), known, _ERROR_FLOOR)

@@ -17,7 +17,7 @@ MAX_JOINT_ERROR = 0.1
 class Run:
     """The result of one method on one grid.
 
-    method, family, order: see Method. intervals: N.
+    method, family, order: see Method. intervals: of the final grid.
     success, message, cost: as reported by the method. steps: iterations.
     error: against the resolved motion.
     setup_seconds: setup. first_seconds: first solve. repeats: each later solve. All in [s].

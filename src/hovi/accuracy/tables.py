@@ -31,15 +31,30 @@ COLUMNS = (
 def cheapest_rows(
     diagram: Diagram, tolerances: Sequence[float] = TOLERANCES
 ) -> list[tuple[str, ...]]:
-    """The fastest run per tolerance of the relative cost error, in COLUMNS."""
+    """The fastest run per tolerance of the relative cost error, in COLUMNS, and plan's default.
+
+    Tolerances below the error of the resolved motion have no row.
+    """
     rows = []
     for tolerance in tolerances:
+        if tolerance < diagram.resolved.uncertainty.cost:
+            break
         run = diagram.cheapest(tolerance)
         if run is None:
             rows.append((f"{tolerance:.0e}", "none so accurate", *[""] * (len(COLUMNS) - 2)))
         else:
             rows.append((f"{tolerance:.0e}", *_cells(run)))
-    return rows
+    return [*rows, *_default_row(diagram)]
+
+
+def _default_row(diagram: Diagram) -> list[tuple[str, ...]]:
+    """What `plan` does by default, in COLUMNS; none if it found another motion."""
+    choice = diagram.default
+    if choice is None or not choice.counts:
+        return []
+    errors = (f"{shown_size(choice.error, measure):.0e}" for measure in MEASURES)
+    times = ("", f"{1e3 * choice.repeats[0]:.3g}", f"{1e3 * choice.seconds:.3g}")
+    return [("default", f"plan: {choice.scheme}", str(choice.intervals), *errors, *times, "")]
 
 
 def _cells(run: Run) -> tuple[str, ...]:

@@ -4,30 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.diagram import Diagram
 from hovi.accuracy.guess_motion import NEARER_RESOLVED_SHARE, guess_curve
-from hovi.accuracy.measures import Thresholds
-from hovi.accuracy.measuring import MAX_SOLVE_SHARE, REPEATS, SUFFICIENT_ERRORS, measure
+from hovi.accuracy.measures import MEASURES, Thresholds, size
+from hovi.accuracy.measuring import (
+    MAX_SOLVE_SHARE,
+    REPEATS,
+    SUFFICIENT_ERRORS,
+    Measured,
+    measure,
+)
 from hovi.accuracy.method import CLOCKS, Method
-from hovi.accuracy.resolved_motion import resolve
-from hovi.accuracy.tolerance_method import choices
-from hovi.accuracy.variational_method import SCHEMES, VariationalMethod
+from hovi.accuracy.reference_search import find_reference
+from hovi.accuracy.resolved_motion import ResolvedMotion
+from hovi.accuracy.run import Run
+from hovi.accuracy.tolerance_method import (
+    Choice,
+    ChoiceTimer,
+    choices_to_tolerances,
+    default_choice,
+)
+from hovi.accuracy.variational_method import LIMITED_SCHEMES, SCHEMES, VariationalMethod
 from hovi.discrete.guess import Curve
 from hovi.errors import InputError, UnmeasurableError, nearest
-from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Progress
-from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task
-from hovi.system.interruption import interruptible, raise_if_interrupted
+from hovi.system.interruption import interruptible
 
-PLANNING_SHARE = 0.3
-"""Fraction of the budget for planning and resolving the motion."""
 MEASURING_SHARE = 0.9
 """Fraction of the budget after which methods are no longer measured; the rest is for
 `plan(tolerance=)`."""
+
+LIMITED_SOLVE_SHARE = 0.5
+"""Time limit of a solve within limits, relative to that of others: it may succeed on a finer grid,
+where fewer intervals have to be halved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +69,7 @@ def work_precision(
     task: Task,
     *,
     guess: str = "near",
-    schemes: Sequence[str] = SCHEMES,
+    schemes: Sequence[str] | None = None,
     peers: Sequence[Peer] = (),
     budget: float = 60.0,
     repeats: int = REPEATS,
@@ -65,18 +79,21 @@ def work_precision(
 ) -> Diagram:
     """Errors of cost, joints and tip against time, of several schemes on several grids.
 
-    The motion of the task is planned without its limits and refined until it no longer changes;
-    every method then solves the same problem from the same guess.
+    The motion of the task is planned, within its limits, and refined until it no longer changes;
+    every method then solves the same problem from the same guess. Limits that the motion stays away
+    from are left out.
 
     guess: "near" (nine tenths of the resolved motion, one tenth of the cubic: all methods converge
         to the same minimum) or "cubic" (runs that end in another minimum are not valid).
-    schemes: names for `by_name`. peers: reference tools for comparison.
+    schemes: names for `by_name`; SCHEMES, or LIMITED_SCHEMES within limits, if None.
+    peers: reference tools for comparison.
     budget: wall time, in [s]. repeats: timed solves of every run after the first.
     clock: "wall", or "processor" for a machine under other load.
-    enough: errors below which no finer grid is tried.
+    enough: errors below which no finer grid is tried; within limits, and for a motion that is not
+        resolved so far, larger ones are enough.
     progress: called with a line of text and the fraction of the budget spent.
     Raises InputError and the errors of `plan` for invalid input, UnmeasurableError when no motion
-    can be resolved.
+    can be resolved or the budget ends before a scheme is measured.
     """
     if task.options.via:
         raise InputError(
@@ -86,42 +103,34 @@ def work_precision(
     if clock not in CLOCKS:
         raise InputError(f"there is no clock {clock!r}: {nearest(clock, CLOCKS)}")
     time, report = Budget(budget), progress or _no_progress
-    report(f"planning {task.name}", 0.0)
-    found = plan(
-        task.scene,
-        task.start,
-        task.goal,
-        task.duration,
-        options=task.options,
-        limits="none",
-        obstacles=(),
-        self_collision=False,
-        tolerance=None,
-        time_limit=PLANNING_SHARE * budget,
-    )
-    raise_if_interrupted()
-    if not found.success or found.problem is None:
-        raise UnmeasurableError(f"no reference motion of {task.name} was found: {found.message}")
-    report("resolving the motion", time.fraction)
-    resolved = resolve(found.problem, found, lambda: time.fraction > PLANNING_SHARE)
-    problem = found.problem.on(resolved.trajectory.grid)
+    reference = find_reference(task, time, report)
+    problem, resolved = reference.problem, reference.resolved
     curve = guess_curve(guess, problem, resolved.trajectory)
     nearer = guess_curve(guess, problem, resolved.trajectory, NEARER_RESOLVED_SHARE)
     setting = Setting(problem, curve, nearer, MAX_SOLVE_SHARE * budget, clock)
-    methods: list[Method] = [VariationalMethod(problem, curve, name, clock) for name in schemes]
-    notes = list(_omissions(task))
-    for peer in peers:
-        try:
-            methods.append(peer(setting))
-        except UnmeasurableError as error:
-            notes.append(str(error))
+    report("measuring plan's default", time.fraction)
+    timer = ChoiceTimer(resolved.reference, time, repeats, clock)
+    by_default = default_choice(task.options, problem, curve, timer)
+    usual = LIMITED_SCHEMES if problem.limited else SCHEMES
+    methods, left_out = _methods(setting, usual if schemes is None else schemes, peers)
     try:
         measured = measure(
-            methods, resolved.reference, time, report, MEASURING_SHARE, repeats, enough
+            methods,
+            resolved.reference,
+            time,
+            report,
+            MEASURING_SHARE,
+            repeats,
+            _attainable(enough, resolved),
         )
+        _require_runs(measured, time)
         report("measuring plan(tolerance=)", time.fraction)
-        intervals = task.options.interval_count
-        chosen = choices(problem, curve, resolved.reference, time, intervals, repeats, clock)
+        intervals, least = task.options.interval_count, resolved.limit_effect
+        chosen = choices_to_tolerances(problem, curve, intervals, timer, least)
+        default, *choices = timer.repeated([by_default, *chosen])
+        found: list[Run | Choice] = [*measured.runs, default, *choices]
+        costs = (each.cost for each in found if each.counts)
+        resolved = resolved.doubted(min(costs, default=resolved.cost))
     finally:
         for method in methods:
             method.close()
@@ -131,21 +140,74 @@ def work_precision(
         clock=clock,
         resolved=resolved,
         runs=measured.runs,
-        choices=chosen,
-        notes=(*notes, *measured.notes),
+        choices=tuple(choices),
+        default=default,
+        limited=problem.limited,
+        notes=(
+            *reference.notes,
+            *_uncertain_note(resolved),
+            *left_out,
+            *_default_note(default),
+            *measured.notes,
+        ),
         complete=measured.complete,
         seconds=time.spent,
     )
 
 
-def _omissions(task: Task) -> Sequence[str]:
-    """Notes on parts of the task that the diagram ignores."""
-    if not as_limits(task.scene.robot, task.options.limits).bounded.any():
+def _methods(
+    setting: Setting, schemes: Sequence[str], peers: Sequence[Peer]
+) -> tuple[list[Method], list[str]]:
+    """hovi's schemes and the reference tools that support the setting; why others do not."""
+    longest = LIMITED_SOLVE_SHARE * setting.longest if setting.problem.limited else setting.longest
+    methods: list[Method] = [
+        VariationalMethod(setting.problem, setting.guess, name, setting.clock, longest)
+        for name in schemes
+    ]
+    left_out = []
+    for peer in peers:
+        try:
+            methods.append(peer(setting))
+        except UnmeasurableError as error:
+            left_out.append(str(error))
+    return methods, list(dict.fromkeys(left_out))
+
+
+def _attainable(enough: Thresholds, resolved: ResolvedMotion) -> Thresholds:
+    """The thresholds, but none below the error of the resolved motion.
+
+    Within limits the cost alone decides, as its tolerance does not let it converge any further.
+    """
+    least = {measure: size(resolved.uncertainty, measure) for measure in MEASURES}
+    if resolved.limit_effect > 0:
+        return Thresholds(max(least["cost"], resolved.limit_effect), inf, inf)
+    return Thresholds(**{each: max(least[each], getattr(enough, each)) for each in MEASURES})
+
+
+def _require_runs(measured: Measured, budget: Budget) -> None:
+    """Raise UnmeasurableError if the budget ended before any run."""
+    if not measured.runs:
+        raise UnmeasurableError(
+            f"the budget of {budget.seconds:g} s ended before a scheme was measured; use a larger "
+            "one."
+        )
+
+
+def _uncertain_note(resolved: ResolvedMotion) -> Sequence[str]:
+    """How well the reference motion is known, if it did not converge."""
+    if resolved.converged:
         return ()
     return (
-        "The scene has limits; the diagram shows the motion without them, since with limits the "
-        "error is dominated by the times at which they become active, for every scheme.",
+        f"The reference motion is known to {resolved.uncertainty.cost:.0e} of its cost only, and "
+        "smaller errors say nothing; a larger budget refines it further.",
     )
+
+
+def _default_note(default: Choice) -> Sequence[str]:
+    """Why the default of `plan` has no star."""
+    if default.counts:
+        return ()
+    return (f"plan's default found {default.found} from this guess: {default.message}",)
 
 
 def _no_progress(text: str, fraction: float) -> None:

@@ -10,7 +10,7 @@ import functools
 import inspect
 import sys
 import types
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -57,6 +57,23 @@ def unchecked(function: Checked) -> Checked:
     return function
 
 
+def without_checks(checked: Checked) -> Checked:
+    """A function, or what makes an instance of a class, without the checks of its arguments.
+
+    For the steps of an optimiser, whose arguments are known to be right.
+    """
+    if not isinstance(checked, type):
+        return inspect.unwrap(checked)  # type: ignore[return-value]
+    initialize = inspect.unwrap(checked.__init__)
+
+    def make(*args: Any) -> Any:
+        made = checked.__new__(checked)
+        initialize(made, *args)
+        return made
+
+    return make  # type: ignore[return-value]
+
+
 def _checking(checked: Checked, names: Collection[str]) -> Checked:
     """The function with its arguments checked but for `names`."""
     parameters = functools.cache(lambda: _Parameters.of(checked, names))
@@ -64,10 +81,11 @@ def _checking(checked: Checked, names: Collection[str]) -> Checked:
     @functools.wraps(checked)
     def checking(*args: Any, **kwargs: Any) -> Any:
         known = parameters()
-        accepted, named = args, kwargs
+        accepted: Sequence[Any] = args
+        named = kwargs
         try:
             accepts = known.accepts if len(args) <= len(known.accepts) else known.repeated(args)
-            accepted = tuple([accept(value) for accept, value in zip(accepts, args, strict=False)])
+            accepted = [accept(value) for accept, value in zip(accepts, args)]  # noqa: B905 - speed
             for name in kwargs:
                 named[name] = known.named.get(name, _anything)(kwargs[name])
         except MismatchError:

@@ -34,6 +34,8 @@ def require_shape(name: str, array: npt.NDArray[Any], *shape: int | None) -> Non
 
     name: of the argument, for the message.
     """
+    if array.shape == shape:
+        return
     same = len(shape) == array.ndim
     if same and all(size in (None, n) for size, n in zip(shape, array.shape, strict=True)):
         return

@@ -175,7 +175,7 @@ class DiscreteLagrangian:
 
         step: in the intervals' scaled coordinates, shape (N, m, n).
         """
-        steps = self.point_steps(step, coordinates, expansion)
+        steps = self._point_steps(step, coordinates, expansion)
         pairs = zip(expansion.outputs, steps, strict=True)
         return [self.lagrangian.predicted_slope(y, J, dx) for (y, J), dx in pairs]
 
@@ -183,7 +183,7 @@ class DiscreteLagrangian:
         self, expansion: Expansion, step: Array, coordinates: Coordinates
     ) -> list[Array]:
         """y + J dx at the quadrature points after a step, (P, m) per batch; step as above."""
-        steps = self.point_steps(step, coordinates, expansion)
+        steps = self._point_steps(step, coordinates, expansion)
         pairs = zip(expansion.outputs, steps, strict=True)
         return [y + np.matmul(J, dx[:, :, None])[:, :, 0] for (y, J), dx in pairs]
 
@@ -194,6 +194,12 @@ class DiscreteLagrangian:
 
         expansion: at the path from which the step is taken.
         """
+        return self._point_steps(step, coordinates, expansion)
+
+    def _point_steps(
+        self, step: Array, coordinates: Coordinates, expansion: Expansion
+    ) -> list[Array]:
+        """As `point_steps`. Raises InputError for a step or an expansion of another grid."""
         N, m = self.grid.intervals, 4 + self.grid.inner_modes
         require_shape("step", step, N, m, self.lagrangian.nv)
         if len(expansion.values) != N:
@@ -316,12 +322,18 @@ class DiscreteLagrangian:
 
     def _check(self, path: DiscretePath, jets: list[Jet] | None = None) -> None:
         """Raise InputError for a path that does not fit the grid, or jets at other points."""
-        nq, nv = self.lagrangian.nq, self.lagrangian.nv
-        self.grid.require_path(path, nq, nv)
+        if path is not self._fitting[0]:
+            self.grid.require_path(path, self.lagrangian.nq, self.lagrangian.nv)
+            self._fitting[0] = path
         if jets and [[x.shape for x in jet] for jet in jets] != self._jet_shapes:
             raise InputError(
                 "the jets are not at this path's points: pass the result of `jets` for it, or None."
             )
+
+    @cached_property
+    def _fitting(self) -> list[DiscretePath | None]:
+        """The last path that was found to fit the grid."""
+        return [None]
 
     @cached_property
     def _jet_shapes(self) -> list[list[tuple[int, ...]]]:

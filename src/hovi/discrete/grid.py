@@ -178,6 +178,12 @@ class Grid:
         """The largest number of inner modes of an interval."""
         return max(scheme.inner_modes for scheme, _ in self.groups)
 
+    @property
+    def scheme_range(self) -> str:
+        """Name of the scheme, or of those with the fewest and the most inner modes."""
+        schemes = sorted((scheme.inner_modes, scheme.name) for scheme, _ in self.groups)
+        return " to ".join(dict.fromkeys((schemes[0][1], schemes[-1][1])))
+
 
 def _enriched(scheme: Scheme, modes: int) -> Scheme:
     """The Galerkin table with more modes, and as many points besides as the scheme has."""

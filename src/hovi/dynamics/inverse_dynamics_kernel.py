@@ -127,9 +127,9 @@ class InverseDynamicsKernel:
         q, v, a = self._points(q, v, a)
         if np.shape(weight) == (self._n,):
             weight = np.full(v.shape, weight)
-        weight = self._array("weight", weight, v.shape)
+        weight = _numbers("weight", weight, v.shape)
         if curvature is not None:
-            curvature = self._array("curvature", curvature, v.shape)
+            curvature = _numbers("curvature", curvature, v.shape)
         _check_threads(threads)
         tau = np.empty_like(v)
         J = np.empty((*v.shape, 3 * self._n))
@@ -139,23 +139,21 @@ class InverseDynamicsKernel:
 
     def _points(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
         q = _numbers("q", q)
-        q = self._array("q", q, (len(q), self._nq))
-        v = self._array("v", v, (len(q), self._n))
-        return q, v, self._array("a", a, v.shape)
-
-    def _array(self, name: str, x: Array, shape: tuple[int, ...]) -> Array:
-        x = _numbers(name, x)
-        if x.shape != shape:
-            raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
-        return x
+        shape = len(q), self._n
+        if q.shape != (len(q), self._nq):
+            raise InputError(f"q must have shape {(len(q), self._nq)}, got {q.shape}.")
+        return q, _numbers("v", v, shape), _numbers("a", a, shape)
 
 
-def _numbers(name: str, x: Array) -> Array:
-    """x as contiguous doubles, of one dimension or more."""
+def _numbers(name: str, x: Array, shape: tuple[int, ...] | None = None) -> Array:
+    """x as contiguous doubles of a shape; None for any of one dimension or more."""
     try:
-        return np.ascontiguousarray(x, dtype=np.float64)
+        x = np.ascontiguousarray(x, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{name} must be an array of numbers: {error}.") from error
+    if shape not in (None, x.shape):
+        raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
+    return x
 
 
 def _check_threads(threads: int) -> None:

@@ -97,6 +97,11 @@ class BandLayout:
         """1 + the unknown of every column of an interval, flat; 0 where it is fixed."""
         return self.unknowns.ravel() + 1
 
+    @cached_property
+    def shape(self) -> tuple[int, int]:
+        """Of the band: columns, with those that pad the last panel, and most rows of a panel."""
+        return PANEL * len(self.rows), max(self.rows, default=0)
+
     def assemble(self, hessian: Array) -> Array:
         """The band of a sum over intervals, one column of the lower triangle per row.
 
@@ -104,7 +109,7 @@ class BandLayout:
         the last panel is padded. Shape (4 panels, maximum rows of a panel).
         hessian: symmetric, shape (N, m, m, n, n).
         """
-        band = np.empty((PANEL * len(self.rows), max(self.rows, default=0)))
+        band = np.empty(self.shape)
         runs = self.runs
         native.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
         return band

@@ -59,12 +59,12 @@ class Robot:
 
     # Sizes and names
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Length of a configuration q."""
         return int(self.model.nq)
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Number of degrees of freedom: length of v, a and tau."""
         return int(self.model.nv)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,6 +24,7 @@ from hovi.accuracy.peers.collocation_table import (
 )
 from hovi.accuracy.peers.external_method import ExternalMethod
 from hovi.accuracy.peers.ipopt_method import CollocationMethod, Kernels
+from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.accuracy.peers.tools import EXTERNAL, tool_peers
 from hovi.accuracy.peers.worker_client import Worker
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
@@ -31,6 +33,7 @@ from hovi.discrete.guess import cubic
 from hovi.discrete.state import State
 from hovi.effects import Gravity, JointLimitPotential
 from hovi.errors import InputError, SchemeError, UnmeasurableError
+from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.robot.robot import Robot
@@ -163,6 +166,14 @@ def test_an_unsupported_scene_raises(two_link: Robot) -> None:
     problem = reach(Scene(two_link, [Gravity(), elbow]))
     with pytest.raises(UnmeasurableError, match="gravity and armature"):
         CollocationMethod(Setting(problem, None, None), "lg-3", Kernels(compiled=False))
+
+
+def test_limits_are_refused(setting: Setting) -> None:
+    lower = np.full((4, 2), -np.inf)
+    lower[3] = -8.0
+    problem = dataclasses.replace(setting.problem, limits=Limits(lower, -lower))
+    with pytest.raises(UnmeasurableError, match="do not hold limits along the whole motion"):
+        require_supported(dataclasses.replace(setting, problem=problem))
 
 
 # The robot that other tools read

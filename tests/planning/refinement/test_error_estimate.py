@@ -17,6 +17,7 @@ from hovi.discrete.motion_error import (
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError
+from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error, finer_than
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -233,6 +234,16 @@ def test_an_unknown_frame_and_another_duration_are_refused(
     longer = solve_on_grid(reach_problem(arm_scene, Grid.uniform(2.0, 8, galerkin(2))))
     with pytest.raises(InputError, match="same duration can be compared, not 2 s with 1 s"):
         true_error(longer, reach_reference)
+
+
+def test_an_estimate_within_limits_holds_its_time_limit(arm_scene: Scene) -> None:
+    lower = np.full((4, 2), -np.inf)
+    lower[1] = -3.0
+    problem = reach_problem(arm_scene, Grid.uniform(1.0, 12, galerkin(2)))
+    limited = solve_on_grid(dataclasses.replace(problem, limits=Limits(lower, -lower)))
+    assert limited.success
+    assert finer_than(limited) is not None
+    assert finer_than(limited, time_limit=1e-9) is None
 
 
 def test_only_minima_have_an_estimate(reach_reference: Solution) -> None:

@@ -1,4 +1,4 @@
-"""The check that the reference tools support a scene: vector joints, gravity and armature."""
+"""The check that the reference tools support a scene: a torque per joint, no limits."""
 
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ MAX_RELATIVE_DIFFERENCE = 1e-9
 
 
 def require_supported(setting: Setting) -> None:
-    """Raise UnmeasurableError for a scene whose cost is not 1/2 |RNEA|^2."""
+    """Raise UnmeasurableError for limits, and for a scene whose cost is not 1/2 |RNEA|^2."""
     problem = setting.problem
+    if problem.limited:
+        raise UnmeasurableError(
+            "The reference tools are left out: they do not hold limits along the whole motion."
+        )
     if not problem.plain:
         raise UnmeasurableError(
             "the reference tools need two boundary states and a torque at every joint."

@@ -15,11 +15,7 @@ from hovi.planning.task_file.task import Task
 
 def scheme_text(task: Task, grid: Grid) -> str:
     """The scheme of the task, or those chosen for its tolerance."""
-    if task.options.names_grid:
-        return task.options.scheme_name
-    by_modes = sorted((scheme.inner_modes, scheme.name) for scheme, _ in grid.groups)
-    names = [name for _, name in by_modes]
-    return names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
+    return task.options.scheme_name if task.options.names_grid else grid.scheme_range
 
 
 def accuracy_json(solution: Solution, task: Task) -> dict[str, Any]:

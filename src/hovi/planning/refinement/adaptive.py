@@ -162,7 +162,7 @@ class _Search:
         """A solution with its estimated error, recorded as a round."""
         raise_if_interrupted()
         began = time.perf_counter()
-        candidate = Candidate.of(solution, self.tolerance)
+        candidate = Candidate.of(solution, self.tolerance, self.deadline.seconds_left)
         grid = solution.trajectory.grid
         points = sum(len(scheme.points) * len(index) for scheme, index in grid.groups)
         seconds = solution.solve_seconds + time.perf_counter() - began

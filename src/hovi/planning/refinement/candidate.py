@@ -71,9 +71,9 @@ class Candidate:
     later: float = 0.0
 
     @classmethod
-    def of(cls, solution: Solution, tolerance: Tolerance) -> Self:
-        """A solution with the estimate of its error."""
-        finer = finer_than(solution) if solution.success else None
+    def of(cls, solution: Solution, tolerance: Tolerance, time_limit: float | None = None) -> Self:
+        """A solution with the estimate of its error. time_limit: of the finer solution, in [s]."""
+        finer = finer_than(solution, time_limit) if solution.success else None
         if finer is None:
             return cls(solution, tolerance)
         assert solution.problem is not None

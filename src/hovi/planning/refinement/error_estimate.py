@@ -57,8 +57,8 @@ def estimate_against(
     return deviation(solution.trajectory, finer.trajectory, costs, frame)
 
 
-def finer_than(solution: Solution) -> FinerSolution | None:
-    """The finer solution that `estimate_error` compares with."""
+def finer_than(solution: Solution, time_limit: float | None = None) -> FinerSolution | None:
+    """The finer solution that `estimate_error` compares with. time_limit: in [s]."""
     problem = solution.problem
     if problem is None:
         raise InputError("this solution has no problem; call plan again instead.")
@@ -67,7 +67,7 @@ def finer_than(solution: Solution) -> FinerSolution | None:
             f"only errors of minima can be estimated, and this solve ended in {solution.status}; "
             "plan again with more time or another initial guess."
         )
-    return finer_solution(problem, solution.trajectory.path)
+    return finer_solution(problem, solution.trajectory.path, time_limit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,16 +96,21 @@ class FinerSolution:
         return self.problem.trajectory(self.path)
 
 
-def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolution | None:
-    """The solution on a finer grid near a given one; None if none was found."""
+def finer_solution(
+    problem: TrajectoryProblem, path: DiscretePath, time_limit: float | None = None
+) -> FinerSolution | None:
+    """The solution on a finer grid near a given one; None if none was found.
+
+    time_limit: of a full solve, in [s].
+    """
     if problem.limited:
         halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
         curve = stretched(problem.trajectory(path), problem.grid.duration)
-        return _solved(halves, halves.path(curve), problem, path)
+        return _solved(halves, halves.path(curve), problem, path, time_limit)
     fine = problem.finer
     start = prolonged(path, fine.grid)
     if problem.constrained:
-        return _solved(fine, start, problem, path)
+        return _solved(fine, start, problem, path, time_limit)
     values = problem.ld.values(path)
     objective, known = ActionObjective(fine), float(np.sum(values))
     efforts = interpolated_slopes(problem.ld, path, fine.ld)
@@ -114,7 +119,7 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
     found = nearby_minimum(objective, start, model, known)
     if found is not None:
         return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
-    solution = solve_on_grid(fine, start, max_iterations=MAX_FINER_STEPS)
+    solution = solve_on_grid(fine, start, max_iterations=MAX_FINER_STEPS, time_limit=time_limit)
     if not solution.success:
         return None
     path, cost = solution.trajectory.path, solution.cost
@@ -122,13 +127,17 @@ def finer_solution(problem: TrajectoryProblem, path: DiscretePath) -> FinerSolut
 
 
 def _solved(
-    fine: TrajectoryProblem, start: DiscretePath, problem: TrajectoryProblem, path: DiscretePath
+    fine: TrajectoryProblem,
+    start: DiscretePath,
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    time_limit: float | None,
 ) -> FinerSolution | None:
     """The finer solution by a full solve, which may split intervals for limits.
 
     Its gains are half the integral of the squared difference of the torques.
     """
-    solution = solve_on_grid(fine, start)
+    solution = solve_on_grid(fine, start, time_limit=time_limit)
     if not solution.success or solution.problem is None:
         return None
     coarse, finer = problem.trajectory(path), solution.trajectory

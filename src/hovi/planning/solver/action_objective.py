@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import without_checks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import with_ends_of_nodes
@@ -24,6 +25,7 @@ from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
+from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +40,13 @@ CHART_TORQUE_FLOOR = 2e-5
 it, and the equations of passive joints are solved to 1e-10 of the torque scale."""
 MAX_BAND_INTERVALS = 1000
 """Maximum number of intervals for the nodal band matrix; its condition number grows like N^4."""
+
+# called at each step
+_expand = without_checks(DiscreteLagrangian.expand)
+_jets = without_checks(DiscreteLagrangian.jets)
+_predict = without_checks(DiscreteLagrangian.predict)
+_integrate = without_checks(Robot.integrate)
+_new_path = without_checks(DiscretePath)
 
 
 class ActionObjective(Objective[DiscretePath]):
@@ -162,7 +171,7 @@ class ActionObjective(Objective[DiscretePath]):
     def jets(self, x: DiscretePath) -> list[Jet]:
         """(q, v, a) at the quadrature points; cached for the last path."""
         if self._last is None or self._last[0] is not x:
-            self._last = x, self.ld.jets(x)
+            self._last = x, _jets(self.ld, x)
         return self._last[1]
 
     def model(
@@ -180,7 +189,7 @@ class ActionObjective(Objective[DiscretePath]):
         if self.moments is not None:
             outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
             return [self.output_slope(y, i) for i, y in enumerate(outputs)]
-        slopes = self.ld.predict(expansion, step, self.coordinates)
+        slopes = _predict(self.ld, expansion, step, self.coordinates)
         if self.multipliers is None:
             return slopes
         return [slope + more for slope, more in zip(slopes, self.multipliers.torque, strict=True)]
@@ -198,7 +207,8 @@ class ActionObjective(Objective[DiscretePath]):
         multipliers = self.multipliers
         if multipliers is not None:
             terms = self._with_moments(x, multipliers).added_to(terms)
-        self._expansion = self.ld.expand(x, self.coordinates, curvatures, terms, self.jets(x))
+        jets = self.jets(x)
+        self._expansion = _expand(self.ld, x, self.coordinates, curvatures, terms, jets)
         if multipliers is not None:
             self._add_conditions(x, self._expansion, multipliers)
             if self.moments is not None:
@@ -254,7 +264,7 @@ class ActionObjective(Objective[DiscretePath]):
         """The path moved by a step: nodes by `integrate`, everything else added."""
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
-        path = DiscretePath(self.problem.robot.integrate(x.q, dq), *moved)
+        path = _new_path(_integrate(self.problem.robot, x.q, dq), *moved)
         if self.ld.chart is None:
             return path
         return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.interior_point import BoundedOutcome, minimize_bounded
+from hovi.optimize.interior_point import BoundedOutcome, Outputs, minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
@@ -102,7 +102,7 @@ class BoundedSearch:
             objective, options = self.objective(known), self.remaining_options()
             options = dataclasses.replace(options, decrease=max(decrease, options.decrease))
             outcome = self._minimized(objective, x, options, start)
-            mu = WARM_MU_RANGE[1] * mean_density(outcome, objective)
+            mu = WARM_MU_RANGE[1] * mean_density(outcome.outputs, objective)
             start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
             return outcome
 
@@ -168,6 +168,6 @@ class BoundedSearch:
         return sentence + static_sentence(self.problem, self.limits)
 
 
-def mean_density(outcome: Bounded, objective: BoundedAction) -> float:
+def mean_density(outputs: Outputs, objective: BoundedAction) -> float:
     """|objective| / sum of all weights: its mean density."""
-    return max(abs(outcome.outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))
+    return max(abs(outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))

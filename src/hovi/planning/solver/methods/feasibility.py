@@ -92,7 +92,7 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     constrained = search.problem.constrained
     known = first_multipliers(search.problem, outcome.x) if constrained else None
     objective = search.objective(known)
-    density = mean_density(outcome, objective)
+    density = mean_density(outcome.outputs, objective)
     least = np.inf
     for guess in _guesses(search):
         path, violation, stop = _penalized(search, objective, guess, density)

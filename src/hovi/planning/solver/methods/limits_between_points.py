@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched
+from hovi.optimize.barrier import Barrier
 from hovi.optimize.trust_region import Stop
 from hovi.planning.solver.methods.bounded_search import (
     STOPPED,
@@ -28,6 +30,11 @@ HALVING_EXCESS = 0.05
 """Excess, as a share of the range, above which intervals are halved at once."""
 NEIGHBOR_EXCESS = 0.01
 """Excess, as a share of the range, above which an interval is halved along with the worst."""
+WARM_EXCESS = 0.2
+"""Excess, as a share of the range, up to which the motion is the guess on halved intervals; one
+that exceeds limits further between the points is an artifact of the coarse grid."""
+HALVED_MU = 1e-2
+"""First barrier parameter from such a guess, relative to the mean density of the objective."""
 TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
 EXTRA_TIGHTENING = 5.0
@@ -57,7 +64,7 @@ def tightened(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str, fl
         failed = again is None or not (usable(again) or again.stop in STOPPED)
         if failed and finer:
             halvings, on_grid = halvings + 1, 0
-            again, reason = _solved_on_halves(search, sides)
+            again, reason = _solved_on_halves(search, outcome, sides)
         if again is None:
             break
         outcome = again
@@ -86,16 +93,16 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
-    mu = share * mean_density(outcome, objective)
+    mu = share * mean_density(outcome.outputs, objective)
     start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
     return search.solve(outcome.x, start)
 
 
-def _solved_on_halves(search: BoundedSearch, sides: Array) -> tuple[Bounded, str]:
+def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> tuple[Bounded, str]:
     """Solve again with those intervals halved in which a limit is exceeded, and their neighbours.
 
-    From the initial guess: a motion that exceeds limits far between the points is an artifact of
-    the coarse grid and a bad guess on a finer one.
+    From the motion, if its excess is within WARM_EXCESS and that succeeds; else from the initial
+    guess.
     """
     grid = search.problem.grid
     by_interval = sides.max(axis=(0, 2))
@@ -103,9 +110,24 @@ def _solved_on_halves(search: BoundedSearch, sides: Array) -> tuple[Bounded, str
     worst = chosen.copy()
     chosen[1:] |= worst[:-1]
     chosen[:-1] |= worst[1:]
-    curve = stretched(search.problem.trajectory(search.guess), grid.duration)
+    motion, guess = (
+        stretched(search.problem.trajectory(path), grid.duration)
+        for path in (outcome.x, search.guess)
+    )
     search.problem = search.problem.on(grid.halved(chosen))
-    search.guess = search.problem.path(curve)
+    search.guess = search.problem.path(guess)
     search.multipliers = None
     search.margins = search.no_margins()
+    if usable(outcome) and by_interval.max() <= WARM_EXCESS:
+        again = _solved_from(search, search.problem.path(motion))
+        if usable(again) or again.stop in STOPPED:
+            return again, ""
     return feasible_motion(search)
+
+
+def _solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
+    """Solve from a motion that nearly is a solution."""
+    objective = search.objective(search.multipliers)
+    outputs = objective.outputs(path)
+    mu = HALVED_MU * mean_density(outputs, objective)
+    return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
