@@ -23,8 +23,8 @@ robot = hovi.load_robot("panda", locked=["panda_finger_joint1", "panda_finger_jo
 print(robot.describe())
 
 # %%
-# Without a scheme or a number of intervals the grid is chosen for a cost within a thousandth; the
-# torque between the nodes depends on second derivatives and needs more.
+# Without a scheme or a number of intervals the grid is chosen for a cost within 1e-3 of the
+# minimum's. The torque between the nodes depends on second derivatives and needs a finer grid.
 
 scene = hovi.Scene(robot, effects=[hovi.effects.Gravity()])
 solution = hovi.plan(

@@ -19,7 +19,7 @@ from hovi.planning.refinement.resolution import resolved
 from hovi.planning.solver.solver import solve_on_grid
 
 RUNS = ("ur5_reach", 16), ("panda_reach", 16), ("panda_reach", 60)
-"""Scenes and intervals; 16 do not carry the Panda's motion, and stay for comparison."""
+"""Scenes and intervals; 16 do not resolve the Panda's motion, and are kept for comparison."""
 SCHEME = "galerkin-2"
 
 
@@ -34,8 +34,8 @@ def measure(scene: str, intervals: int) -> list[dict[str, object]]:
     built = time.perf_counter() - began - solution.solve_seconds
     assert solution.success, solution.message
     warm = best_time(lambda: solve_on_grid(problem), seconds=2.0)
-    told = "" if resolved(solution).success else ", unresolved"
-    ours = {"solver": f"hovi{told}", "steps": solution.nit, "seconds": warm, "built": built}
+    note = "" if resolved(solution).success else ", unresolved"
+    ours = {"solver": f"hovi{note}", "steps": solution.nit, "seconds": warm, "built": built}
     rows = [ours | {"cost": solution.cost, "stays": 0.0}]
     transcription = Transcription(problem)
     with tempfile.TemporaryDirectory() as folder:

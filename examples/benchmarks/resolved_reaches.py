@@ -1,14 +1,14 @@
-"""Is what hovi calls a minimum one? Random reaches of twelve arms, all defaults, judged outside.
+"""Are the minima of hovi minima? Random reaches of twelve arms with defaults, judged independently.
 
-Start and goal are drawn uniformly within the position limits, at most one turn, among pairs that
-can be held with 0.9 of the torque limits; T is 1.5 to 3 times that of the slowest joint at its
-velocity limit. A success is denied if
-- the integral of 1/2 |tau|^2 along its curve, with torques of pin.rnea from sampled (q, v, a), by
-  48 Gauss points per interval, differs from its cost by more than 1 %;
+Start and goal are drawn uniformly within the position limits, at most half a turn from the neutral
+configuration, among pairs that can be held with 0.9 of the torque limits. T is 1.5 to 3 times the
+time that the slowest joint needs at its velocity limit. A success is denied if
+- the integral of 1/2 |tau|^2 along its curve, with torques of pin.rnea from sampled (q, v, a) at 48
+  Gauss points per interval, differs from its cost by more than 1 %;
 - a solve on a grid four times finer, started from it, is no minimum within 1 % of its cost: neither
-  on four times as many equal intervals with `galerkin-2`, which may carry less of the motion than
+  with `galerkin-2` on four times as many equal intervals, which may resolve less of the motion than
   its own, nor on its own intervals cut into four;
-- a limit is exceeded by more than 2e-6 of its range at one of 50,001 instants.
+- a limit is exceeded by more than 2e-6 of its range at one of 50,001 times.
 
     python resolved_reaches.py [ARM ...] [--count 25] [--seed 0] [--limits urdf|none] [--jobs 1]
 """
@@ -31,29 +31,37 @@ import hovi
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.schemes import galerkin
 
-ANY_BUT_FINGERS = r"(?!.*(finger|[Gg]ripper)).*"
+ALL_BUT_FINGERS = r"(?!.*(finger|[Gg]ripper)).*"
 ARMS = {
-    "ur5": ANY_BUT_FINGERS,
-    "ur10": ANY_BUT_FINGERS,
-    "panda": ANY_BUT_FINGERS,
-    "z1": ANY_BUT_FINGERS,
-    "xarm7": ANY_BUT_FINGERS,
-    "kinova": ANY_BUT_FINGERS,
-    "talos_arm": ANY_BUT_FINGERS,
+    **dict.fromkeys(
+        ("ur5", "ur10", "panda", "z1", "xarm7", "kinova", "talos_arm"), ALL_BUT_FINGERS
+    ),
     "so100": r"(shoulder|elbow|wrist)_.*",
-    "bravo7_no_ee": ANY_BUT_FINGERS,
+    "bravo7_no_ee": ALL_BUT_FINGERS,
     "tiago": r"arm_\d_joint",
     "baxter": r"left_[swe]\d",
     "alex_nub_hands": r"Left(?!Gripper).*",
 }
-"""Robots of example-robot-data, and the joints that move; the others are locked."""
-HOLDING_SHARE, TIME_LIMIT = 0.9, 600.0
-DENIED, EXCESS, INSTANTS, GAUSS = 1e-2, 2e-6, 50_001, 48
+"""Robots of example-robot-data, with a pattern of the joints that move; all others are locked."""
+HOLDING_SHARE = 0.9
+"""Largest torque that holds a start or goal, as a share of its limit."""
+TIME_LIMIT = 600.0
+"""Time limit of a plan, in [s]."""
+MAX_DIFFERENCE = 1e-2
+"""Largest relative difference of costs of a success that is not denied."""
+MAX_EXCESS = 2e-6
+"""Largest accepted excess over a limit, as a share of its range: twice hovi's own tolerance."""
+GAUSS_POINTS, SAMPLES = 48, 50_001
+"""Points per interval of the integral, and times at which limits are checked."""
 
 
 @dataclass(frozen=True)
 class Reach:
-    """The result of one reach."""
+    """The result of one reach.
+
+    nit: steps of the optimiser. seconds: of CPU. denied: why the success is denied, or "".
+    whirl: largest velocity of a joint, over (half a turn + its distance) / T.
+    """
 
     arm: str
     limits: str
@@ -79,11 +87,11 @@ def reaches(scene: hovi.Scene, count: int, seed: int) -> list[tuple[np.ndarray, 
     rng, found = np.random.default_rng(seed), []
     while len(found) < count:
         start, goal = (_draw(robot, rng) for _ in range(2))
-        held = np.abs(_static(scene, np.array([start, goal]))) <= HOLDING_SHARE * robot.effort_limit
-        way = np.abs(robot.difference(start, goal))
-        share = rng.uniform(1.5, 3.0)
-        if held.all():
-            T = share * np.max(way / np.clip(robot.velocity_limit, 0.1, 10.0))
+        slowness = rng.uniform(1.5, 3.0)
+        torque = np.abs(_holding_torque(scene, np.array([start, goal])))
+        if (torque <= HOLDING_SHARE * robot.effort_limit).all():
+            distance = np.abs(robot.difference(start, goal))
+            T = slowness * np.max(distance / np.clip(robot.velocity_limit, 0.1, 10.0))
             found.append((start, goal, float(T)))
     return found
 
@@ -99,12 +107,12 @@ def _draw(robot: hovi.Robot, rng: np.random.Generator) -> np.ndarray:
     return np.asarray(pin.integrate(model, pin.neutral(model), angle))
 
 
-def _static(scene: hovi.Scene, q: np.ndarray) -> np.ndarray:
+def _holding_torque(scene: hovi.Scene, q: np.ndarray) -> np.ndarray:
     zero = np.zeros((len(q), scene.robot.nv))
     return scene.inverse_dynamics(q, zero, zero)
 
 
-def outside_model(scene: hovi.Scene) -> pin.Model:
+def oracle_model(scene: hovi.Scene) -> pin.Model:
     """The robot's model with the scene's gravity and armature, for pin.rnea."""
     model = scene.robot.model.copy()
     model.gravity.linear = np.array([0.0, 0.0, -9.81])
@@ -113,7 +121,7 @@ def outside_model(scene: hovi.Scene) -> pin.Model:
 
 
 def torques(model: pin.Model, motion: object) -> np.ndarray:
-    """pin.rnea at samples (q, v, a)."""
+    """Torques of pin.rnea at samples of q, v and a, shape (M, nv), in [N m]."""
     data = model.createData()
     rows = zip(motion.q, motion.v, motion.a, strict=True)
     return np.array([pin.rnea(model, data, *row) for row in rows])
@@ -121,45 +129,45 @@ def torques(model: pin.Model, motion: object) -> np.ndarray:
 
 def integral(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
     """1/2 integral |tau|^2 along the curve."""
-    x, w = np.polynomial.legendre.leggauss(GAUSS)
+    x, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     t, h = np.asarray(trajectory.t), np.diff(trajectory.t)[:, None]
-    tau = torques(outside_model(scene), trajectory.sample((t[:-1, None] + h * (x + 1) / 2).ravel()))
+    tau = torques(oracle_model(scene), trajectory.sample((t[:-1, None] + h * (x + 1) / 2).ravel()))
     return float(np.sum((h * w / 2).ravel() * 0.5 * np.sum(tau**2, axis=1)))
 
 
 def excess(scene: hovi.Scene, trajectory: hovi.Trajectory) -> float:
-    """Largest excess over a limit, relative to its range."""
+    """Largest excess over a limit, as a share of its range; unlimited joints are left out."""
     robot = scene.robot
-    motion = trajectory.sample(np.linspace(0.0, trajectory.duration, INSTANTS))
-    rows = [
+    motion = trajectory.sample(np.linspace(0.0, trajectory.duration, SAMPLES))
+    bounds = [
         (motion.v, -robot.velocity_limit, robot.velocity_limit),
-        (torques(outside_model(scene), motion), -robot.effort_limit, robot.effort_limit),
+        (torques(oracle_model(scene), motion), -robot.effort_limit, robot.effort_limit),
     ]
     if robot.vector_joints:
-        rows.append((motion.q, robot.lower, robot.upper))
+        bounds.append((motion.q, robot.lower, robot.upper))
     worst = 0.0
-    for y, low, high in rows:
-        wide = np.isfinite(low) & np.isfinite(high) & (high > low) & (high - low < 1e6)
-        outside = np.maximum(y - high, low - y)[:, wide] / (high - low)[wide]
+    for y, low, high in bounds:
+        limited = np.isfinite(low) & np.isfinite(high) & (high > low) & (high - low < 1e6)
+        outside = np.maximum(y - high, low - y)[:, limited] / (high - low)[limited]
         worst = max(worst, float(outside.max(initial=0.0)))
     return worst
 
 
 def denial(scene: hovi.Scene, limits: str, plan: hovi.Solution) -> str:
     """Why a success is denied, or ""."""
-    apart = integral(scene, plan.trajectory) / plan.cost - 1
-    if abs(apart) > DENIED:
-        return f"integral {apart:+.1e}"
-    over = excess(scene, plan.trajectory) if limits == "urdf" else 0.0
-    N = 4 * plan.trajectory.grid.intervals
-    if over > EXCESS:
-        return f"limits {over:.1e}"
-    finer = _solved(plan, hovi.Grid.uniform(plan.trajectory.duration, N, galerkin(2)))
+    difference = integral(scene, plan.trajectory) / plan.cost - 1
+    if abs(difference) > MAX_DIFFERENCE:
+        return f"integral {difference:+.1e}"
+    beyond = excess(scene, plan.trajectory) if limits == "urdf" else 0.0
+    if beyond > MAX_EXCESS:
+        return f"limits {beyond:.1e}"
+    grid = plan.trajectory.grid
+    finer = _solved(plan, hovi.Grid.uniform(grid.duration, 4 * grid.intervals, galerkin(2)))
     if not _confirms(finer, plan):
-        finer = _solved(plan, _quarters(plan.trajectory.grid))
-    return (
-        "" if _confirms(finer, plan) else f"finer {finer.status} {finer.cost / plan.cost - 1:+.1e}"
-    )
+        finer = _solved(plan, _quarters(grid))
+    if _confirms(finer, plan):
+        return ""
+    return f"finer {finer.status} {finer.cost / plan.cost - 1:+.1e}"
 
 
 def _solved(plan: hovi.Solution, grid: hovi.Grid) -> hovi.Solution:
@@ -168,7 +176,8 @@ def _solved(plan: hovi.Solution, grid: hovi.Grid) -> hovi.Solution:
 
 
 def _confirms(finer: hovi.Solution, plan: hovi.Solution) -> bool:
-    return finer.success and abs(finer.cost / plan.cost - 1) <= DENIED
+    """Whether a finer solution is a minimum of nearly the same cost."""
+    return finer.success and abs(finer.cost / plan.cost - 1) <= MAX_DIFFERENCE
 
 
 def _quarters(grid: hovi.Grid) -> hovi.Grid:
@@ -186,15 +195,13 @@ def measure(arm: str, limits: str, number: int, count: int, seed: int) -> Reach:
     plan = hovi.plan(scene, *ends, T, limits=limits, time_limit=TIME_LIMIT, processes=1)
     seconds = time.process_time() - began
     denied = denial(scene, limits, plan) if plan.success else ""
-    sample = plan.trajectory.sample(np.linspace(0, T, 2001))
-    way = np.pi + np.abs(scene.robot.difference(*ends))
-    whirl = float(np.max(np.abs(sample.v).max(axis=0) * T / way))
-    row = Reach(
-        arm, limits, number, str(plan.status), plan.nit, seconds, denied, whirl, plan.message
-    )
-    text = f"{arm} {limits} {number}: T {T:.2f} {plan.status} {plan.nit} steps {seconds:.2f} s"
+    velocity = np.abs(plan.trajectory.sample(np.linspace(0, T, 2001)).v).max(axis=0)
+    unit = (np.pi + np.abs(scene.robot.difference(*ends))) / T
+    whirl = float(np.max(velocity / unit))
+    status = str(plan.status)
+    text = f"{arm} {limits} {number}: T {T:.2f} {status} {plan.nit} steps {seconds:.2f} s"
     print(f"{text} whirl {whirl:.1f} {denied}", file=sys.stderr, flush=True)
-    return row
+    return Reach(arm, limits, number, status, plan.nit, seconds, denied, whirl, plan.message)
 
 
 def main() -> None:
@@ -219,25 +226,27 @@ def main() -> None:
 
 def _print(kind: str, arms: list[str], rows: list[Reach]) -> None:
     """The table by arm, and a line for every denied success."""
-    table = []
-    for arm in [*arms, "all"]:
-        own = [row for row in rows if row.limits == kind and arm in (row.arm, "all")]
-        others = Counter(row.status for row in own if row.status != "minimum")
-        steps, seconds = [row.nit for row in own], [row.seconds for row in own]
-        table.append(
-            [
-                f"`{arm}`",
-                f"{len(own) - sum(others.values())} of {len(own)}",
-                ", ".join(f"{n} {status}" for status, n in others.items()) or "-",
-                sum(bool(row.denied) for row in own),
-                f"{np.median(steps):.0f}, {max(steps)}",
-                f"{np.median(seconds):.2f}, {max(seconds):.2f}",
-            ]
-        )
-    print_table(["arm", "minima", "others", "denied", "steps", "seconds of CPU"], table)
-    for row in rows:
-        if row.limits == kind and row.denied:
+    own = [row for row in rows if row.limits == kind]
+    table = [_summary(arm, [row for row in own if row.arm == arm]) for arm in arms]
+    columns = ["arm", "minima", "others", "denied", "steps", "seconds of CPU"]
+    print_table(columns, [*table, _summary("all", own)])
+    for row in own:
+        if row.denied:
             print(f"- denied: `{row.arm}` {row.number}: {row.denied}")
+
+
+def _summary(name: str, rows: list[Reach]) -> list[object]:
+    """A row of the table."""
+    others = Counter(row.status for row in rows if row.status != "minimum")
+    steps, seconds = [row.nit for row in rows], [row.seconds for row in rows]
+    return [
+        f"`{name}`",
+        f"{len(rows) - others.total()} of {len(rows)}",
+        ", ".join(f"{n} {status}" for status, n in others.items()) or "-",
+        sum(bool(row.denied) for row in rows),
+        f"{np.median(steps):.0f}, {max(steps)}",
+        f"{np.median(seconds):.2f}, {max(seconds):.2f}",
+    ]
 
 
 if __name__ == "__main__":

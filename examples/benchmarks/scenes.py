@@ -19,7 +19,7 @@ RUNS: tuple[tuple[str, int | None], ...] = (
     ("panda_reach", 16),
     ("panda_reach", None),
 )
-"""Scenes, and intervals in place of their own: 16 do not carry the Panda's motion."""
+"""Scenes, and intervals, None for the scene's own; 16 do not resolve the Panda's motion."""
 
 
 def measure(scene: str, intervals: int | None) -> dict[str, float]:

@@ -111,7 +111,7 @@ def test_what_does_not_fit_is_refused_by_name_and_kind(name: str) -> None:
         assert sentence.endswith(".")
 
 
-def test_a_class_is_no_object_of_a_protocol() -> None:
+def test_a_class_is_not_accepted_for_an_object_of_a_protocol() -> None:
     for value in (1, "motor", Robot()):
         with pytest.raises(InputError, match="drive must be a Drive, a function or None"):
             function(drive=value)
@@ -126,7 +126,7 @@ def test_arguments_by_position_are_checked_too() -> None:
         Made.of(1.0, 2.0)  # type: ignore[call-arg]
 
 
-def test_arrays_are_converted_and_what_is_one_is_passed_on() -> None:
+def test_lists_become_arrays_and_arrays_are_passed_on() -> None:
     given = np.zeros((3, 2))[:, ::2]
     assert function(array=given)["array"] is given
     converted = function(array=[1, 2])["array"]
@@ -146,7 +146,7 @@ def further(first: float, *rest: float, **options: int) -> tuple[Any, ...]:
     return first, rest, options
 
 
-def test_further_arguments_are_checked() -> None:
+def test_arguments_beyond_the_named_ones_are_checked() -> None:
     assert further(1.0, 2.0, 3, key="any") == (1.0, (2.0, 3), {"key": "any"})
     with pytest.raises(InputError, match="rest must be a number, got 'x'"):
         further(1.0, 2.0, "x")  # type: ignore[arg-type]
@@ -186,7 +186,7 @@ def test_constructor_and_public_methods_of_a_class_are_checked() -> None:
             call(None)  # type: ignore[operator]
 
 
-def test_what_checks_itself_is_left_alone() -> None:
+def test_private_methods_and_those_with_a_decorator_of_their_own_are_not_checked() -> None:
     made = Made(1.0, own=None)  # type: ignore[arg-type]
     assert made.quick(None) is None  # type: ignore[arg-type]
     assert made._inner(None) is None  # type: ignore[arg-type]

@@ -43,5 +43,7 @@ def test_rows_must_broadcast() -> None:
     require_rows((("a", np.zeros((4, 1, 3)), 3), ("b", np.zeros((5, 2)), 2)))
     with pytest.raises(InputError, match=r"a must have shape \(\.\.\., 3\), got \(\)"):
         require_rows((("a", np.zeros(()), 3),))
-    with pytest.raises(InputError, match=r"b has rows \(4,\), which do not fit \(5,\)"):
+    with pytest.raises(
+        InputError, match=r"b must have .* rows \(4,\) do not broadcast with \(5,\)"
+    ):
         require_rows((("a", np.zeros((5, 3)), 3), ("b", np.zeros((4, 3)), 3)))

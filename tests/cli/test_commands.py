@@ -171,7 +171,7 @@ goal.q = [1.5707963267948966, 0.0]
 """
 
 
-def test_a_grid_that_cannot_carry_its_motion_is_called_unresolved(run: Run, tmp_path: Path) -> None:
+def test_a_motion_that_its_grid_does_not_resolve_is_unresolved(run: Run, tmp_path: Path) -> None:
     path = scene(tmp_path, SWING_UP.format(duration=200.0))
     code, out, _ = run("plan", path, "--intervals", "16")
     assert code == 1

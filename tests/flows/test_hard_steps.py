@@ -111,7 +111,7 @@ def test_their_flows_have_the_order_of_the_scheme(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_step_found_the_long_way_is_symplectic(seed: int) -> None:
+def test_a_step_found_by_shorter_steps_is_symplectic(seed: int) -> None:
     L, (x, p) = effort("z1"), start("z1", 0.1, seed)
     S = SchemeLagrangian(L, galerkin(2), STEP).from_start(x[None], p[None]).tangent[0]
     m = len(S) // 2

@@ -230,7 +230,7 @@ def test_the_command_refuses_in_one_sentence(
     assert sentence in capsys.readouterr().err
 
 
-def test_of_several_tips_the_one_that_strays_most_is_told(two_arms: Robot) -> None:
+def test_of_several_tips_the_one_with_the_largest_deviation_is_reported(two_arms: Robot) -> None:
     scene = Scene(two_arms, [Gravity()])
     ends = State(two_arms.neutral()), State(two_arms.neutral() + 0.2)
     motion = plan(scene, *ends, 0.5, limits="none").trajectory

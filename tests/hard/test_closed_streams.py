@@ -62,7 +62,7 @@ def test_output_that_nobody_can_read_is_an_error(words: Sequence[str]) -> None:
     assert (done.returncode, done.stderr) == (1, CLOSED)
 
 
-def test_a_command_without_output_does_not_mind() -> None:
+def test_a_command_without_output_succeeds_with_closed_streams() -> None:
     program = (
         "import hovi.cli.application as a\n"
         "a.app.command('quiet')(lambda: None)\n"
@@ -105,7 +105,7 @@ run()
 """
 
 
-def test_a_pipe_that_breaks_elsewhere_is_told() -> None:
+def test_a_pipe_that_breaks_elsewhere_is_reported() -> None:
     """A worker that ends while it is started, for instance; only stdout's reader may be silent."""
     done = run(("broken",), (), ("-c", BROKEN))
     assert done.returncode == 2
@@ -114,7 +114,7 @@ def test_a_pipe_that_breaks_elsewhere_is_told() -> None:
 
 
 @pytest.mark.parametrize("terminal", [False, True])
-def test_progress_ends_nothing_when_its_reader_has_gone(
+def test_progress_raises_nothing_when_its_reader_has_gone(
     terminal: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reader, writer = os.openpty() if terminal else os.pipe()

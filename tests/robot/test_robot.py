@@ -465,6 +465,18 @@ def test_every_robot_can_be_described(two_link: Robot) -> None:
         assert robot.name in robot.describe()
 
 
+def test_links_keep_their_names_when_a_joint_with_the_name_of_a_link_is_locked(
+    tmp_path: Path,
+) -> None:
+    """A link "rod/link", too, which looks like a link that is renamed while joints are locked."""
+    file = mesh_arm(tmp_path, "rod.stl")
+    for old, new in (('"rod"', '"rod/link"'), ('"base"', '"hinge"')):
+        file.write_text(file.read_text().replace(old, new))
+    free, locked = load_robot(file), load_robot(file, locked=["hinge"])
+    assert sorted(locked.frame_names) == sorted(free.frame_names)
+    assert "rod/link" in locked.frame_names
+
+
 def test_a_joint_whose_link_has_its_name_can_be_locked() -> None:
     """SO-100: joint and link 'gripper'; Pinocchio's own reduction refuses the name."""
     free, locked = load_robot("so100"), load_robot("so100", locked=["gripper"])

@@ -96,7 +96,7 @@ def test_the_tips_of_every_example_move_and_end_its_longest_chains(name: str) ->
 
 
 @pytest.mark.parametrize(("name", "tips"), EXPECTED.items())
-def test_a_tip_is_what_a_person_calls_it(name: str, tips: tuple[str, ...]) -> None:
+def test_the_tips_are_those_that_a_person_would_name(name: str, tips: tuple[str, ...]) -> None:
     assert load_robot(name).tip_frames == tips
 
 
@@ -207,7 +207,7 @@ def test_names_of_tools_hands_and_feet(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["", *NO_TOOLS.split()])
-def test_names_of_what_is_no_tool(name: str) -> None:
+def test_other_names_are_not_those_of_tools(name: str) -> None:
     assert not is_end_effector_name(name)
 
 

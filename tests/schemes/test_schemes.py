@@ -119,7 +119,7 @@ def test_a_galerkin_table_holds_the_rows_at_its_points(r: int) -> None:
 
 
 @pytest.mark.parametrize(("r", "k", "Q"), [(0, 2, 3), (2, 2, 8), (1, 1, 2), (1, 1, 6), (2, 3, 7)])
-def test_points_are_chosen_apart_from_modes(r: int, k: int, Q: int) -> None:
+def test_points_are_chosen_independently_of_modes(r: int, k: int, Q: int) -> None:
     scheme = galerkin(r, k, points=Q)
     assert (len(scheme.points), scheme.inner_modes, scheme.order) == (Q, r, 2 * (r + k))
     np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
@@ -147,9 +147,7 @@ def test_names_say_modes_points_and_order(name: str, r: int, k: int, Q: int) -> 
     ("name", "count"),
     [("galerkin-0x3", 2), ("galerkin-2x6", 4), ("galerkin-4x10", 6), ("galerkin-2x7-k3", 5)],
 )
-def test_moments_are_against_an_orthonormal_basis_of_as_many_as_coefficients(
-    name: str, count: int
-) -> None:
+def test_moments_have_one_orthonormal_test_function_per_coefficient(name: str, count: int) -> None:
     scheme = by_name(name)
     assert scheme.moments is not None
     products = (scheme.moments * scheme.weights) @ scheme.moments.T
@@ -176,7 +174,7 @@ def test_points_that_are_not_on_the_curve_have_no_moments() -> None:
     assert Scheme("four midpoints", 2, *twice, table).moments is None
 
 
-def test_as_many_points_as_modes_and_ends_are_the_table_of_always() -> None:
+def test_r_plus_k_points_are_the_default() -> None:
     assert galerkin(2, points=4) is galerkin(2)
 
 

@@ -337,7 +337,7 @@ def test_a_slow_browser_gets_the_end_of_the_motion_and_not_every_frame(shown: Re
     assert final == kept
 
 
-def test_browsers_are_told_what_is_deleted(shown: Replay) -> None:
+def test_deletions_are_sent_to_browsers(shown: Replay) -> None:
     async def received() -> list[bytes]:
         browser = await tornado.websocket.websocket_connect(shown.url[:-5].replace("http", "ws"))
         for _ in shown.page.messages.all():
@@ -353,7 +353,7 @@ def test_browsers_are_told_what_is_deleted(shown: Replay) -> None:
     assert (message["type"], message["path"]) == ("delete", "/meshcat/robot")
 
 
-def test_a_browser_that_takes_nothing_is_left(
+def test_a_browser_that_takes_nothing_is_disconnected(
     shown: Replay, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(meshcat_server, "_TAKE_SECONDS", 0.1)

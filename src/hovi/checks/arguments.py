@@ -18,16 +18,17 @@ from hovi.checks.kinds import Kind, MismatchError, kind_of, resolved
 from hovi.errors import HoviError, InputError
 
 Accept = Callable[[Any], Any]
-_MARK = "_hovi_checks_arguments"  # of functions that are checked
+_MARK = "_hovi_checks_arguments"
+"""Attribute of functions that are checked already, or are not to be."""
 Checked = TypeVar("Checked", bound=Callable[..., Any])
 
 
 def check_arguments(checked: Checked) -> Checked:
     """A decorator: arguments that are not what their annotations say raise InputError.
 
-    Numbers of any real type are floats, whole ones integers too; what numpy converts to an array of
-    numbers is one, and the function receives the array where the annotation is one. What is
-    annotated by Any, or a name that only type checkers import, is left to the function.
+    Any real number is accepted as a float, and a whole one as an int. What NumPy converts to an
+    array of numbers is accepted as an array, which the function then receives. Arguments annotated
+    by Any, or by a name that only type checkers import, are not checked.
 
     checked: a function; or a class, whose constructor and public methods are checked unless they
         have a decorator of their own.
@@ -36,7 +37,10 @@ def check_arguments(checked: Checked) -> Checked:
 
 
 def check_arguments_except(*names: str) -> Callable[[Checked], Checked]:
-    """As `check_arguments`, without some arguments, of which the function itself says more."""
+    """As `check_arguments`, but some arguments are left to the function, whose messages say more.
+
+    names: of these arguments.
+    """
 
     def decorate(checked: Checked) -> Checked:
         if not isinstance(checked, type):
@@ -48,7 +52,7 @@ def check_arguments_except(*names: str) -> Callable[[Checked], Checked]:
 
 
 def unchecked(function: Checked) -> Checked:
-    """A decorator: what is called within hovi at each step, and so not checked with its class."""
+    """A decorator: leaves a method out of the checks of its class, since inner loops call it."""
     setattr(function, _MARK, True)
     return function
 
@@ -71,6 +75,7 @@ def without_checks(checked: Checked) -> Checked:
 
 
 def _checking(checked: Checked, names: Collection[str]) -> Checked:
+    """The function with its arguments checked but for `names`."""
     parameters = functools.cache(lambda: _Parameters.of(checked, names))
 
     @functools.wraps(checked)
@@ -109,9 +114,9 @@ def _anything(value: Any) -> Any:
 class _Parameters:
     """The parameters of a function.
 
-    kinds: of each, by name; None where it may be anything. positional: names of those that can be
-    given by position; rest: the name of further ones, or "". accepts, named: how they are accepted,
-    by position and by name.
+    function: its name, for messages. kinds: of each parameter, by name; None where it may be
+    anything. positional: names of those that can be given by position. rest: name of *args, or "".
+    accepts, named: functions that accept the arguments, by position and by name.
     """
 
     function: str
@@ -123,6 +128,7 @@ class _Parameters:
 
     @classmethod
     def of(cls, function: Callable[..., Any], left_out: Collection[str]) -> _Parameters:
+        """The parameters of a function, with any value accepted for those that are left out."""
         kinds, positional, rest = dict[str, Kind | None](), list[str](), ""
         scope = inspect.unwrap(function).__globals__
         for name, each in inspect.signature(function).parameters.items():
@@ -141,7 +147,7 @@ class _Parameters:
         return cls(name, kinds, tuple(positional), rest, accepts, named)
 
     def repeated(self, args: tuple[Any, ...]) -> tuple[Accept, ...]:
-        """How as many positional arguments as these are accepted."""
+        """Functions that accept as many positional arguments as these, with *args among them."""
         more = len(args) - len(self.accepts)
         return (*self.accepts, *[self.named.get(self.rest, _anything)] * more)
 

@@ -21,21 +21,25 @@ _ARRAY_LIKE = set(get_args(npt.ArrayLike))
 
 
 class MismatchError(Exception):
-    """A value is not of a kind; with words for what it must be, where these say more."""
+    """A value is not of a kind.
+
+    Its argument, if any, says what the value must be more precisely than the words of the kind.
+    """
 
 
 @dataclass(frozen=True)
 class Kind:
     """What a value may be.
 
-    words: with an article. accept: returns the value, arrays converted; raises MismatchError.
+    words: for messages, with an article. accept: returns the value, with numbers and arrays
+    converted; raises MismatchError.
     """
 
     words: str
     accept: Callable[[Any], Any]
 
     def refusal(self, name: str, value: Any, mismatch: MismatchError) -> str:
-        """The sentence about a value that was not accepted."""
+        """The sentence about a value that was not accepted. name: of the argument."""
         words = mismatch.args[0] if mismatch.args else self.words
         return f"{name} must be {words}, got {shown(value)}."
 
@@ -175,7 +179,7 @@ def _union(members: Sequence[Kind | None]) -> Kind | None:
     kinds = [kind for kind in members if kind is not None]
     if len(kinds) < len(members):
         return None
-    # a list of arrays is that, where it may be, and not one array
+    # a list of arrays must not become one array if the annotation allows the list
     ordered = sorted(kinds, key=lambda kind: kind.words.startswith(_ARRAY_OF))
 
     def accept(value: Any) -> Any:
@@ -209,7 +213,10 @@ def _array(dtype: np.dtype[Any]) -> Kind:
 
 
 def _array_like(others: set[Any]) -> Kind | None:
-    """Of ArrayLike, which the function converts itself; None if it may be something else."""
+    """The kind of ArrayLike, which the function itself converts; None if it is not the only one.
+
+    others: the other members of the annotated union.
+    """
     if others - {types.NoneType}:
         return None
 

@@ -30,7 +30,10 @@ def numbers_of(name: str, value: npt.ArrayLike, *shape: int | None) -> Array:
 
 
 def require_shape(name: str, array: npt.NDArray[Any], *shape: int | None) -> None:
-    """Raise InputError unless an array has a shape, in which None stands for any length."""
+    """Raise InputError unless an array has a shape, in which None stands for any length.
+
+    name: of the argument, for the message.
+    """
     if array.shape == shape:
         return
     same = len(shape) == array.ndim
@@ -54,10 +57,16 @@ def require_rows(rows: Iterable[tuple[str, npt.NDArray[Any], int]]) -> None:
 
 
 def _broadcast(name: str, first: tuple[int, ...] | None, lead: tuple[int, ...]) -> tuple[int, ...]:
-    """The common shape of rows. Raises InputError."""
+    """The shape to which rows of shapes (*first, n) and (*lead, m) broadcast, without n and m.
+
+    first: None if there is none yet. Raises InputError.
+    """
     if first is None or lead == first:
         return lead
     try:
         return np.broadcast_shapes(first, lead)
     except ValueError:
-        raise InputError(f"{name} has rows {lead}, which do not fit {first} before it.") from None
+        raise InputError(
+            f"{name} must have one row or as many as the arguments before it: its rows {lead} do "
+            f"not broadcast with {first}."
+        ) from None

@@ -14,17 +14,18 @@ from hovi.scene.lagrangian import Lagrangian
 Array = npt.NDArray[np.float64]
 
 MORE_POINTS = 5
-"""Gauss points that the first rule has more than the scheme with the most points."""
+"""Gauss points of the first rule beyond those of the scheme with the most, so that it sees what
+hides between them."""
 STEP = 4
-"""Gauss points that the second rule has more than the first."""
+"""Gauss points of the second rule beyond those of the first."""
 
 
 @dataclass(frozen=True)
 class CurveIntegral:
     """An integral along a curve.
 
-    value: by the rule with more points. error: its distance from the rule with fewer points, which
-    bounds the error of the value where the integrand is resolved, plus rounding.
+    value: by the rule with more points. error: its distance from that by the rule with fewer
+    points, plus rounding; it bounds the error where the integrand is resolved.
     """
 
     value: float
@@ -39,7 +40,7 @@ class CurveIntegral:
 def integral_along(lagrangian: Lagrangian, trajectory: Trajectory) -> CurveIntegral:
     """The integral of L(q, v, a, t) dt along the interpolant, by two Gauss rules per interval.
 
-    Of Q + 5 and Q + 9 points, Q the largest number of points of the trajectory's schemes.
+    They have Q + 5 and Q + 9 points, with Q the largest number of points of a scheme on the grid.
     lagrangian: L on T^(2)Q.
     """
     grid = trajectory.grid

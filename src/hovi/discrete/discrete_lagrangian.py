@@ -111,7 +111,10 @@ class DiscreteLagrangian:
         self._check(path, jets)
         self._check_terms(terms)
         if multipliers is not None and len(multipliers) != len(self.batches):
-            raise InputError(f"multipliers are {len(self.batches)} arrays, one per batch.")
+            raise InputError(
+                f"multipliers must be {len(self.batches)} arrays, one per batch, got "
+                f"{len(multipliers)}."
+            )
         parts = []
         known = jets or self.jets(path)
         charts = self._charts(path)
@@ -203,7 +206,10 @@ class DiscreteLagrangian:
         N, m = self.grid.intervals, 4 + self.grid.inner_modes
         require_shape("step", step, N, m, self.lagrangian.nv)
         if len(expansion.values) != N:
-            raise InputError(f"the expansion has {len(expansion.values)} intervals, not {N}.")
+            raise InputError(
+                f"the expansion must be one on this grid of {N} intervals, got one of "
+                f"{len(expansion.values)}."
+            )
         steps = []
         for i, batch in enumerate(self.batches):
             columns = step[batch.index, : 4 + batch.scheme.inner_modes]
@@ -323,7 +329,9 @@ class DiscreteLagrangian:
             self.grid.require_path(path, self.lagrangian.nq, self.lagrangian.nv)
             self._fitting[0] = path
         if jets and [[x.shape for x in jet] for jet in jets] != self._jet_shapes:
-            raise InputError("the jets are not at this path's points: see `jets`.")
+            raise InputError(
+                "the jets are not at this path's points: pass the result of `jets` for it, or None."
+            )
 
     @cached_property
     def _fitting(self) -> list[DiscretePath | None]:
@@ -332,7 +340,7 @@ class DiscreteLagrangian:
 
     @cached_property
     def _jet_shapes(self) -> list[list[tuple[int, ...]]]:
-        """Of q, v and a at the points of each batch."""
+        """Shapes of q, v and a at the points of each batch."""
         nq, nv = self.lagrangian.nq, self.lagrangian.nv
         return [[(len(b.t), nq), (len(b.t), nv), (len(b.t), nv)] for b in self.batches]
 
@@ -341,8 +349,9 @@ class DiscreteLagrangian:
         if terms is None:
             return
         points = [len(batch.t) for batch in self.batches]
-        if [len(term.jet_gradient) for term in terms] != points:
-            raise InputError(f"terms are one per batch, at {points} points.")
+        given = [len(term.jet_gradient) for term in terms]
+        if given != points:
+            raise InputError(f"terms must be one per batch, at {points} points, got {given}.")
 
     def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
         """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""
@@ -356,7 +365,7 @@ class DiscreteLagrangian:
 
     @cached_property
     def batches(self) -> list[IntervalBatch]:
-        """The intervals by their schemes, as they are evaluated."""
+        """The intervals in batches of one scheme, which are evaluated together."""
         return list(interval_batches(self.grid))
 
 

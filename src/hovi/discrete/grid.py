@@ -18,7 +18,7 @@ from hovi.schemes.galerkin_table import MAX_INNER_MODES
 Array = npt.NDArray[np.float64]
 
 MAX_INTERVALS = 10**7
-"""Maximum number of intervals, of a file too."""
+"""Maximum number of intervals, also of a trajectory file."""
 MIN_STEP, MAX_STEP = 1e-12, 1e9
 """Steps, in [s], whose powers do not overflow or underflow in double precision."""
 
@@ -71,7 +71,7 @@ class Grid:
         return cls(np.full(intervals, duration / intervals), (scheme,) * intervals)
 
     def stretched(self, duration: float) -> Grid:
-        """The grid scaled to another duration.
+        """The grid with all steps scaled to another duration.
 
         duration: T > 0 in [s]. Raises InputError for steps that are too short or too long.
         """
@@ -123,7 +123,7 @@ class Grid:
     def require_path(self, path: DiscretePath, nq: int, nv: int) -> None:
         """Raise InputError unless a path has the intervals and inner modes of this grid.
 
-        It may have more inner modes. nq, nv: lengths of its configurations and velocities.
+        More inner modes are accepted, too. nq, nv: lengths of its configurations and velocities.
         """
         N, r = len(self.steps), self.inner_modes
         inner = path.inner.shape

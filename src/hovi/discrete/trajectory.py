@@ -153,13 +153,13 @@ class Trajectory:
         return Sample(q, v, a, self.scene.inverse_dynamics(q, v, a, t))
 
     def _checked(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Index, Array]:
-        """Interval numbers and positions as arrays. Raises InputError if they are not these."""
+        """Interval numbers and relative positions as arrays, (M,) each. Raises InputError."""
         numbers, positions = numbers_of("k", k, None), numbers_of("s", s, None)
         known = (numbers >= 0) & (numbers < self.grid.intervals) & (numbers == np.floor(numbers))
         if not known.all() or not ((positions >= 0) & (positions <= 1)).all():
             raise InputError(
-                f"k must be numbers of intervals, 0 to {self.grid.intervals - 1}, and s positions "
-                "from 0 to 1 within them."
+                f"k must be interval numbers from 0 to {self.grid.intervals - 1} and s positions "
+                f"from 0 to 1 within them, got k = {_span(numbers)}, s = {_span(positions)}."
             )
         require_shape("s", positions, len(numbers))
         return numbers.astype(np.intp), positions
@@ -303,6 +303,10 @@ def _check_shapes(trajectory: Trajectory) -> None:
     sizes = (nv, nv) if trajectory.space is None else (trajectory.space.nq, trajectory.space.nv)
     if (nq, nv) != sizes:
         raise InputError(f"nq is {nq} and nv is {nv}; the configuration space has {sizes}.")
+
+
+def _span(values: Array) -> str:
+    return f"{values.min():g} to {values.max():g}" if values.size else "none"
 
 
 def _check_name(scheme: Scheme) -> None:

@@ -77,10 +77,7 @@ class PointFunction:
                 f"{self.function.name()} takes {len(self._widths)} arrays, got {len(arrays)}."
             )
         for i, (array, width) in enumerate(zip(arrays, self._widths, strict=True)):
-            if array.shape != (points, width) and (len(array), array.size) != (
-                points,
-                points * width,
-            ):
+            if (len(array), array.size) != (points, points * width):
                 raise InputError(
                     f"{self.function.name_in(i)} must have shape ({points}, {width}), got "
                     f"{array.shape}."

@@ -30,7 +30,7 @@ class Gravity(Effect):
     touches: ClassVar[tuple[Touch, ...]] = (Touch.MODEL,)
 
     def check(self, robot: Robot) -> None:
-        """Raise SceneError for an acceleration that is no size, and an invalid direction."""
+        """Raise SceneError for a negative or infinite acceleration, and an invalid direction."""
         if not np.isfinite(self.acceleration):
             raise SceneError(
                 f"effect 'gravity': acceleration must be finite, got {self.acceleration}; "
@@ -39,7 +39,7 @@ class Gravity(Effect):
         if self.acceleration < 0:
             raise SceneError(
                 f"effect 'gravity': acceleration must be 0 or more, got {self.acceleration} m/s^2, "
-                "which pulls upwards; where it pulls is the `direction`, (0, 0, -1) by default."
+                "which pulls upwards; set the `direction` instead, (0, 0, -1) by default."
             )
         if len(self.direction) != 3 or not 0 < np.linalg.norm(self.direction) < np.inf:
             raise SceneError(

@@ -27,9 +27,9 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 SINGULAR = 1e-13
-"""Singular value relative to the largest, of a matrix with rows of one size, that is rounding."""
+"""Singular value of an equilibrated matrix, relative to the largest, that counts as zero."""
 INVOLVED = 0.1
-"""Part in a unit vector of the kernel above which a coordinate is named."""
+"""Norm of a coordinate's part of the kernel's unit vectors above which it is named."""
 
 
 @check_arguments
@@ -142,7 +142,7 @@ def require_regular_lagrangian(
 
 
 def kernel_coordinates(matrix: Array, n: int, terms: Array | None = None) -> Indices:
-    """Which of n coordinates have part in the kernel of a matrix, none where it is regular.
+    """Which of n coordinates are involved in the kernel of a matrix; none if it is regular.
 
     matrix: shape (m n, m n), m unknowns for each coordinate. terms: sizes of what its entries are
         sums of, the same shape; the entries themselves when None. Units differ from coordinate to
@@ -156,7 +156,7 @@ def kernel_coordinates(matrix: Array, n: int, terms: Array | None = None) -> Ind
 
 
 def coordinates_in_words(lagrangian: Lagrangian, coordinates: Indices) -> str:
-    """Joints of a scene's robot, or numbers; not more than six of them."""
+    """Names of the joints of a scene's robot, or indices, for a message; at most six of them."""
     scene = getattr(lagrangian, "scene", None)
     if isinstance(scene, Scene):
         shown = [repr(scene.robot.coordinate_names[i]) for i in coordinates]

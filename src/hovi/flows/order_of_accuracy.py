@@ -22,11 +22,11 @@ from hovi.schemes import Scheme
 Array = npt.NDArray[np.float64]
 
 SLOPE_BAND = 0.08
-"""How far slopes may lie apart, relative to the largest, where steps are small enough."""
+"""Largest range of the slopes of a reliable order, relative to the largest slope."""
 INTEGER_BAND = 0.25
-"""How far the measured order may then lie from an integer."""
+"""Largest distance of a reliable order from an integer."""
 ROUNDING = 100 * float(np.finfo(float).eps)
-"""Error relative to the action, below which it may be rounding."""
+"""Error relative to the action below which it may be rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +60,14 @@ class VariationalOrder:
 
     @property
     def reason(self) -> str:
-        """Why `order` is not reliable, in one sentence; empty where it is.
+        """Why `order` is not reliable, in one sentence; "" if it is.
 
         The slopes between consecutive steps, those of the largest and of the mean error alike,
         must agree to `SLOPE_BAND`, and the order lie within `INTEGER_BAND` of an integer. The
         largest error alone may be that of one solution, whose slopes agree before they are right.
         """
         if not 3 <= len(self.steps) == np.unique(self.steps).size:
-            return "it takes three different steps or more: one slope has nothing to agree with."
+            return "it takes three different steps or more, for slopes that can be compared."
         lost = self.errors <= ROUNDING * self.actions
         if lost.any():
             return (
@@ -85,7 +85,7 @@ class VariationalOrder:
         return ""
 
     def __str__(self) -> str:
-        """The order, and why it is not reliable where it is not."""
+        """The order, and why it is not reliable if so."""
         order = f"order {self.order:.2f}" if (self.errors > 0).all() else "no order"
         return f"{order}, not reliable: {self.reason}" if self.reason else order
 

@@ -23,19 +23,22 @@ Array = npt.NDArray[np.float64]
 PARTS = (2, 4, 8, 16)
 """Numbers of shorter steps that are tried in place of one."""
 PERTURBED = 6
-"""Random variants of the curve of each of them."""
-NEAR, DOUBTFUL, FAR = 0.5, 1.0, 10.0
-"""Mismatch with shorter steps of a solution that is taken at once, with the guess of one that is
-checked, and with shorter steps of one that is refused."""
+"""Number of random variants of the curve of each of them that are tried as guesses."""
+NEAR = 0.5
+"""Mismatch with shorter steps below which a solution is accepted without a further search."""
+DOUBTFUL = 1.0
+"""Mismatch of a solution and its guess above which it is compared with shorter steps."""
+FAR = 10.0
+"""Mismatch with shorter steps above which a solution is refused."""
 HARMLESS = 1e-2
-"""Distance of ends that is small in itself, in [rad] or [m]; in time h for their derivatives."""
+"""Distance of ends that counts as small, in [rad] or [m]; for derivatives, that divided by h^j."""
 CONTINUED = 6
-"""Modes of the previous step that are continued: higher ones would be magnified."""
+"""Number of modes of the previous step that are continued: higher ones would be magnified."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What Newton's method made of one step.
+    """The result of Newton's method for one step.
 
     modes: shape (k + r, n). residual: its last step relative to the modes. end: x1 and p1, for a
         batch of one; None where no solution was found.
@@ -108,7 +111,7 @@ def hard_step(attempt: Attempt, h: float, x: Array, p: Array, t: float, first: T
 
 
 def mismatch(h: float, k: int, modes: Array, reference: Array) -> Array:
-    """How far apart curves end, relative to how far q^(k) carries the reference, shape (B,).
+    """Distance of the ends of curves, relative to that which q^(k) moves the reference, shape (B,).
 
     The largest over q, q', ..., q^(k-1). modes, reference: shape (B, count, n).
     """
@@ -128,7 +131,7 @@ def _perturbed(shorter: list[Array]) -> Iterator[Array]:
 
 
 def _nearest(h: float, k: int, trials: list[Trial], reference: Array) -> tuple[float, Trial]:
-    """The smallest mismatch of the solutions found, and which one; infinite where none was."""
+    """The smallest mismatch of the solutions found, and its trial; infinite if none was found."""
     distance, best = np.inf, trials[0]
     for trial in trials:
         if trial.end is not None:
@@ -153,7 +156,7 @@ def _shorter_steps(
 
 
 def _sufficient(h: float, k: int, shorter: dict[int, Array]) -> int:
-    """The fewest shorter steps that end where the shortest ones do; 0 where there are none."""
+    """The smallest number of steps that end where the shortest ones do; 0 if there is none."""
     for parts, modes in shorter.items():
         if mismatch(h, k, modes[None], shorter[max(shorter)][None])[0] < NEAR:
             return parts
@@ -163,7 +166,10 @@ def _sufficient(h: float, k: int, shorter: dict[int, Array]) -> int:
 def _no_solution(h: float, residual: float, nearest: float, possible: int) -> str:
     reason = "the matrix of Newton's method is singular"
     if np.isfinite(nearest):
-        reason = f"the nearest one misses the end of shorter steps by {nearest:.2g} times their way"
+        reason = (
+            f"the nearest one misses the end of shorter steps by {nearest:.2g} times the distance "
+            "that they cover"
+        )
     elif np.isfinite(residual):
         reason = f"Newton's method stops at a relative residual of {residual:.1g}"
     advice = f"nor have {PARTS[-1]} steps of {h / PARTS[-1]:g} s; use a much shorter step"

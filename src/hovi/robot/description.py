@@ -17,7 +17,7 @@ from hovi.robot.source import RobotSource
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.joint_kinds import ANGLE, FLOATING, kind_of
 from hovi.robot.urdf.check import checked_urdf
-from hovi.robot.urdf.spelling import passed_over
+from hovi.robot.urdf.spelling import ignored_names
 
 Array = npt.NDArray[np.float64]
 
@@ -141,8 +141,8 @@ def _notes(model: pin.Model, source: RobotSource) -> Iterator[str]:
             f"the position range of {_some(unbounded)} is not enforced, since its leader is a "
             "continuous joint"
         )
-    if names := passed_over(robot):
-        yield f"passed over, since URDF has no such elements and attributes: {_some(names)}"
+    if names := ignored_names(robot):
+        yield f"ignored, since URDF has no such elements and attributes: {_some(names)}"
     moving = _moving_links(source, robot)
     bare = [link.get("name", "") for link in moving if link.find("inertial") is None]
     if bare:

@@ -1,4 +1,4 @@
-"""The distance between the positions of frames in two motions."""
+"""The distance of frames between two motions of a robot."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class FrameDistance:
 
     @classmethod
     def of(cls, frames: tuple[str, ...], positions: Array, others: Array) -> Self:
-        """The same from the positions of the frames, each of shape (M, F, 3), in [m]."""
+        """The distance between positions of the frames in two motions, (M, F, 3) each, in [m]."""
         return cls(frames, np.asarray(np.linalg.norm(positions - others, axis=-1)))
 
     @property

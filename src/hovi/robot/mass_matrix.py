@@ -15,7 +15,7 @@ from hovi.robot.space.joint_kinds import ANGLE, kind_of
 Array = npt.NDArray[np.float64]
 
 LIGHT_SHARE = 3e-3
-"""Inertia of a light joint, relative to that of the heaviest."""
+"""Largest inertia of a joint that is reported as light, relative to that of the heaviest."""
 
 
 class MassMatrix:

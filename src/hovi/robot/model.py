@@ -59,10 +59,6 @@ def build_model(source: RobotSource) -> pin.Model:
     return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
 
 
-_LINK = "/link"
-"""Ending of the name of a link that has the name of a joint, while joints are removed."""
-
-
 def locked_and_coupled(
     model: pin.Model,
     geometry: list[pin.GeometryModel] | None,
@@ -92,20 +88,21 @@ def _reduced(
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
     """Model and geometry with joints fixed at q.
 
-    Pinocchio looks frames up by name alone, and refuses a link that has the name of a joint: such
-    links have another name meanwhile.
+    Pinocchio looks frames up by name alone and refuses a link that has the name of a joint, so such
+    links are renamed in between.
     """
-    joints, model = set(model.names), model.copy()
+    joints, original, model = set(model.names), dict[str, str](), model.copy()
     for frame in model.frames:
         if frame.type != pin.JOINT and frame.name in joints:
-            frame.name += _LINK
+            name, frame.name = frame.name, f"{frame.name}/link"
+            original[frame.name] = name
     if shapes:
         reduced, found = pin.buildReducedModel(model, shapes, ids, q)
         shapes = list(found)
     else:
         reduced = pin.buildReducedModel(model, ids, q)
     for frame in reduced.frames:
-        frame.name = frame.name.removesuffix(_LINK)
+        frame.name = original.get(frame.name, frame.name)
     return reduced, shapes
 
 

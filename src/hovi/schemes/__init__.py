@@ -34,6 +34,7 @@ FAMILIES: dict[str, Callable[[int, int, int | None], Scheme]] = {"galerkin": gal
 """By the number of inner modes, the order of the Lagrangian and the number of points."""
 
 _MEMBER = re.compile(r"(.+?)-(\d{1,4})(?:x(\d{1,4}))?(?:-k([1-9]))?")
+"""FAMILY-R, FAMILY-RxQ and both with -kK."""
 
 
 @check_arguments

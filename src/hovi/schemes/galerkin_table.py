@@ -1,4 +1,4 @@
-"""The Galerkin family: a table for every number of inner modes and points, and every order k."""
+"""The Galerkin family: a table for every number of inner modes and of points, and every order k."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ MAX_POINTS = 100
 
 
 def galerkin(inner_modes: int = 2, derivatives: int = 2, points: int | None = None) -> Scheme:
-    """A polynomial k-th derivative with r inner modes, integrated with Q Gauss points.
+    """The scheme whose k-th derivative is a polynomial with r inner modes, with Q Gauss points.
 
-    The degree of the curve and the number of quadrature points are chosen apart
-    [OberBloebaumSaake2015]. The order of the nodes is 2 (r + k) for every Q >= r + k: 4, 6, 8, 10,
-    ... for k = 2. With Q = r + k an interval has as many points as its k-th derivative has
-    coefficients, and on coarse grids the integrand may vanish at the points and swing between them;
-    with more of them the action is nearly the integral along the curve.
+    L_d = h sum_j w_j L(q(t_j), ..) over the Gauss points t_j of the interval. The degree of the
+    curve and Q are chosen independently [OberBloebaumSaake2015]. The order at the nodes is
+    2 (r + k) for every Q >= r + k: 4, 6, 8, 10, ... for k = 2. With Q = r + k an interval has as
+    many points as its k-th derivative has coefficients, and on coarse grids the integrand may
+    vanish at the points and swing between them; with more points the action is nearly the integral
+    along the curve.
 
     inner_modes: r, from 0 to 40. derivatives: k, the order of the Lagrangian: 1 for mechanics, 2
         for torques and accelerations, 3 for jerk. points: Q, from r + k to 100; r + k when None.
@@ -53,7 +54,7 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2, points: int | None = No
 
 @cache
 def _table(inner_modes: int, derivatives: int, count: int) -> Scheme:
-    """The scheme, cached since schemes are immutable."""
+    """The scheme with `count` points, cached since schemes are immutable."""
     x, w = np.polynomial.legendre.leggauss(count)
     points, weights = (x + 1) / 2, w / 2
     fewest = inner_modes + derivatives
@@ -65,7 +66,7 @@ def _table(inner_modes: int, derivatives: int, count: int) -> Scheme:
 
 
 def is_galerkin(scheme: Scheme) -> bool:
-    """Whether a scheme is a member of the family, so that it has a curve of its own."""
+    """Whether a scheme is a member of the family: its action is that of its interpolant."""
     r, k, points = scheme.inner_modes, scheme.derivatives, len(scheme.points)
     known = 0 <= r <= MAX_INNER_MODES and k <= MAX_DERIVATIVES and r + k <= points <= MAX_POINTS
     return known and scheme.key == _table(r, k, points).key

@@ -90,12 +90,12 @@ class Scheme:
 
     @cached_property
     def moments(self) -> Array | None:
-        """Test functions of equations along the motion: r + k moments hold in every interval.
+        """Test functions P_j of equations along the motion, sum_q w_q P_j(s_q) f(s_q) = 0.
 
-        A curve with r inner modes has r + k coefficients in an interval, and at more points than
-        that equations would lock it. P_0 .. P_{r+k-1}, orthonormal shifted Legendre polynomials, at
-        the points, shape (r + k, Q). None where equations hold at every point: where there are at
-        most r + k, or they are not on the curve of the interval (Taylor schemes).
+        P_0 .. P_{r+k-1}, orthonormal shifted Legendre polynomials, at the points, shape (r + k, Q):
+        a curve with r inner modes has r + k coefficients in an interval, and would be locked by
+        equations at more points than that. None if equations hold at every point instead: there are
+        at most r + k of them, or they are not on the curve of the interval (Taylor schemes).
         """
         count = self.inner_modes + self.derivatives
         if len(self.points) <= count or not np.array_equal(self.table, self.rows(self.points)):

@@ -80,7 +80,11 @@ class Command(Protocol):
 
 
 class Message(NamedTuple):
-    """A packed message to meshcat's window; the last one of a path, kind and name counts."""
+    """A packed message to meshcat's window, replaced by a later one with the same other fields.
+
+    path: of the part of the scene. kind: such as "set_object" or "delete". name: of the property
+    that is set, or "".
+    """
 
     path: str
     kind: str
@@ -89,9 +93,9 @@ class Message(NamedTuple):
 
 
 class Messages:
-    """Messages in their order, without those that a later one overrides.
+    """Messages in their order, without those that a later one replaces.
 
-    deletions: whether to keep the deletions of parts, which are of no use to a new window.
+    deletions: whether to keep the deletion of parts, which a new window does not need.
     """
 
     def __init__(self, deletions: bool = False) -> None:
@@ -99,7 +103,7 @@ class Messages:
         self._packed: dict[tuple[str, str, str], bytes] = {}
 
     def add(self, message: Message) -> None:
-        """Add a message, and drop those that it overrides."""
+        """Add a message, and drop those that it replaces."""
         is_deletion = message.kind == "delete"
         if is_deletion:
             inside = message.path.rstrip("/") + "/"
@@ -114,7 +118,7 @@ class Messages:
         return None if key is None else self._packed.pop(key)
 
     def all(self) -> list[Message]:
-        """The messages, while another thread may add some: the copy is atomic."""
+        """The messages; the copy is atomic, since another thread may add some meanwhile."""
         return [Message(*key, packed) for key, packed in self._packed.copy().items()]
 
 

@@ -26,13 +26,14 @@ _HOST_NAMES = r"(127\.0\.0\.1|localhost)"
 MAX_BROWSERS = 16
 """Windows that show a page at once; each may hold the copy of one message."""
 _MAX_CONNECTIONS = 64
-_MAX_HEADER, _MAX_BODY = 16_384, 0  # [bytes]; browsers send nothing but requests
+_MAX_HEADER, _MAX_BODY = 16_384, 0  # [bytes]; browsers send requests without a body
 _IDLE_SECONDS = 30.0
 _TRY_AGAIN_LATER = 1013  # of the WebSocket protocol
 _LEAVE_SECONDS = 5.0
 _TAKE_SECONDS = 60.0  # for one message, until a browser counts as gone
 _LARGE, _LARGE_AT_ONCE = 1_000_000, 2
-"""Bytes from which a message is large, and number of copies of large ones in memory."""
+"""Size above which a message is large, in [bytes], and how many large ones are sent at once: each
+connection copies its message."""
 
 
 class ServedPage(Page):
@@ -136,7 +137,7 @@ class ServedPage(Page):
 
 
 class _Server(tornado.httpserver.HTTPServer):
-    """A server with a limited number of open requests; browsers that show the page are no more."""
+    """A server with a limited number of open connections, without those that became WebSockets."""
 
     _open = 0
 
@@ -195,12 +196,13 @@ class _Browser(tornado.websocket.WebSocketHandler):
         self.page._disconnect(self)
 
     def show(self, message: Message) -> None:
+        """Send a message after those that wait, without blocking."""
         self.waiting.add(message)
         if self.sender is None or self.sender.done():
             self.sender = asyncio.ensure_future(self._send())
 
     async def _send(self) -> None:
-        """Send what waits, each message when the browser has taken the one before."""
+        """Send what waits, each message after the browser has taken the one before."""
         try:
             while (packed := self.waiting.take()) is not None:
                 async with self.page._large if len(packed) > _LARGE else contextlib.nullcontext():
@@ -212,7 +214,10 @@ class _Browser(tornado.websocket.WebSocketHandler):
             self.page._disconnect(self)
 
     def leave(self, code: int | None = None, reason: str | None = None) -> None:
-        """End the connection at once, without an answer of the browser."""
+        """End the connection at once, without waiting for the browser's answer.
+
+        code, reason: of the WebSocket protocol.
+        """
         self.page._disconnect(self)
         stream = None if self.ws_connection is None else self.ws_connection.stream
         if stream is not None:

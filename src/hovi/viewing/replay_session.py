@@ -84,7 +84,10 @@ class Replay:
                 raise
 
     def offer_controls(self, *, loop: bool = False) -> None:
-        """Give browsers that are opened from now on the motion with the page's controls."""
+        """Give browsers that are opened from now on the motion with the page's controls.
+
+        loop: whether the controls repeat the motion.
+        """
         self.page.keep(_animation(self.trajectory, self.visualizer, loop, self.highlights))
 
     def close(self) -> None:
@@ -171,7 +174,10 @@ def serve(
     port: int = 0,
     announce: Callable[[str], object] = print,
 ) -> Replay:
-    """A live page that shows the start of a motion; arguments and errors as in `replay`."""
+    """A live page that shows the start of a motion, for `Replay.play`.
+
+    Arguments and errors as in `replay`.
+    """
     robot = _robot(trajectory)
     highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
     page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)

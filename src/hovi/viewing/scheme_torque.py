@@ -1,8 +1,8 @@
-"""Torques of schemes that have no curve of their own, for plots.
+"""Torques of schemes without a curve of their own, for plots.
 
-The cubic through the nodes of a Taylor scheme has a second derivative that oscillates about the
-true acceleration, and so do its torques. Those at the quadrature points do not: they are the
-controls of the scheme.
+The second derivative of the cubic through the nodes of a Taylor scheme oscillates about the true
+acceleration, and so do its torques. Those at the quadrature points, the controls of the scheme, do
+not.
 """
 
 from __future__ import annotations

@@ -103,10 +103,10 @@ def test_empty_ranges_are_refused(two_link: Robot) -> None:
         ({"elbow": [0.0, 45.0]}, "range of elbow, 0 to 45 rad, .* 0 to 0.7854 rad"),
     ],
 )
-def test_ranges_that_look_like_degrees_are_told(two_link: Robot, q: Any, words: str) -> None:
-    with pytest.warns(HoviWarning, match=words) as told:
+def test_ranges_that_look_like_degrees_cause_a_warning(two_link: Robot, q: Any, words: str) -> None:
+    with pytest.warns(HoviWarning, match=words) as caught:
         limits = as_limits(two_link, {"base": "none", "q": q})
-    assert str(told[0].message).endswith("; limits are in radians.")
+    assert str(caught[0].message).endswith("; limits are in radians.")
     assert limits.bounded[0].any()
 
 
@@ -118,7 +118,7 @@ def test_ranges_that_look_like_degrees_are_told(two_link: Robot, q: Any, words: 
     ],
     ids=str,
 )
-def test_other_ranges_are_taken_without_a_word(two_link: Robot, limits: Any) -> None:
+def test_other_ranges_cause_no_warning(two_link: Robot, limits: Any) -> None:
     as_limits(two_link, limits)
 
 
@@ -127,7 +127,7 @@ def test_a_rail_may_be_long(tmp_path: Path) -> None:
     as_limits(load_robot(tmp_path / "slider.urdf"), {"base": "none", "q": {"rail": [-170, 170]}})
 
 
-def test_degrees_in_a_urdf_are_told_by_plan_and_by_the_description(models: Path, tmp_path) -> None:
+def test_plan_and_description_warn_of_degrees_in_a_urdf(models: Path, tmp_path) -> None:
     text = (models / "two_link.urdf").read_text()
     path = tmp_path / "degrees.urdf"
     path.write_text(text.replace('lower="-1000" upper="1000"', 'lower="-170" upper="170"'))
@@ -139,13 +139,13 @@ def test_degrees_in_a_urdf_are_told_by_plan_and_by_the_description(models: Path,
         plan(Scene(robot), [0.0, 0.0], [0.1, 0.1], 1.0, intervals=4)
 
 
-def test_the_command_tells_it_in_one_line(models: Path, tmp_path: Path, capsys) -> None:
+def test_the_command_prints_the_warning_in_one_line(models: Path, tmp_path: Path, capsys) -> None:
     scene = (models / "two_link_reach.toml").read_text().replace('limits = "none"', "")
     path = tmp_path / "scene.toml"
     path.write_text(scene + '\n[limits]\nbase = "none"\nq = { elbow = [-170, 170] }\n')
     (tmp_path / "two_link.urdf").write_text((models / "two_link.urdf").read_text())
     assert main(["plan", str(path), "--starts", "3"]) == 0
     lines = capsys.readouterr().err.splitlines()
-    told = [line for line in lines if line.startswith("warning: ")]
-    assert len(told) == 1
-    assert told[0].startswith("warning: the position range of elbow, -170 to 170 rad, looks like")
+    caught = [line for line in lines if line.startswith("warning: ")]
+    assert len(caught) == 1
+    assert caught[0].startswith("warning: the position range of elbow, -170 to 170 rad, looks like")

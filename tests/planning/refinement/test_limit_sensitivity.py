@@ -22,7 +22,7 @@ def limited(scene: Scene, limits: dict[str, object]) -> Solution:
 @pytest.mark.parametrize(
     "bounds", [{"v": 3.0}, {"tau": 8.0}, {"q": [[-1.6, 0.31], [-0.4, 0.71]]}, {"a": 20.0}]
 )
-def test_it_is_the_change_of_the_cost_with_a_shift_of_all_limits(
+def test_the_cost_of_the_tolerance_is_the_change_with_a_shift_of_all_limits(
     arm_scene: Scene, bounds: dict[str, object]
 ) -> None:
     found = limited(arm_scene, {"base": "none", **bounds})
@@ -44,7 +44,7 @@ def test_limits_that_are_not_reached_add_nothing(arm_scene: Scene) -> None:
     assert cost_of_tolerance(found) < 1e-9
 
 
-def test_a_tolerance_below_it_is_not_reached(arm_scene: Scene) -> None:
+def test_a_tolerance_below_the_cost_of_that_of_limits_is_not_reached(arm_scene: Scene) -> None:
     limits = {"base": "none", "v": 3.0}
     found = hovi.plan(arm_scene, HANG, GOAL, 1.0, limits=limits, tolerance=1e-6)
     assert found.accuracy is not None

@@ -21,17 +21,17 @@ def xarm() -> hovi.Scene:
 def test_a_whirling_wrist_is_named_with_its_inertia(xarm: hovi.Scene) -> None:
     found = hovi.plan(xarm, *XARM_REACH, limits="none")
     assert found.status is hovi.Status.UNRESOLVED
-    told = re.search(
+    named = re.search(
         r"joint '(\S+)' whirls at up to (\S+) rad/s with an inertia of (\S+) kg", found.message
     )
-    assert told is not None
-    joint = xarm.robot.coordinate_names.index(told[1])
+    assert named is not None
+    joint = xarm.robot.coordinate_names.index(named[1])
     motion = found.trajectory.sample(np.linspace(0.0, 3.0, 20_001))
-    assert float(told[2]) == pytest.approx(np.abs(motion.v[:, joint]).max(), rel=0.05)
+    assert float(named[2]) == pytest.approx(np.abs(motion.v[:, joint]).max(), rel=0.05)
     model = xarm.robot.model.copy()
     model.armature = np.zeros(model.nv)
     mass = [pin.crba(model, model.createData(), q)[joint, joint] for q in found.trajectory.q]
-    assert float(told[3]) == pytest.approx(min(mass), rel=0.05)
+    assert float(named[3]) == pytest.approx(min(mass), rel=0.05)
     for remedy in ("limits", "armature", "acceleration_cost"):
         assert remedy in found.message
 

@@ -128,7 +128,7 @@ ENDINGS = {
         WIDE,
         landscape(fate=below(1.7, Status.INFEASIBLE)),
         MINIMUM,
-        "at the edge of what was found feasible, to 0.001 of it towards shorter ones: 1.7",
+        "The best duration, to 0.1 % the shortest one found feasible, is 1.7",
         1.7,
         1e-3,
     ),
@@ -136,7 +136,7 @@ ENDINGS = {
         (0.1, 10, 0, 0.3),
         landscape(fate=above(2.5, Status.INFEASIBLE)),
         MINIMUM,
-        "at the edge of what was found feasible, to 0.001 of it towards longer ones: 2.4",
+        "The best duration, to 0.1 % the longest one found feasible, is 2.4",
         2.5,
         1e-3,
     ),
@@ -147,7 +147,7 @@ ENDINGS = {
         WIDE,
         landscape(rise=jump(1.1, 0.5, -2.0)),
         MINIMUM,
-        "motions cost more, to 0.001",
+        "before motions cost more, is",
         1.1,
         1e-3,
     ),
@@ -155,7 +155,7 @@ ENDINGS = {
         WIDE,
         landscape(fate=within(0.97, 1.03, Status.INFEASIBLE)),
         MINIMUM,
-        "at the edge of what was found feasible, to 0.001 of it towards shorter ones",
+        "to 0.1 % the shortest one found feasible, is",
         1.03,
         1e-3,
     ),
@@ -171,7 +171,7 @@ ENDINGS = {
         WIDE,
         landscape(rise=jump(1.1, 0.5)),
         MINIMUM,
-        "motions cost more, to 0.001 of it: it is 1.1",
+        "to 0.1 % the shortest one before motions cost more, is 1.1",
         1.1,
         1e-3,
     ),
@@ -193,7 +193,7 @@ ENDINGS = {
 
 
 @pytest.mark.parametrize("name", ENDINGS)
-def test_an_ending_is_what_it_says(name: str) -> None:
+def test_status_message_and_duration_of_every_ending_agree(name: str) -> None:
     ending = ENDINGS[name]
     costs = ending.landscape()
     found = costs.search(*ending.free)
@@ -238,7 +238,7 @@ def test_a_first_motion_that_is_no_minimum_is_returned_as_it_is(status: Status) 
     assert "Time adds 3 to the cost" in found.message
 
 
-def test_a_search_that_comes_to_no_end_is_cut_short(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_durations_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(free_duration, "MAX_DURATIONS", 3)
     costs = Landscape()
     found = costs.search(0.1, 10.0, 1.0, 3.0)

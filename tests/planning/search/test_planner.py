@@ -70,7 +70,7 @@ def test_one_start_is_one_solve(arm_scene: Scene) -> None:
     assert planned.solve_seconds > 0
 
 
-def test_the_default_is_a_tolerance_of_a_thousandth(arm_scene: Scene) -> None:
+def test_the_default_is_a_tolerance_of_1e_3(arm_scene: Scene) -> None:
     found = plan(arm_scene, HANG, GOAL, 1.0, limits="none")
     assert found.accuracy is not None
     assert found.accuracy.tolerance.size == 1e-3

@@ -1,4 +1,4 @@
-"""Misspelt and misplaced names of a URDF are refused; names of others are passed over and told."""
+"""Misspelt and misplaced names of a URDF are refused; unknown names are ignored and reported."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from hovi.errors import ModelError
 from hovi.robot.loading import load_robot
 from hovi.robot.urdf.check import check_urdf
-from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, HOMES, attributes_of
+from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, PARENTS, attributes_of
 from hovi.robot.urdf.planar_chain import chain
 from hovi.robot.urdf.spelling import MAX_UNKNOWN, is_near
 
@@ -103,7 +103,7 @@ def known_beside(number: int, attribute: str | None) -> set[str]:
 def test_a_urdf_with_every_name_is_accepted() -> None:
     check_urdf(FULL)
     robot = ElementTree.fromstring(FULL)
-    assert {element.tag for element in robot.iter()} >= {*CHILDREN, *HOMES}
+    assert {element.tag for element in robot.iter()} >= {*CHILDREN, *PARENTS}
     for element in list(robot.iter()):
         assert set(element.attrib) <= set(attributes_of(element.tag))
 
@@ -120,7 +120,7 @@ def test_every_misspelt_name_is_refused(number: int, attribute: str | None, edit
             check_urdf(renamed(number, attribute, wrong))
         quoted = f"<{wrong}>" if attribute is None else f"{wrong}="
         assert quoted in str(caught.value)
-        assert "did you mean" in str(caught.value) or wrong in HOMES
+        assert "did you mean" in str(caught.value) or wrong in PARENTS
 
 
 def distance(one: str, other: str) -> int:
@@ -182,7 +182,7 @@ def test_a_mistake_that_makes_another_robot_is_refused(mistake: str) -> None:
         assert word in str(caught.value)
 
 
-@pytest.mark.parametrize("tag", HOMES)
+@pytest.mark.parametrize("tag", PARENTS)
 @pytest.mark.parametrize("place", [*CHILDREN, "mass", "origin", "limit", "box"])
 def test_an_element_in_another_place_is_refused(tag: str, place: str) -> None:
     robot = ElementTree.fromstring(FULL)
@@ -190,7 +190,8 @@ def test_an_element_in_another_place_is_refused(tag: str, place: str) -> None:
     if tag in CHILDREN.get(place, ()):
         return
     ElementTree.SubElement(owner, tag)
-    with pytest.raises(ModelError, match=f"has <{tag}>, which belongs in <{HOMES[tag]}>: move it"):
+    words = f"has <{tag}>, which belongs in <{PARENTS[tag]}>: move it"
+    with pytest.raises(ModelError, match=words):
         check_urdf(ElementTree.tostring(robot, encoding="unicode"))
 
 
@@ -209,32 +210,34 @@ def with_extensions() -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def told(folder: Path, text: str) -> str:
-    """The lines of `hovi info` about what is passed over or without inertia."""
+def notes(folder: Path, text: str) -> str:
+    """The lines of `hovi info` about what is ignored or without inertia."""
     (folder / "robot.urdf").write_text(text)
     lines = load_robot(folder / "robot.urdf").describe().splitlines()
-    return "\n".join(line.strip() for line in lines if "passed over" in line or "without <" in line)
+    return "\n".join(
+        line.strip() for line in lines if "ignored, since" in line or "without <" in line
+    )
 
 
 def test_extensions_of_simulators_and_controllers_are_accepted_in_silence(tmp_path: Path) -> None:
     check_urdf(with_extensions())
-    assert "passed over" not in told(tmp_path, with_extensions())
+    assert "ignored, since" not in notes(tmp_path, with_extensions())
 
 
-def test_other_names_are_accepted_and_told(tmp_path: Path) -> None:
+def test_other_names_are_accepted_and_reported(tmp_path: Path) -> None:
     text = FULL.replace("</inertial>", "</inertial><gravity>1</gravity><origin/>")
     text = text.replace("<limit ", '<limit current="3" ').replace("<link ", '<link kind="x" ')
     text = text.replace("</robot>", '<drake:joint xmlns:drake="d"/></robot>')
-    assert told(tmp_path, text).startswith(
-        "passed over, since URDF has no such elements and attributes: kind= in <link> (3 times), "
+    assert notes(tmp_path, text).startswith(
+        "ignored, since URDF has no such elements and attributes: kind= in <link> (3 times), "
     )
     for name in ("<gravity> in <link>", "<origin> in <link>", "<drake:joint> in <robot>"):
-        assert name in told(tmp_path, text.replace('kind="x"', "").replace('current="3"', ""))
+        assert name in notes(tmp_path, text.replace('kind="x"', "").replace('current="3"', ""))
 
 
-def test_long_names_are_told_briefly(tmp_path: Path) -> None:
+def test_long_names_are_shortened(tmp_path: Path) -> None:
     text = FULL.replace("<limit ", f'<limit {"q" * 5000}="3" ')
-    assert len(told(tmp_path, text)) < 200
+    assert len(notes(tmp_path, text)) < 200
 
 
 def test_the_number_of_unknown_names_is_limited() -> None:
@@ -259,10 +262,10 @@ def chain_without(*links: str, shape: bool = True) -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def test_moving_links_without_inertia_are_told(tmp_path: Path) -> None:
-    assert told(tmp_path, chain_without()) == ""  # the tip is a frame, and the base does not move
+def test_moving_links_without_inertia_are_reported(tmp_path: Path) -> None:
+    assert notes(tmp_path, chain_without()) == ""  # the tip is a frame, and the base does not move
     for shape in (True, False):
-        assert told(tmp_path, chain_without("link1", "link3", shape=shape)) == (
+        assert notes(tmp_path, chain_without("link1", "link3", shape=shape)) == (
             "link1, link3: moving without <inertial>, so without mass and inertia"
         )
 
@@ -273,7 +276,7 @@ def test_a_shape_on_a_moving_frame_needs_an_inertia_too(tmp_path: Path) -> None:
     )
     text = chain_without().replace('<link name="tip" />', ball)
     assert text != chain_without()
-    assert told(tmp_path, text).startswith("tip: moving without")
+    assert notes(tmp_path, text).startswith("tip: moving without")
 
 
 def test_links_that_do_not_move_need_no_inertia(tmp_path: Path) -> None:

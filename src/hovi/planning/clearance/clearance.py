@@ -42,7 +42,7 @@ class Clearance:
             object.__setattr__(self, "obstacles", (self.obstacles,))
         if not isinstance(self.obstacles, Sequence):
             raise InputError(
-                f"obstacles are a list of hovi.Sphere, hovi.Capsule and hovi.Box, got "
+                f"obstacles must be a list of hovi.Sphere, hovi.Capsule or hovi.Box, got "
                 f"{self.obstacles!r}."
             )
         if len(self.obstacles) > MAX_OBSTACLES:
@@ -88,4 +88,6 @@ class Clearance:
             obstacles = [obstacle_from_dict(each) for each in data["obstacles"]]
             return cls(obstacles, float(data["margin"]), bool(data["self_collision"]))
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
-            raise InputError(f"this is no clearance of `to_dict`: {error!r}.") from error
+            raise InputError(
+                f"expected the clearance that `to_dict` returns, got data with {error!r}."
+            ) from error

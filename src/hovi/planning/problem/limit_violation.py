@@ -13,13 +13,15 @@ from hovi.robot.robot import Robot
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 SAMPLES = 33
 """Samples per interval in the first pass, both ends included."""
 REFINEMENT_SHARE = 0.05
-"""Extremes closer than this to a bound, as a share of its range, are refined."""
+"""The largest extreme of an output in an interval is refined if it is closer than this to a bound,
+as a share of its range."""
 PEAK_SHARE = 2e-3
-"""Distance of a local extreme from a bound, as a share of its range, within which it is refined."""
+"""The same for every other local extreme; smaller, as a motion along a bound has many of them."""
 AT_LIMIT = 1e-3
 """Distance to a bound, as a share of its range, within which an output is at the bound."""
 
@@ -51,73 +53,85 @@ class Excess:
 def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     """The extremes of q, v, a and tau along the interpolant, compared with the limits.
 
-    Every interval is sampled, and again more densely around all extremes that are near a bound:
-    a motion along a bound has several, and the highest sample need not be next to the highest one.
+    Every interval is sampled, and again more densely around all extremes that are near a bound: a
+    motion along a bound has several, and the largest one is not always next to the largest sample.
     """
     raise_if_late()
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     s = np.linspace(0.0, 1.0, SAMPLES)
     outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
     outputs = outputs.reshape(N, SAMPLES, 4, nv)
-    sides = []
-    for sign, bound in ((-1.0, limits.lower), (1.0, limits.upper)):
-        raise_if_late()
-        outside = sign * (outputs - bound) / limits.ranges
-        index = np.argmax(outside, axis=1)  # (N, 4, nv)
-        largest = np.take_along_axis(outside, index[:, None], axis=1)[:, 0]
-        sides.append(_refined(trajectory, limits, sign, bound, outside, largest, s[index]))
-    (lower, at_lower), (upper, at_upper) = sides
+    lower, at_lower = _Side(trajectory, -1.0, limits.lower, limits.ranges).extremes(outputs)
+    upper, at_upper = _Side(trajectory, 1.0, limits.upper, limits.ranges).extremes(outputs)
     return Excess(lower, upper, at_lower, at_upper)
 
 
-def _outputs(trajectory: Trajectory, k: npt.NDArray[np.intp], s: Array) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """The lower or the upper bounds of a motion's outputs.
+
+    sign: -1 for lower bounds, 1 for upper ones. bound, ranges: shape (4, nv).
+    """
+
+    trajectory: Trajectory
+    sign: float
+    bound: Array
+    ranges: Array
+
+    def extremes(self, outputs: Array) -> tuple[Array, Array]:
+        """The largest excess in each interval, and its relative position, (N, 4, nv) each.
+
+        outputs: of all samples, shape (N, SAMPLES, 4, nv).
+        """
+        raise_if_late()
+        excess = self.sign * (outputs - self.bound) / self.ranges
+        index = np.argmax(excess, axis=1)
+        largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
+        s = index / (SAMPLES - 1)
+        k, sample, kind, joint = np.nonzero(_near_extremes(excess, largest))
+        if len(k) == 0:
+            return largest, s
+        found, at = self._refined(k, sample / (SAMPLES - 1), kind, joint)
+        for row in np.argsort(found):  # the largest of each interval and output comes last
+            entry = k[row], kind[row], joint[row]
+            if found[row] >= largest[entry]:
+                largest[entry], s[entry] = found[row], at[row]
+        return largest, s
+
+    def _refined(self, k: Index, at: Array, kind: Index, joint: Index) -> tuple[Array, Array]:
+        """The excess at M extremes and their positions, from two denser samplings around them.
+
+        k: intervals. at: positions of the extreme samples. kind, joint: of the outputs. All (M,).
+        """
+        width, rows = 1.0 / (SAMPLES - 1), np.arange(len(k))
+        for _ in range(2):
+            around = np.clip(at[:, None] + width * np.linspace(-1, 1, SAMPLES), 0.0, 1.0)
+            outputs = _outputs(self.trajectory, np.repeat(k, SAMPLES), around.ravel())
+            values = outputs.reshape(len(k), SAMPLES, 4, -1)[rows, :, kind, joint]
+            excess = self.sign * (values - self.bound[kind, joint][:, None])
+            excess /= self.ranges[kind, joint][:, None]
+            best = np.argmax(excess, axis=1)
+            at, width = around[rows, best], width / (SAMPLES - 1)
+        return excess[rows, best], at
+
+
+def _outputs(trajectory: Trajectory, k: Index, s: Array) -> Array:
     """(q, v, a, tau) at relative positions s in intervals k, shape (M, 4, nv)."""
     q, v, a, tau = trajectory.sample_intervals(k, s)
     q = q if trajectory.space is None else trajectory.space.coordinates(q)
     return np.stack([q, v, a, tau], axis=1)
 
 
-def _refined(
-    trajectory: Trajectory,
-    limits: Limits,
-    sign: float,
-    bound: Array,
-    outside: Array,
-    largest: Array,
-    s: Array,
-) -> tuple[Array, Array]:
-    """Excesses and their positions, sampled more densely around extremes near a bound.
+def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
+    """Samples that are local extremes, and are the largest of their output or next to its bound.
 
-    outside: of the samples, (N, SAMPLES, 4, nv). largest, s: of the highest ones, (N, 4, nv).
+    excess: of the samples, shape (N, SAMPLES, 4, nv). largest: of each interval, (N, 4, nv).
     """
-    k, sample, kind, joint = np.nonzero(_near_extremes(outside, largest))
-    if len(k) == 0:
-        return largest, s
-    largest, s = largest.copy(), s.copy()
-    at, width, rows = sample / (SAMPLES - 1), 1.0 / (SAMPLES - 1), np.arange(len(k))
-    for _ in range(2):
-        around = np.clip(at[:, None] + width * np.linspace(-1, 1, SAMPLES), 0.0, 1.0)
-        values = _outputs(trajectory, np.repeat(k, SAMPLES), around.ravel())
-        values = values.reshape(len(k), SAMPLES, 4, -1)[rows, :, kind, joint]
-        beyond = sign * (values - bound[kind, joint][:, None])
-        beyond /= limits.ranges[kind, joint][:, None]
-        best = np.argmax(beyond, axis=1)
-        at, width = around[rows, best], width / (SAMPLES - 1)
-    found = beyond[rows, best]
-    for row in np.argsort(found):  # the highest of each interval and output comes last
-        place = k[row], kind[row], joint[row]
-        if found[row] >= largest[place]:
-            largest[place], s[place] = found[row], at[row]
-    return largest, s
-
-
-def _near_extremes(outside: Array, largest: Array) -> npt.NDArray[np.bool_]:
-    """Samples that are local extremes, and the highest of their output or next to its bound."""
-    padded = np.pad(outside, ((0, 0), (1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
+    padded = np.pad(excess, ((0, 0), (1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
     with np.errstate(invalid="ignore"):
-        peak = (outside >= padded[:, :-2]) & (outside >= padded[:, 2:])
-    highest = (outside == largest[:, None]) & (outside > -REFINEMENT_SHARE)
-    return np.asarray(peak & np.isfinite(outside) & (highest | (outside > -PEAK_SHARE)))
+        peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
+    highest = (excess == largest[:, None]) & (excess > -REFINEMENT_SHARE)
+    return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_SHARE)))
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:

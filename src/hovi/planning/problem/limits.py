@@ -97,7 +97,9 @@ class Limits:
             )
             return cls(lower, upper, float(data["tolerance"]))
         except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"these are not limits of `to_dict`: {error!r}.") from error
+            raise InputError(
+                f"expected the limits that `to_dict` returns, got data with {error!r}."
+            ) from error
 
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a share of the range; negative inside.
@@ -152,7 +154,7 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _with_word(robot, _by_name(robot, limits))
+        return _warned_of_degrees(robot, _by_name(robot, limits))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
@@ -164,13 +166,13 @@ def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
             lower[row, i], upper[row, i] = low, high
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
-    return _with_word(robot, chosen.with_margin(_number(limits, "margin", 0.0)))
+    return _warned_of_degrees(robot, chosen.with_margin(_number(limits, "margin", 0.0)))
 
 
-def _with_word(robot: Robot, limits: Limits) -> Limits:
-    """The limits, with a warning if the ranges of angles look like degrees."""
-    given = limits.lower[0], limits.upper[0]
-    suspicion = ranges_in_degrees(robot.coordinate_names, ~robot.sliding, *given)
+def _warned_of_degrees(robot: Robot, limits: Limits) -> Limits:
+    """The limits, after a warning if the ranges of angles look like degrees."""
+    lower, upper = limits.lower[KINDS.index("q")], limits.upper[KINDS.index("q")]
+    suspicion = ranges_in_degrees(robot.coordinate_names, ~robot.sliding, lower, upper)
     if suspicion:
         warnings.warn(f"{suspicion}; limits are in radians.", HoviWarning, stacklevel=3)
     return limits

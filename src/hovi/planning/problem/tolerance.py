@@ -19,6 +19,10 @@ from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
 from hovi.robot.tip_frame import names_in_words
 
+CURVE_TOLERANCE = 1e-3
+"""Relative error of the integral along the curve that no tolerance of another kind, and no smaller
+one of the cost, asks to improve."""
+
 
 class Quantity(StrEnum):
     """The quantity whose error is bounded."""
@@ -37,7 +41,7 @@ class Tolerance:
         frame.
     quantity: which of the three. frame: name of the frame; all of the robot's tip_frames if None.
     unit: used in messages: of LENGTHS, ANGLES or SHARES; "" stands for mm, rad or 1.
-    tips: used in messages: the robot's tip_frames.
+    tips: the robot's tip_frames, used in messages.
     """
 
     size: float
@@ -188,12 +192,12 @@ class Accuracy:
             return f"{self.reason}; no error was estimated (tolerance {wanted})."
         error = self.tolerance.in_words(self.error, self._frame)
         found = f"estimated error {error}, tolerance {wanted}"
-        if not self.reached and self.along > 1e-3:
-            found = f"the integral along the curve is off by {self.along:.1e}; {found}"
+        if not self.reached and self.along > CURVE_TOLERANCE:
+            found = f"the integral along the curve differs by {self.along:.1e}; {found}"
         return f"{found}." if self.reached else f"stopped early: {self.reason}; {found}."
 
     @property
     def _frame(self) -> str:
-        """Which of several frames has the error; "" where there is but one, or none is known."""
+        """The frame with the largest error, of several; "" for a single or an unknown one."""
         several = self.tolerance.frame is None and len(self.tolerance.tips) > 1
         return self.estimate.frame if several and self.estimate is not None else ""

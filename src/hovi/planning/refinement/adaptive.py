@@ -16,9 +16,10 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate, least_error
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
+from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
-from hovi.planning.refinement.next_grid import KNOWN_DECAY, interpolated_to, next_grid
+from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_to, next_grid
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -53,17 +54,17 @@ def first_grid(
 ) -> Grid:
     """The first grid: galerkin-2x8 on the intervals, or galerkin-4x10 on two thirds of them.
 
-    With more points than modes the torque cannot hide between the points. With more modes the
-    errors of smooth motions are smaller, and the decay of the modes can be estimated.
+    More points leave the torque no room to hide between them. With more modes the errors of smooth
+    motions are smaller, and the decay of the modes can be estimated.
     duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
-        motion has no kinks, which limits and via points cause. more_points: False for as many as a
-        smooth motion needs.
+        motion has no kinks, which limits and via points cause. more_points: False for galerkin-4,
+        which suffices for a smooth motion that the grid resolves.
     Raises InputError as Grid.uniform does.
     """
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
-        return Grid.uniform(duration, number, galerkin(2, points=8))
-    scheme = galerkin(4, points=10 if more_points else 6)
+        return Grid.uniform(duration, number, galerkin_with_more_points(2))
+    scheme = galerkin_with_more_points(4) if more_points else galerkin(4)
     return Grid.uniform(duration, max(2 * number // 3, 1), scheme)
 
 
@@ -106,7 +107,8 @@ def refine_to_tolerance(
 ) -> Solution:
     """Refine a solution to a tolerance; arguments as for `solve_to_tolerance`.
 
-    restart: returns the solution to begin with if the given one is not near a finer one.
+    restart: returns the solution to begin with if the given one is not near a finer one; None to
+        keep the given one.
     """
     deadline = Deadline(time_limit)
     return _Search(tolerance, max_iterations, deadline, on_round, restart).run(solution)
@@ -186,8 +188,9 @@ class _Search:
         if self._at_floor(candidate):
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
-        whirling, nearly = candidate.whirl, candidate.difference <= KNOWN_DECAY
-        if whirling is not None and whirling.is_hopeless(nearly, len(self.rounds)):
+        whirling, nearly = candidate.whirl, candidate.difference <= MAX_ERROR_OF_DECAY
+        grids = len(self.rounds)
+        if whirling is not None and whirling.is_hopeless(grids=grids, nearly_resolved=nearly):
             return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"

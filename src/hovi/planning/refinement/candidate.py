@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.motion_error import relative_difference
 from hovi.errors import InputError
-from hovi.planning.problem.tolerance import Quantity, Tolerance
+from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against, finer_than
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
@@ -30,9 +30,6 @@ Array = npt.NDArray[np.float64]
 
 ACCEPTED_SHARE = 0.8
 """Largest accepted estimate, as a share of the tolerance."""
-CURVE_TOLERANCE = 1e-3
-"""Relative error of the integral along the curve that no tolerance of another kind, and no smaller
-one of the cost, asks to improve."""
 CANCELLATION_LIMIT = 20.0
 """Largest accepted sum of the intervals' |contributions| to the cost's error, in tolerances."""
 HAMILTONIAN_ERROR_SHARE = 0.1
@@ -40,9 +37,9 @@ HAMILTONIAN_ERROR_SHARE = 0.1
 ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
 LOOSE_SAFETY_FACTOR = 3.0
-"""Factor on estimates above CURVE_TOLERANCE, where the finer solution is not better by orders."""
+"""Factor on estimates above CURVE_TOLERANCE, where the finer solution is not much better."""
 LIMITED_SAFETY_FACTOR = 1.5
-"""Factor on estimates under limits, where the finer solution is not better by orders."""
+"""Factor on estimates under limits, where the finer solution is not much better."""
 CONTRADICTION_RATIO = 10.0
 """Ratio of the difference of costs on two grids to their estimated errors above which the solver
 is taken to have reached another minimum."""
@@ -55,7 +52,7 @@ class Candidate:
     finer: the nearby solution on a finer grid, if any. error: estimate in the tolerance's unit;
         NaN if unknown.
     along: relative error of the integral of L~ along the curve; 0 for schemes without a curve.
-    passive: torques of passive joints along the curve; None without such joints.
+    passive: torques of passive joints along the curve; None as for `passive_torque`.
     uncancelled: the error with the sum of |contributions| instead of their sum, and at least the
         error inferred from the Hamiltonian.
     contradicted: relative difference from the cost on the next grid if it is far larger than the
@@ -97,7 +94,7 @@ class Candidate:
 
     @property
     def is_carried(self) -> bool:
-        """Whether the integral along the curve and passive torques are as small as they should."""
+        """Whether the integral along the curve is accurate, and passive torques are negligible."""
         return self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
 
     @property
@@ -107,7 +104,10 @@ class Candidate:
 
     @property
     def difference(self) -> float:
-        """The relative error of the cost or the integral along the curve; inf if unknown."""
+        """The relative error of the cost or of the integral along the curve, the larger one.
+
+        inf if it is unknown.
+        """
         known = self.error_of_cost
         return np.inf if known is None else max(known, self.along)
 
@@ -119,7 +119,7 @@ class Candidate:
 
     @property
     def larger_error(self) -> float:
-        """The error, or that of the integral along the curve if it is larger."""
+        """The error in the tolerance's unit, or that of the integral along the curve if larger."""
         in_cost = self.tolerance.quantity is Quantity.COST
         return max(self.error, self.along) if in_cost else self.error
 
@@ -191,7 +191,7 @@ def _accepted(error: float, uncancelled: float, tolerance: Tolerance) -> bool:
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:
-    """Relative error of the cost, with what the tolerance of limits adds to it.
+    """Relative error of the cost, with the effect of the limits' tolerance on it.
 
     Not below ROUNDING_FLOOR; 0 for zero cost with zero error.
     """
@@ -221,7 +221,7 @@ def error_along(solution: Solution, finer: FinerSolution) -> float:
 
 
 def least_error(solution: Solution) -> float:
-    """The smallest relative error of the cost that can be estimated."""
+    """The least relative error of the cost that can be estimated: see `cost_of_tolerance`."""
     return max(ROUNDING_FLOOR, cost_of_tolerance(solution))
 
 

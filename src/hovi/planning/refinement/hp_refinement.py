@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.schemes import galerkin
+from hovi.schemes import Scheme, galerkin
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -35,7 +35,8 @@ The cost of a point grows like the square of the number of joints; this one is c
 UNRESOLVED_MODES = 6
 """Largest number of inner modes while the motion is not resolved: its decay is not yet known."""
 MORE_POINTS = 4
-"""Quadrature points of an interval beyond r + 2 while the motion is not resolved."""
+"""Quadrature points of an interval beyond r + 2 while the motion is not resolved, so that the
+torque cannot vanish at the points alone."""
 INFEASIBLE_PIECES = 1000
 """Number of pieces that marks a number of modes with which the demands cannot be met."""
 SPLIT_COST = 900.0
@@ -88,18 +89,18 @@ def refined(
     rho: Array,
     demands: Sequence[Demand],
     joints: int = 6,
-    known: bool = True,
+    decay_known: bool = True,
     few_points: bool = True,
 ) -> Grid:
     """The cheapest grid that is predicted to meet every demand, with one scheme or two.
 
-    rho: decay of each interval. joints: degrees of freedom of the robot. known: whether the decay
-        is that of the motion, else modes are at most UNRESOLVED_MODES. few_points: whether an
-        interval has r + 2 quadrature points, else MORE_POINTS more.
+    rho: decay of each interval, shape (N,). joints: degrees of freedom of the robot.
+    decay_known: whether that is the decay of the motion; else modes are at most UNRESOLVED_MODES.
+    few_points: whether an interval has r + 2 quadrature points, else MORE_POINTS more.
     An interval whose demands no choice meets is split into four.
     """
     current = np.array([scheme.inner_modes for scheme in grid.schemes])
-    allowed = MODES if known else MODES[MODES <= UNRESOLVED_MODES]
+    allowed = MODES if decay_known else MODES[MODES <= UNRESOLVED_MODES]
     more = np.maximum(allowed, current[:, None])  # (N, D)
     pieces = _pieces(current, more, rho, demands)
     low, high = _cheapest(more, pieces, 1.0 / joints**2)
@@ -107,9 +108,14 @@ def refined(
     choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
     cut, modes = pieces[N, choice], more[N, choice]
     steps = np.repeat(grid.steps / cut, cut)
-    beyond = 0 if few_points else MORE_POINTS
-    tables = {int(r): galerkin(int(r), points=int(r) + 2 + beyond) for r in set(modes)}
+    table = galerkin if few_points else galerkin_with_more_points
+    tables = {int(r): table(int(r)) for r in set(modes)}
     return Grid(steps, tuple(tables[int(r)] for r in np.repeat(modes, cut)))
+
+
+def galerkin_with_more_points(inner_modes: int) -> Scheme:
+    """The Galerkin scheme for motions that are not resolved yet: MORE_POINTS beyond r + 2."""
+    return galerkin(inner_modes, points=inner_modes + 2 + MORE_POINTS)
 
 
 def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
-from hovi.planning.problem.limits import TOLERANCE, Limits
+from hovi.planning.problem.limits import TOLERANCE
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
@@ -19,8 +19,9 @@ SHIFT = 6.0
 def cost_of_tolerance(solution: Solution) -> float:
     """Relative change of the cost with a shift of all limits by SHIFT tolerances.
 
-    By the envelope theorem dJ = sum w_i |z_i| range_i shift over the active bounds, with their
-    multipliers z_i at the quadrature points. 0 without limits, or where none is active.
+    By the envelope theorem dJ = sum_j h w_j |z_j| range_j SHIFT tolerance, over the quadrature
+    points and the bounds that are active there, with their multipliers z_j. 0 without limits, or
+    where none is active.
     """
     problem = solution.problem
     assert problem is not None
@@ -37,15 +38,13 @@ def cost_of_tolerance(solution: Solution) -> float:
 
 
 def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:
-    """Ranges of (q, v, a) and of the outputs; 0 where a force is of no limit."""
+    """Ranges of (q, v, a), shape (3 nv,), and of the outputs; 0 where there is no limit."""
     outputs = len(problem.ld.lagrangian.output_weight)
     limits, nv = problem.limits, problem.robot.nv
-    ranges = np.zeros((4, nv)) if limits is None else _bounded_ranges(limits)
+    ranges = np.zeros((4, nv))
+    if limits is not None:
+        ranges[limits.bounded] = limits.ranges[limits.bounded]
     if problem.distances is not None:
         ranges[0] = np.maximum(ranges[0], DISTANCE_SCALE)
-    ranges[3, problem.passive] = 0.0
+    ranges[3, problem.passive] = 0.0  # whose multipliers are those of an equation
     return ranges[:3].ravel(), ranges[3, :outputs]
-
-
-def _bounded_ranges(limits: Limits) -> Array:
-    return np.where(limits.bounded, limits.ranges, 0.0)

@@ -8,8 +8,8 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
 from hovi.planning.problem.problem import MORE_MODES, TrajectoryProblem
-from hovi.planning.problem.tolerance import Quantity
-from hovi.planning.refinement.candidate import CURVE_TOLERANCE, Candidate, contributions
+from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity
+from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import UNRESOLVED_MODES, Demand, decay, refined
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE
@@ -18,10 +18,11 @@ Array = npt.NDArray[np.float64]
 
 TARGET_SHARE = 0.3
 """Error for which a grid is refined, as a share of the tolerance."""
-KNOWN_DECAY = 1e-2
-"""Difference of costs up to which the decay of the modes is that of the motion."""
-FEW_POINTS = 0.05
-"""Difference of costs up to which tables with r + 2 points finish what more points began."""
+MAX_ERROR_OF_DECAY = 1e-2
+"""Relative error of the cost up to which the decay of the modes is that of the motion."""
+MAX_ERROR_WITH_FEW_POINTS = 0.05
+"""Relative error of the cost up to which the next grid has r + 2 points per interval, which are
+cheaper; with larger errors the torque could hide between them."""
 FINER_GRID_RATIO = 2.5
 """Ratio of the finer solution's predicted error to that target up to which its grid is the next:
 the solution is known already, and estimating its error is cheap."""
@@ -36,18 +37,20 @@ def next_grid(candidate: Candidate) -> Grid:
     demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
-    known = error <= KNOWN_DECAY
-    few_points = error <= (FEW_POINTS if candidate.whirl is None else CURVE_TOLERANCE)
+    decay_known = error <= MAX_ERROR_OF_DECAY
+    few_points = error <= (
+        MAX_ERROR_WITH_FEW_POINTS if candidate.whirl is None else CURVE_TOLERANCE
+    )
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
-    usable = same_steps and (known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)
+    usable = same_steps and (decay_known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)
     change = rho**MORE_MODES
     if usable and all(demand.remaining(change) <= FINER_GRID_RATIO for demand in demands):
         return finer.problem.grid
-    grid = refined(problem.grid, rho, demands, problem.robot.nv, known, few_points)
+    grid = refined(problem.grid, rho, demands, problem.robot.nv, decay_known, few_points)
     if not _same_grid(grid, problem.grid):
         return grid
-    if known or grid.inner_modes < UNRESOLVED_MODES:
+    if decay_known or grid.inner_modes < UNRESOLVED_MODES:
         return grid.enriched(MORE_MODES)
     return grid.halved(np.ones(grid.intervals, dtype=bool))
 
@@ -71,7 +74,7 @@ def _demands(candidate: Candidate, finer: FinerSolution) -> list[Demand]:
     N, target = len(known), TARGET_SHARE * candidate.tolerance.size
     if candidate.tolerance.quantity is Quantity.COST:
         error = candidate.error
-        if error <= target:  # the curve has to become better
+        if error <= target:  # then only the integral along the curve is not accurate enough
             error = candidate.along
         scale = max(1.0, error / max(known.sum(), 1e-300))
         return [Demand(target / (N * np.maximum(scale * known, 1e-300)), 2)]

@@ -18,11 +18,12 @@ NEGLIGIBLE_SHARE = 0.01
 
 
 class PassiveTorque(NamedTuple):
-    """Torques that should vanish.
+    """The torques of passive joints along a motion, which should vanish.
 
     by_interval: the largest of each interval, relative to the largest torque of the other joints,
-    (N,). joint: the one that carries most. torque, largest: of that joint, and of the others, in
-    the unit of each.
+        shape (N,).
+    joint: the passive joint with the largest torque. torque: that torque. largest: the largest
+        torque of the other joints; both in [N m] or [N].
     """
 
     by_interval: Array
@@ -37,7 +38,7 @@ class PassiveTorque(NamedTuple):
 
 
 def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> PassiveTorque | None:
-    """The torques of passive joints along a motion; None without such joints, or others."""
+    """The torques of passive joints along a motion; None if no joint is passive, or all are."""
     passive, nv = problem.passive, trajectory.v.shape[1]
     active = np.setdiff1d(np.arange(nv), passive)
     if len(passive) == 0 or len(active) == 0:

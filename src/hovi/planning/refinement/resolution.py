@@ -1,7 +1,7 @@
-"""Resolution: a motion that is called a minimum is one between the quadrature points, too.
+"""Resolution: whether a minimum of the discrete action is one between the quadrature points, too.
 
-On a coarse grid the torque may vanish at the points and swing between them. Such a motion is a
-minimum of the discrete action, and of nothing else.
+On a coarse grid the torque may vanish at the points and swing between them. Such a motion minimizes
+the discrete action, but not the integral along its curve.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.trajectory import Trajectory
@@ -20,11 +21,8 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import (
-    UNUSABLE_RATIO,
-    whirl,
-    whirl_without_minimum,
-)
+from hovi.planning.refinement.whirling import UNUSABLE_RATIO, whirl, whirl_without_minimum
+from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
@@ -41,15 +39,47 @@ NEGLIGIBLE = 1e-12
 """Cost that counts as none, relative to that of torques of the size of the inertial torque."""
 
 
-def solve(
-    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath = "cubic", **options: Any
-) -> Solution:
-    """A motion that makes the discrete action stationary, checked between the points.
+_NO_FINER_MINIMUM = "no minimum was found near it on a finer grid"
 
-    As `hovi.planning.solver.solver.solve_on_grid`, whose options it takes. A minimum on the grid
-    that is none along the whole motion has the status UNRESOLVED: see `resolved`.
+
+@check_arguments
+def solve(
+    problem: TrajectoryProblem,
+    guess: str | Trajectory | DiscretePath = "cubic",
+    *,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    escape_saddles: bool = True,
+    report: Report | None = None,
+    method: Method | None = None,
+) -> Solution:
+    """A motion that makes the discrete action stationary, checked between the quadrature points.
+
+    A minimum that the grid does not resolve has the status UNRESOLVED, and no success.
+
+    problem: the boundary data and the discrete Lagrangian.
+    guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
+    max_iterations: maximum number of steps; with limits or constraints, per round.
+    time_limit: in [s]. At either limit the best motion so far is returned.
+    escape_saddles: whether to leave saddles along negative curvature; False stops there with
+        status SADDLE.
+    report: called with the number of each step and the least cost so far.
+    method: minimisation method; None for the first suitable one of
+        hovi.planning.solver.methods.choice.
+    With limits, `cost` belongs to the motion that satisfies them everywhere, and intervals may
+    have been split.
+    Raises InputError for a guess or a method that does not fit the problem.
     """
-    return resolved(solve_on_grid(problem, guess, **options))
+    found = solve_on_grid(
+        problem,
+        guess,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        escape_saddles=escape_saddles,
+        report=report,
+        method=method,
+    )
+    return resolved(found)
 
 
 @one_blas_thread
@@ -65,9 +95,9 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
-    and if no light joint without limits whirls so fast that no grid can be trusted.
+    (d) no light joint without limits whirls faster than UNUSABLE_RATIO allows.
     Solutions of another status are returned unchanged. If the deadline in force passes before
-    (a) to (c) are known, the status is TIME_LIMIT.
+    all of this is known, the status is TIME_LIMIT.
     """
     if not solution.success or solution.problem is None:
         return solution
@@ -86,33 +116,33 @@ def resolved(solution: Solution) -> Solution:
 
 def _checked(solution: Solution) -> tuple[Solution, str]:
     """The solution with an estimate, and why it is no minimum along its way, or ""."""
-    reason = _difference_along(solution)
+    reason = _fault_on_curve(solution)
     if not reason and solution.error_estimate is None:
-        solution, reason = _compared(solution)
+        solution, reason = _compared_with_finer(solution)
     elif not reason:
-        reason = _estimate_sentence(solution.error_estimate)
-    return solution, reason or _whirling_sentence(solution)
+        reason = _fault_of_estimate(solution.error_estimate)
+    return solution, reason or _fault_of_whirling(solution)
 
 
-def told_as_whirling(solution: Solution) -> Solution:
-    """A motion at its iteration limit as an unresolved one, if a light joint whirls in it."""
+def unresolved_if_whirling(solution: Solution) -> Solution:
+    """A motion at its iteration limit, with the status UNRESOLVED if a light joint whirls in it."""
     whirling = whirl_without_minimum(solution)
     if whirling is None:
         return solution
-    metadata = {**solution.trajectory.metadata, "status": str(Status.UNRESOLVED)}
     return dataclasses.replace(
         solution,
         status=Status.UNRESOLVED,
         message=f"{solution.message.rstrip('.')}: {whirling}.",
-        trajectory=dataclasses.replace(solution.trajectory, metadata=metadata),
+        trajectory=_with_metadata(solution.trajectory, status=str(Status.UNRESOLVED)),
     )
 
 
 @dataclass(frozen=True, eq=False)
 class Resolution:
-    """The check of motions that are replanned from one that passed.
+    """The check of motions that are replanned from a resolved one.
 
-    path: that motion. estimate: of the relative error of its cost, which holds for motions nearby.
+    path: of the resolved motion. estimate: of the relative error of its cost, kept for motions that
+    are NEARBY.
     """
 
     path: DiscretePath
@@ -122,7 +152,7 @@ class Resolution:
         """The solution as `resolved` returns it, without (b) for a motion NEARBY."""
         if not (solution.success and self._is_near(solution)):
             return resolved(solution)
-        reason = _difference_along(solution)
+        reason = _fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(_with_estimate(solution, self.estimate), check=self)
@@ -137,27 +167,31 @@ class Resolution:
         return bool(max(np.abs(dq).max(), np.abs(dv).max()) <= NEARBY)
 
 
-def _difference_along(solution: Solution) -> str:
-    """(a): why the motion differs from its values at the points; "" if it does not."""
+def _fault_on_curve(solution: Solution) -> str:
+    """Why (a) does not hold; "" if it does."""
     problem, trajectory = solution.problem, solution.trajectory
     assert problem is not None
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return ""
-    known = solution.accuracy, solution.error_estimate
-    if known[0] is not None and known[1] is not None and known[0].along + known[1] <= RESOLVED:
-        return _passive_sentence(problem, trajectory)  # both are that close to the same cost
-    action = problem.ld.action(trajectory.path)
-    integral = integral_along(problem.ld.lagrangian, trajectory).value
+    return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
+
+
+def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
+    """The costs at the points and along the curve; "" if they agree."""
+    accuracy, estimate = solution.accuracy, solution.error_estimate
+    if accuracy is not None and estimate is not None and accuracy.along + estimate <= RESOLVED:
+        return ""  # both are that close to the cost of the same finer solution
+    action = problem.ld.action(solution.trajectory.path)
+    integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
     least = NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
-    if not abs(action - integral) <= RESOLVED * max(abs(integral), least):
-        return (
-            f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own "
-            "curve"
-        )
-    return _passive_sentence(problem, trajectory)
+    if abs(action - integral) <= RESOLVED * max(abs(integral), least):
+        return ""
+    return (
+        f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own curve"
+    )
 
 
-def _passive_sentence(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
+def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
     """The torque of a passive joint between the points; "" if it is negligible."""
     found = passive_torque(problem, trajectory)
     if found is None or found.share <= NEGLIGIBLE_SHARE:
@@ -168,25 +202,25 @@ def _passive_sentence(problem: TrajectoryProblem, trajectory: Trajectory) -> str
     )
 
 
-def _compared(solution: Solution) -> tuple[Solution, str]:
-    """(b) and (c): the solution with the estimate, and why it is no minimum, or ""."""
+def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
+    """The solution with an error estimate, and why (b) or (c) does not hold, or ""."""
     try:
         finer = finer_than(solution)
     except HoviError as refused:
         return solution, f"it could not be compared with a finer one: {str(refused).rstrip('.')}"
     if finer is None:
-        return solution, "from it no minimum was found on a finer grid"
+        return solution, _NO_FINER_MINIMUM
     estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost
     compared = _with_estimate(solution, estimate)
     if difference <= RESOLVED * abs(solution.cost):
         return compared, ""
-    return compared, _sentence(difference / abs(solution.cost))
+    return compared, _cost_change(difference / abs(solution.cost))
 
 
-def _whirling_sentence(solution: Solution) -> str:
-    """The speed of a joint that whirls beyond UNUSABLE_RATIO; "" if none does."""
+def _fault_of_whirling(solution: Solution) -> str:
+    """Why (d) does not hold; "" if it does."""
     assert solution.problem is not None
     whirling = None if solution.problem.limited else whirl(solution)
     if whirling is None or whirling.ratio <= UNUSABLE_RATIO:
@@ -194,34 +228,38 @@ def _whirling_sentence(solution: Solution) -> str:
     return f"at {whirling.speed:.3g} rad/s a finer grid may find another motion"
 
 
-def _estimate_sentence(estimate: float | None) -> str:
+def _fault_of_estimate(estimate: float | None) -> str:
+    """Why (b) or (c) does not hold by a known error estimate; "" if they do."""
     if estimate is None:
-        return "from it no minimum was found on a finer grid"
-    return "" if estimate <= RESOLVED else _sentence(estimate)
+        return _NO_FINER_MINIMUM
+    return "" if estimate <= RESOLVED else _cost_change(estimate)
 
 
-def _sentence(change: float) -> str:
+def _cost_change(change: float) -> str:
     return f"a finer grid changes its cost by {100 * change:.2g} %"
 
 
 def _with_estimate(solution: Solution, estimate: float) -> Solution:
-    metadata = {**solution.trajectory.metadata, "error_estimate": estimate}
-    trajectory = dataclasses.replace(solution.trajectory, metadata=metadata)
+    trajectory = _with_metadata(solution.trajectory, error_estimate=estimate)
     return dataclasses.replace(solution, trajectory=trajectory, error_estimate=estimate)
 
 
+def _with_metadata(trajectory: Trajectory, **entries: Any) -> Trajectory:
+    return dataclasses.replace(trajectory, metadata={**trajectory.metadata, **entries})
+
+
 def _unresolved(solution: Solution, reason: str) -> Solution:
-    """The solution as no success, with the figures and what to do."""
+    """The solution with the status UNRESOLVED; its message has the reason and what to do."""
     assert solution.problem is not None
     message = (
-        f"the motion is a minimum on {solution.problem.grid.intervals} intervals, but not along "
-        f"its whole way: {reason}; {_remedy(solution)}."
+        f"the motion is a minimum on {solution.problem.grid.intervals} intervals, which do not "
+        f"resolve it: {reason}; {_remedy(solution)}."
     )
     return _failed(solution, Status.UNRESOLVED, message)
 
 
 def _not_checked(solution: Solution) -> Solution:
-    """The solution as no success, since it is not known what lies between its points."""
+    """The solution with the status TIME_LIMIT: it is not known what lies between its points."""
     assert solution.problem is not None
     message = (
         f"the motion is a minimum on {solution.problem.grid.intervals} intervals, of cost "
@@ -232,21 +270,19 @@ def _not_checked(solution: Solution) -> Solution:
 
 
 def _failed(solution: Solution, status: Status, message: str) -> Solution:
-    metadata = {**solution.trajectory.metadata, "status": str(status)}
-    trajectory = dataclasses.replace(solution.trajectory, metadata=metadata)
     return dataclasses.replace(
         solution,
         success=False,
         status=status,
         message=message,
-        trajectory=trajectory,
+        trajectory=_with_metadata(solution.trajectory, status=str(status)),
         minima=(),
         check=None,
     )
 
 
 def _remedy(solution: Solution) -> str:
-    """What to do, by what the motion looks like."""
+    """What to do: against whirling if a joint whirls, else with the grid or the search."""
     whirling = whirl(solution)
     if whirling is not None:
         return str(whirling)

@@ -1,8 +1,8 @@
 """Whirling joints: without limits and rotors a light joint spins, faster on every finer grid.
 
-Spinning a link of inertia I costs a torque of the order of I, and what it does to the other joints
-grows with the square of its velocity. For small I the least torque is found at velocities that no
-joint of a robot reaches, if it is attained at all.
+Spinning a link of inertia I up costs a torque of the order of I, while its reaction on the other
+joints grows with the square of its velocity. For small I the least torque is found at velocities
+that no joint of a robot reaches, if there is a minimum at all.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ WHIRLING_RATIO = 10.0
 """Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
 2 for a smooth motion from rest to rest."""
 MAX_GRIDS = 6
-"""Number of grids that are tried for a whirling motion."""
-LIGHT_SHARE = 0.03
-"""Inertia of a joint that may whirl, relative to that of the heaviest."""
+"""Maximum number of grids that are tried for a whirling motion."""
+MAX_INERTIA_SHARE = 0.03
+"""Largest inertia of a joint that counts as whirling, relative to that of the heaviest: the torque
+that spins a heavier one shows in the cost. `hovi info` warns of far lighter ones only."""
 HOPELESS_RATIO = 40.0
-"""That ratio above which finer grids are not tried for a motion that its grid does not resolve."""
+"""The same ratio above which finer grids are not tried for a motion that is not resolved."""
 UNUSABLE_RATIO = 60.0
-"""That ratio above which no grid is trusted: what one finds to be a minimum a finer one leaves."""
+"""The same ratio above which no grid is trusted: a minimum on one grid is none on a finer one."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +45,14 @@ class Whirl:
     ratio: float
     inertia: float
 
-    def is_hopeless(self, resolved: bool, grids: int) -> bool:
-        """Whether no finer grid is tried. resolved: whether the last of the grids nearly was."""
-        most = UNUSABLE_RATIO if resolved else HOPELESS_RATIO
-        return self.ratio > most or grids >= MAX_GRIDS
+    def is_hopeless(self, *, grids: int, nearly_resolved: bool) -> bool:
+        """Whether no finer grid is to be tried.
+
+        grids: number of those that were tried. nearly_resolved: whether the costs on the last one
+        and a finer one are close.
+        """
+        largest = UNUSABLE_RATIO if nearly_resolved else HOPELESS_RATIO
+        return self.ratio > largest or grids >= MAX_GRIDS
 
     def __str__(self) -> str:
         """What it does, and what helps."""
@@ -66,32 +71,33 @@ def whirl(solution: Solution) -> Whirl | None:
     if len(joints) == 0:
         return None
     distance = np.abs(problem.robot.difference(q[:-1], q[1:]).sum(axis=0))  # with full turns
-    plain = (np.pi + distance) / trajectory.duration
-    if np.max(np.abs(trajectory.v) / plain) < WHIRLING_RATIO / 2:  # nor between the nodes
+    unit = (np.pi + distance) / trajectory.duration
+    if np.max(np.abs(trajectory.v) / unit) < WHIRLING_RATIO / 2:  # too slow between nodes, too
         return None
     v = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
-    ratio = v.max(axis=0) / plain
+    ratio = v.max(axis=0) / unit
     worst = int(joints[np.argmax(ratio[joints])])
     if ratio[worst] <= WHIRLING_RATIO:
         return None
     diagonal = np.diagonal(MassMatrix(problem.scene.model)(q), axis1=1, axis2=2)
     inertia = float(diagonal[:, worst].min())
-    if inertia > LIGHT_SHARE * diagonal[:, joints].max():
+    if inertia > MAX_INERTIA_SHARE * diagonal[:, joints].max():
         return None
     name, speed = trajectory.coordinate_names[worst], float(v[:, worst].max())
     return Whirl(name, speed, float(ratio[worst]), inertia)
 
 
 def whirl_without_minimum(solution: Solution) -> Whirl | None:
-    """The joint that whirls most in a motion at its iteration limit; None if none is hopeless."""
+    """The joint that whirls hopelessly in a motion at its iteration limit; None if none does."""
     problem = solution.problem
     if solution.status is not Status.ITERATION_LIMIT or problem is None or problem.limited:
         return None
     found = whirl(solution)
-    return None if found is None or not found.is_hopeless(False, 0) else found
+    hopeless = found is not None and found.is_hopeless(grids=0, nearly_resolved=False)
+    return found if hopeless else None
 
 
 def _unlimited_angles(problem: TrajectoryProblem) -> npt.NDArray[np.bool_]:
-    """Which coordinates are angles without a bound on their velocity, (nv,)."""
+    """Which coordinates are angles without a bound on their velocity, shape (nv,)."""
     limits, sliding = problem.limits, problem.robot.sliding
     return ~sliding if limits is None else ~sliding & ~limits.bounded[1]

@@ -210,7 +210,7 @@ class _Search:
     """Strides in the direction of decreasing J + w T, then Brent's method or bisection.
 
     here: the current minimum. beyond: the nearest trial in the direction of decrease that failed
-    or costs more, or None; the search continues between the two.
+    or costs more, if any; the search continues between the two.
     ending: words of the message before the duration; "" until the search has converged.
     """
 
@@ -266,7 +266,7 @@ class _Search:
         return max(further, bound) if shorter else min(further, bound)
 
     def _take(self, trial: _Trial) -> None:
-        """Move to a trial, or bracket with it, or keep it as what lies beyond."""
+        """Move to a trial, bracket a root with it, or keep it as the one beyond."""
         here, beyond = self.here, self.beyond
         if not trial.success:
             self.beyond = trial
@@ -353,15 +353,13 @@ class _Search:
         best, beyond = self._best(), self.beyond
         if beyond is None:
             return dataclasses.replace(best, ending="The duration is kept at its bound,")
-        side = "shorter" if beyond.duration < self.here.duration else "longer"
-        of_it = f"to {EDGE_PRECISION:g} of it"
+        extreme = "shortest" if beyond.duration < self.here.duration else "longest"
+        edge = f"The best duration, to {100 * EDGE_PRECISION:g} % the {extreme} one"
         if beyond.success:
-            ending = f"Beyond the best duration motions cost more, {of_it}: it is"
-            return dataclasses.replace(best, ending=ending)
+            return dataclasses.replace(best, ending=f"{edge} before motions cost more, is")
         status = beyond.solution.status
         if status is Status.INFEASIBLE:
-            edge = f"at the edge of what was found feasible, {of_it} towards {side} ones:"
-            return dataclasses.replace(best, ending=f"The best duration is {edge}")
+            return dataclasses.replace(best, ending=f"{edge} found feasible, is")
         at = f"{beyond.duration:.6g} s, where less cost is expected"
         return best.unfinished(status, f"for {at}, the solve ended in {status}")
 

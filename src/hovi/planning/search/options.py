@@ -42,6 +42,7 @@ _CHECKED_HERE = (
     *("via", "scheme", "intervals", "starts", "seed", "obstacles", "margin"),
     *("max_iterations", "time_limit", "processes"),
 )
+"""Options whose own checks say more than their annotations."""
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
@@ -171,14 +172,17 @@ class PlanOptions:
     @property
     def table(self) -> Scheme:
         """The scheme as a Scheme, the default one if none is named."""
-        scheme = DEFAULT_SCHEME if self.scheme is None else self.scheme
+        scheme = self._scheme
         return by_name(scheme) if isinstance(scheme, str) else scheme
 
     @property
     def scheme_name(self) -> str:
         """The name of the scheme, or of the default one."""
-        scheme = DEFAULT_SCHEME if self.scheme is None else self.scheme
-        return scheme if isinstance(scheme, str) else scheme.name
+        return self._scheme if isinstance(self._scheme, str) else self._scheme.name
+
+    @property
+    def _scheme(self) -> str | Scheme:
+        return DEFAULT_SCHEME if self.scheme is None else self.scheme
 
     @property
     def interval_count(self) -> int:
@@ -212,9 +216,10 @@ class PlanOptions:
 
         Raises InputError for values that do not fit the robot.
         """
-        wanted = self.effective_tolerance
-        wanted = None if wanted is None else Tolerance.of(wanted, robot)
-        return self.with_changes(limits=as_limits(robot, self.limits), tolerance=wanted)
+        tolerance = self.effective_tolerance
+        if tolerance is not None:
+            tolerance = Tolerance.of(tolerance, robot)
+        return self.with_changes(limits=as_limits(robot, self.limits), tolerance=tolerance)
 
 
 explain(PlanOptions, PlanOptions)

@@ -33,7 +33,7 @@ from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
 
 MAX_GUESS_INTERVALS = 400
-"""Largest number of intervals of a guess that a refinement begins with."""
+"""Largest number of intervals of a guess on whose grid a refinement begins."""
 Start = State | npt.ArrayLike | str
 Goal = State | FrameGoal | npt.ArrayLike | str
 Keywords = ParamSpec("Keywords")
@@ -148,12 +148,13 @@ def _time(
 def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
     """The requested grid, or the first grid of the refinement to a tolerance.
 
-    That is the guess's own if it is a motion on a finer grid, so that nothing of it is lost.
+    The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
+    free: whether the duration is.
     """
     guess = options.guess
     if options.tolerance is None:
         grid = Grid.uniform(T, options.interval_count, options.table)
-    elif isinstance(guess, Trajectory) and _begins(guess.grid, options):
+    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options):
         grid = guess.grid.stretched(T)
     else:
         limited = as_limits(robot, options.limits).bounded.any()
@@ -163,12 +164,16 @@ def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
 
 
-def _begins(grid: Grid, options: PlanOptions) -> bool:
-    """Whether a refinement begins with a guess's grid: Galerkin tables, and none other named."""
+def _is_first_grid(grid: Grid, options: PlanOptions) -> bool:
+    """Whether a refinement begins on the grid of its guess.
+
+    The grid has Galerkin tables only, and more intervals than the first grid would have, up to
+    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others.
+    """
     if options.intervals is not None or options.via:
         return False
-    usual = all(is_galerkin(scheme) for scheme, _ in grid.groups)
-    return usual and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
+    refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
+    return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
 
 
 def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.planning.refinement.resolution import resolved, told_as_whirling
+from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
+from hovi.planning.refinement.resolution import resolved, unresolved_if_whirling
 from hovi.planning.refinement.whirling import whirl_without_minimum
 from hovi.planning.search.continuation import STOPPED, UNUSABLE, may_help, solve_by_continuation
 from hovi.planning.search.final_stages import (
@@ -25,7 +26,6 @@ from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.solver import Solution, guess_path
 from hovi.planning.solver.status import Status
-from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
@@ -113,7 +113,7 @@ class Search:
         return best, tuple(s.cost for s in found if s.success)
 
     def _resolved(self, found: list[Solution]) -> list[Solution]:
-        """The minima from the cheapest resolved one on; the cheapest one if none is resolved."""
+        """The minima from the cheapest resolved one on; the cheapest of all if none is resolved."""
         checked: list[Solution] = []
         if found[0].success:
             self.progress("comparing with a finer grid", 0.95)
@@ -121,11 +121,11 @@ class Search:
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
             checked.append(resolved(dataclasses.replace(solution, problem=problem)))
             if checked[-1].success:
-                return [_with_costlier(checked), *found[i + 1 :]]
+                return [_noting_cheaper(checked), *found[i + 1 :]]
             if self.deadline.passed or interrupted():
                 break
         best = checked[0]
-        return [best if self.fine.tolerance is None else told_as_whirling(best)]
+        return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
 
     def _coarse(self) -> Job:
         """The job on the grid of the exploration."""
@@ -133,7 +133,7 @@ class Search:
         continued = isinstance(options.guess, Trajectory) and options.starts == 1
         if grid.intervals <= 2 * COARSE_INTERVALS or continued:
             return self.fine
-        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin(2, points=8))
+        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin_with_more_points(2))
         if self.fine.via:
             try:
                 coarse = coarse.with_nodes([each.time for each in self.fine.via])
@@ -197,7 +197,7 @@ class Search:
 
 
 def _rank(tried: tuple[Job, Solution]) -> tuple[int, float]:
-    """The least for the most promising duration: a minimum, a usable motion, or the longest."""
+    """Sort key of durations that were tried: minima, then usable motions, then the longest one."""
     fine, found = tried
     if found.success or found.status not in UNUSABLE:
         return (0 if found.success else 1), 0.0
@@ -212,8 +212,8 @@ def _ended(found: list[Solution], stopped: BaseException, what: str) -> list[Sol
     return [ended_early(found[0], Status.TIME_LIMIT, f"{stopped} before {what}")]
 
 
-def _with_costlier(checked: list[Solution]) -> Solution:
-    """The last solution, with a note on the cheaper ones that are not resolved."""
+def _noting_cheaper(checked: list[Solution]) -> Solution:
+    """The last solution, with a note on the cheaper ones before it, which are not resolved."""
     *unresolved, best = checked
     if not unresolved:
         return best

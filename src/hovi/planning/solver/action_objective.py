@@ -157,7 +157,7 @@ class ActionObjective(Objective[DiscretePath]):
     def _least_torque(self, x: DiscretePath) -> float:
         """Lower bound of the torque scale for residuals, in [N m]."""
         inertial, grid = self.problem.inertial_torque, self.problem.grid
-        if self.ld.chart is None:  # z is stored, and rounding in it is one of accelerations
+        if self.ld.chart is None:  # then z is stored, and rounding of nodes moves no acceleration
             return TORQUE_FLOOR * inertial
         size = max(1.0, float(np.abs(x.q).max()))
         shortest = float(grid.steps.min()) / grid.duration
@@ -204,15 +204,15 @@ class ActionObjective(Objective[DiscretePath]):
 
         curvatures: weights per batch, multipliers of constraints included. terms: at the points.
         """
-        known = self.multipliers
-        if known is not None:
-            terms = self._at_points(x, known).added_to(terms)
+        multipliers = self.multipliers
+        if multipliers is not None:
+            terms = self._with_moments(x, multipliers).added_to(terms)
         jets = self.jets(x)
         self._expansion = _expand(self.ld, x, self.coordinates, curvatures, terms, jets)
-        if known is not None:
-            self._add_conditions(x, self._expansion, known)
-        if known is not None and self.moments is not None:
-            self.moments.add_squares(self._expansion, known.torque_penalty)
+        if multipliers is not None:
+            self._add_conditions(x, self._expansion, multipliers)
+            if self.moments is not None:
+                self.moments.add_squares(self._expansion, multipliers.torque_penalty)
         intervals = IntervalSum(
             self._expansion.gradient,
             self._expansion.hessian,
@@ -237,12 +237,12 @@ class ActionObjective(Objective[DiscretePath]):
         intervals = IntervalSum(expansion.gradient, expansion.hessian, metric)
         return MergeTreeModel(intervals, self.structure.tree)
 
-    def _at_points(self, x: DiscretePath, known: Multipliers) -> Multipliers:
-        """The multipliers with the penalty of moments at x, which is no weight of torques."""
+    def _with_moments(self, x: DiscretePath, multipliers: Multipliers) -> Multipliers:
+        """The multipliers, plus the force of the penalty of moments at x."""
         if self.moments is None:
-            return known
+            return multipliers
         forces = [self._force(y, i) for i, y in enumerate(self.outputs(x))]
-        return dataclasses.replace(known, torque=forces)
+        return dataclasses.replace(multipliers, torque=forces)
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """Add the terms of the conditions to the intervals that contain their nodes."""
@@ -280,7 +280,8 @@ class ActionObjective(Objective[DiscretePath]):
 def _penalized(problem: TrajectoryProblem, multipliers: Multipliers) -> DiscreteLagrangian:
     """The discrete Lagrangian with the penalty as the weight of the passive joints' torques.
 
-    That of their moments couples the points of an interval, and is no weight.
+    The penalty of moments couples the points of an interval, and cannot be a weight: see
+    `TorqueMoments.add_squares`.
     """
     if len(problem.passive) == 0 or problem.torque_moments is not None:
         return problem.ld

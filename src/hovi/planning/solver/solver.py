@@ -1,4 +1,4 @@
-"""solve_on_grid: from a trajectory problem to a Solution, at the points of its grid."""
+"""solve_on_grid: from a trajectory problem to a Solution, not checked between the points."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STATIONARY_DECREASE = 1e-9
 class Solution:
     """The solution of a trajectory problem, or the best motion found.
 
-    success: whether a minimum was found that is one between the quadrature points, too.
+    success: whether a minimum was found; after `plan`, `solve` and `replan`, a resolved one.
     status, message: the outcome, as a word and in a sentence.
     trajectory: the motion; the best one found if there is no minimum.
     cost: the discrete action of L~, by default 1/2 integral |tau|^2.
@@ -55,7 +55,7 @@ class Solution:
     setup_seconds, solve_seconds: wall time before and during the solve.
     problem: the trajectory problem; `replan` starts from it.
     forces: multipliers of limits and of passive joints' torques at the quadrature points.
-    check: what `replan` checks its motion with; None for none.
+    check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     """
 
     success: bool
@@ -140,7 +140,7 @@ def solve_on_grid(
     report: Report | None = None,
     method: Method | None = None,
 ) -> Solution:
-    """A motion that makes the discrete action stationary, which may differ between the points.
+    """A motion that makes the discrete action stationary, without a check between the points.
 
     problem: the boundary data and the discrete Lagrangian.
     guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.

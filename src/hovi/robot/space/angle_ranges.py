@@ -1,4 +1,4 @@
-"""Ranges of angles that are likely to be given in degrees."""
+"""Ranges of angles that were probably meant in degrees."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-LEAST, MOST = 8 * np.pi, 720.0
-"""Bounds of an angle, in [rad], between which they look like degrees: four turns and more.
-
-Beyond, as in +-1000, a number usually stands for no bound.
-"""
+MIN_SUSPICIOUS, MAX_SUSPICIOUS = 8 * np.pi, 720.0
+"""Bounds of angles in this range, in [rad], look like degrees: few joints make four turns, and a
+number beyond two turns in degrees, such as 1000, usually stands for no bound."""
 
 
 def ranges_in_degrees(
@@ -24,7 +22,8 @@ def ranges_in_degrees(
     names: of the coordinates, (nv,). angles: which are angles, (nv,). lower, upper: in [rad].
     """
     sizes = np.abs(np.stack([lower, upper]))
-    found = np.flatnonzero(angles & ((sizes > LEAST) & (sizes <= MOST)).any(axis=0))
+    suspicious = (sizes > MIN_SUSPICIOUS) & (sizes <= MAX_SUSPICIOUS)
+    found = np.flatnonzero(angles & suspicious.any(axis=0))
     if not len(found):
         return ""
     i = int(found[0])

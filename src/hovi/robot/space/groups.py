@@ -97,7 +97,10 @@ def differenced(layout: Layout, q0: Array, q1: Array, expected: Array | None = N
     lead = _common_rows(q0, q1)
     result = np.empty((*lead, nv))
     if expected is not None and _common_rows(q0, q1, expected) != lead:
-        raise InputError(f"expected has rows {expected.shape[:-1]}, the configurations {lead}.")
+        raise InputError(
+            f"the expected tangent vectors must broadcast to shape {(*lead, nv)}, got an array of "
+            f"shape {expected.shape}."
+        )
     near = None if expected is None else _rows(expected, lead)
     native.difference(layout, _rows(q0, lead), _rows(q1, lead), near, result.reshape(-1, nv))
     return result
@@ -126,7 +129,10 @@ def _common_rows(*arrays: Array) -> tuple[int, ...]:
     try:
         return np.broadcast_shapes(*leads)
     except ValueError:
-        raise InputError(f"rows {', '.join(map(str, leads))} do not broadcast.") from None
+        shapes = " and ".join(str(array.shape) for array in arrays)
+        raise InputError(
+            f"arrays of shape {shapes} must have the same number of rows, or one of them one row."
+        ) from None
 
 
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:

@@ -26,7 +26,7 @@ NUMBERS: dict[str, dict[str, int]] = {
 }
 """Number of values in each attribute, by element."""
 
-_WORDS: dict[str, tuple[str, ...]] = {
+_TEXTS: dict[str, tuple[str, ...]] = {
     "robot": ("name", "version"),
     "link": ("name",),
     "visual": ("name",),
@@ -40,6 +40,7 @@ _WORDS: dict[str, tuple[str, ...]] = {
     "texture": ("filename",),
     "material": ("name",),
 }
+"""Attributes whose value is a text, by element."""
 
 CHILDREN: dict[str, tuple[str, ...]] = {
     "robot": ("link", "joint", "material"),
@@ -54,7 +55,7 @@ CHILDREN: dict[str, tuple[str, ...]] = {
         *("calibration", "safety_controller"),
     ),
 }
-"""Elements inside an element; all others have none."""
+"""Elements that each element may contain; elements that are not listed contain none."""
 
 EXTENSIONS: dict[str, tuple[str, ...]] = {
     "robot": ("gazebo", "transmission", "ros2_control", "sensor", "mujoco"),
@@ -62,9 +63,9 @@ EXTENSIONS: dict[str, tuple[str, ...]] = {
     "joint": ("gazebo",),
     "collision": ("material", "verbose", "contact_coefficients"),
 }
-"""What simulators and controllers add to a URDF, which says nothing about the mechanism."""
+"""Elements that simulators and controllers add; they do not describe the mechanism."""
 
-HOMES: dict[str, str] = {
+PARENTS: dict[str, str] = {
     "link": "robot",
     "joint": "robot",
     **dict.fromkeys(("inertial", "visual", "collision"), "link"),
@@ -72,12 +73,12 @@ HOMES: dict[str, str] = {
     "geometry": "visual",
     **dict.fromkeys(("axis", "parent", "child", "limit", "dynamics", "mimic"), "joint"),
 }
-"""Where elements belong that the mechanism and its shapes need."""
+"""The element in which each element of the mechanism and its shapes belongs."""
 
 
 def attributes_of(tag: str) -> tuple[str, ...]:
     """The attributes of an element."""
-    return (*NUMBERS.get(tag, ()), *_WORDS.get(tag, ()))
+    return (*NUMBERS.get(tag, ()), *_TEXTS.get(tag, ()))
 
 
 def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
@@ -91,6 +92,6 @@ def elements_in_use(robot: Element) -> Iterator[tuple[Element, Element]]:
             yield from ((owner, element) for element in owner)
 
 
-def called(owner: Element) -> str:
-    """An element of the robot in a message, such as "link 'arm'"."""
+def tag_and_name(owner: Element) -> str:
+    """The name of an element of the robot in messages, such as "link 'arm'"."""
     return "<robot>" if owner.tag == "robot" else f"{owner.tag} {owner.get('name', '')!r}"

@@ -1,4 +1,4 @@
-"""Meshes that exist but hold nothing usable: found one by one, so that the other shapes stay."""
+"""Finds unusable meshes one by one, so that the robot keeps all other shapes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def without_unreadable_meshes(text: str, kind: str) -> tuple[str, list[str]]:
 
 def remove_unusable_shapes(geometry: pin.GeometryModel, model: pin.Model) -> list[str]:
     """Remove meshes with coordinates that are not finite or too large; returns the reasons."""
-    # What is said of an object is read first: removing one moves those behind it in memory.
+    # All names are read before any removal, which moves the objects behind it in memory.
     unusable = {
         str(item.name): f"link {model.frames[item.parentFrame].name!r}: mesh "
         f"{Path(item.meshPath).name!r} has coordinates that are not finite, or larger than "
@@ -53,10 +53,10 @@ def _problems_of(shape: ElementTree.Element) -> Iterator[str]:
 
 
 def one_line(error: Exception) -> str:
-    """What Coal says of a file, without the places in its own code: its last words but a hint."""
+    """Coal's last line about a file that is not a hint: those before are places in its source."""
     lines = [line.strip(" .") for line in str(error).splitlines()]
-    said = [line for line in lines if line and not line.startswith("Hint:")]
-    return said[-1] if said else type(error).__name__
+    lines = [line for line in lines if line and not line.startswith("Hint:")]
+    return lines[-1] if lines else type(error).__name__
 
 
 def _is_usable(shape: coal.BVHModelBase) -> bool:

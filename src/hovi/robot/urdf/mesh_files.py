@@ -77,7 +77,7 @@ def _check_named(mesh: Path, name: str, root: Path, must_exist: bool) -> None:
 
 
 def _check_text(mesh: str, content: bytes) -> None:
-    """A page gets Collada and OBJ files as text."""
+    """Raise ModelError unless a mesh is UTF-8: a page gets Collada and OBJ files as text."""
     try:
         content.decode()
     except UnicodeDecodeError as error:

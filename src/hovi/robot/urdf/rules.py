@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from hovi.errors import nearest
-from hovi.robot.urdf.elements import NUMBERS, called, elements_in_use
+from hovi.robot.urdf.elements import NUMBERS, elements_in_use, tag_and_name
 from hovi.robot.urdf.spelling import names_are_of_urdf, values_are_attributes
 
 Rule = Callable[[Element], Iterator[str]]
@@ -95,7 +95,7 @@ def elements_are_not_repeated(robot: Element) -> Iterator[str]:
             for tag in _ONCE.get(element.tag, ()):
                 if (count := len(element.findall(tag))) > 1:
                     yield (
-                        f"<{element.tag}> of {called(owner)} has {count} elements <{tag}>: "
+                        f"<{element.tag}> of {tag_and_name(owner)} has {count} elements <{tag}>: "
                         "keep one."
                     )
 
@@ -105,7 +105,7 @@ def attributes_are_there(robot: Element) -> Iterator[str]:
     for owner, element in elements_in_use(robot):
         for attribute in _REQUIRED.get(element.tag, ()):
             if not element.get(attribute):
-                yield f"<{element.tag}> of {called(owner)} needs {attribute}=."
+                yield f"<{element.tag}> of {tag_and_name(owner)} needs {attribute}=."
 
 
 def numbers_are_finite(robot: Element) -> Iterator[str]:
@@ -114,7 +114,7 @@ def numbers_are_finite(robot: Element) -> Iterator[str]:
         for attribute, count in NUMBERS.get(element.tag, {}).items():
             text = element.get(attribute)
             if text is not None and (problem := _number_problem(text, count, element.tag)):
-                place = f"<{element.tag} {attribute}={_short(text)}> of {called(owner)}"
+                place = f"<{element.tag} {attribute}={_short(text)}> of {tag_and_name(owner)}"
                 yield f"{place} must be {problem}."
 
 
@@ -204,7 +204,8 @@ def shapes_have_a_size(robot: Element) -> Iterator[str]:
         for attribute in ("size", "radius", "length"):
             text = element.get(attribute) if element.tag in NUMBERS else None
             if text is not None and min(map(float, text.split())) < 0.0:
-                yield f"<{element.tag} {attribute}={_short(text)}> of {called(owner)} is negative."
+                place = f"<{element.tag} {attribute}={_short(text)}> of {tag_and_name(owner)}"
+                yield f"{place} is negative."
 
 
 def axes_are_not_zero(robot: Element) -> Iterator[str]:
@@ -276,7 +277,7 @@ def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
         inside = posixpath.normpath(rest).startswith(f"{package}/")
         if separator and scheme != "file" and (package in ("", ".", "..") or not inside):
             yield (
-                f"{element.tag} {_short(filename)} of {called(owner)} leaves its package: "
+                f"{element.tag} {_short(filename)} of {tag_and_name(owner)} leaves its package: "
                 "write package://<package>/<path inside it>."
             )
 

@@ -1,7 +1,7 @@
-"""Finds names in a URDF that are no names of URDF.
+"""Finds misspelt and misplaced elements and attributes of a URDF.
 
-Pinocchio passes over what it does not know: with <inertail>, or <inertial> in the wrong place, the
-link has no mass, and the robot is another one. A name that is nearly one of URDF, or that belongs
+Pinocchio ignores what it does not know: with <inertail>, or <inertial> in the wrong place, the link
+has no mass, and another robot is planned for. A name that is nearly one of URDF, or that belongs
 elsewhere, is an error; others are reported by `hovi info`.
 """
 
@@ -13,18 +13,19 @@ from dataclasses import dataclass
 from functools import cache
 from xml.etree.ElementTree import Element
 
-from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, HOMES, attributes_of, called
+from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, PARENTS, attributes_of, tag_and_name
 
 MAX_UNKNOWN = 10_000
+"""Maximum number of unknown names, so that a file full of them is refused in time."""
 
 
 @dataclass(frozen=True)
 class Unknown:
     """An element or attribute that URDF does not have at its place.
 
-    where: the element that has it, in a message. place: the tag of that element.
+    where: the element that has it, for messages. place: the tag of that element.
     name: in angle brackets for an element, followed by = for an attribute.
-    remedy: what is wrong, for one that is probably a mistake; else "".
+    remedy: what is wrong and what to do, for a probable mistake; "" for others.
     """
 
     where: str
@@ -36,7 +37,8 @@ class Unknown:
 def unknown_names(robot: Element) -> Iterator[Unknown]:
     """Every unknown element and attribute, without looking into extensions."""
     for element, owner in _known_elements(robot, robot):
-        where = called(owner) if element is owner else f"<{element.tag}> of {called(owner)}"
+        where = tag_and_name(owner)
+        where = where if element is owner else f"<{element.tag}> of {where}"
         names = [f"{key}=" for key in element.attrib if not _is_qualified(key)]
         for name in (*names, *(f"<{child.tag}>" for child in element)):
             if name not in _known_in(element.tag):
@@ -53,8 +55,8 @@ def names_are_of_urdf(robot: Element) -> Iterator[str]:
             return
 
 
-def passed_over(robot: Element) -> list[str]:
-    """The unknown names of a checked URDF and how often they occur, the most frequent first."""
+def ignored_names(robot: Element) -> list[str]:
+    """The unknown names of a checked URDF, with their counts, the most frequent first."""
     counts = Counter((each.place, each.name[:40]) for each in unknown_names(robot))
     return [
         f"{name} in <{place}>" + (f" ({count} times)" if count > 1 else "")
@@ -69,7 +71,7 @@ def values_are_attributes(robot: Element) -> Iterator[str]:
         if text and element.tag not in CHILDREN:
             attribute = attributes_of(element.tag)[0]
             yield (
-                f"<{element.tag}> of {called(owner)} has the text {text[:40]!r}: "
+                f"<{element.tag}> of {tag_and_name(owner)} has the text {text[:40]!r}: "
                 f"write values as attributes, such as {attribute}=."
             )
 
@@ -96,15 +98,15 @@ def _known_in(place: str) -> frozenset[str]:
 
 def _remedy(place: str, name: str) -> str:
     """What is probably wrong with an unknown name in <place>, or ""."""
-    home = HOMES.get(name.strip("<>"))
-    if home is not None:
-        return f"which belongs in <{home}>: move it there."
+    parent = PARENTS.get(name.strip("<>"))
+    if parent is not None:
+        return f"which belongs in <{parent}>: move it there."
     near = [each for each in sorted(_known_in(place)) if is_near(name, each)]
     return f"which is unknown: did you mean {' or '.join(near)}?" if near else ""
 
 
 def is_near(one: str, other: str) -> bool:
-    """Whether two names differ by case, and at most one letter or one swap of neighbours."""
+    """Whether two names differ, apart from case, by at most one letter or one swap of neighbors."""
     one, other = sorted((one.casefold(), other.casefold()), key=len)
     if one == other or len(other) - len(one) > 1:
         return one == other

@@ -48,7 +48,7 @@ def test_a_torque_that_is_not_a_number_between_the_points_breaks_no_limit(two_li
     assert "between the quadrature points" in solution.message
 
 
-def test_a_motion_that_the_limits_forbid_is_infeasible_still(two_link: Robot) -> None:
+def test_a_motion_that_the_limits_forbid_is_still_infeasible(two_link: Robot) -> None:
     scene = Scene(two_link, [Custom({"elbow": "exp(t)"})])
     options = {"intervals": 8, "limits": {"tau": 0.01}, "continuation": False}
     solution = plan(scene, [0.0, 0.0], [0.3, 0.7], 1.0, **options)
