@@ -136,12 +136,12 @@ def test_an_interrupt_returns_the_best_candidate(
 ) -> None:
     estimates = 0
 
-    def interrupted(solution: Solution) -> FinerSolution | None:
+    def interrupted(solution: Solution, time_limit: float | None) -> FinerSolution | None:
         nonlocal estimates
         estimates += 1
         if estimates > finished:
             raise KeyboardInterrupt
-        return finer_than(solution)
+        return finer_than(solution, time_limit)
 
     monkeypatch.setattr("hovi.planning.refinement.candidate.finer_than", interrupted)
     goal = State(REACH_Q, REACH_V)
