@@ -22,7 +22,8 @@ MAX_ERROR_OF_DECAY = 1e-2
 """Relative error of the cost up to which the decay of the modes is that of the motion."""
 MAX_ERROR_WITH_FEW_POINTS = 0.05
 """Relative error of the cost up to which the next grid has r + 2 points per interval, which are
-cheaper; with larger errors the torque could hide between them."""
+cheaper; with larger errors the torque could hide between them. Within limits, and where a joint
+whirls, only up to CURVE_TOLERANCE."""
 FINER_GRID_RATIO = 2.5
 """Ratio of the finer solution's predicted error to that target up to which its grid is the next:
 the solution is known already, and estimating its error is cheap."""
@@ -38,9 +39,8 @@ def next_grid(candidate: Candidate) -> Grid:
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
     decay_known = error <= MAX_ERROR_OF_DECAY
-    few_points = error <= (
-        MAX_ERROR_WITH_FEW_POINTS if candidate.whirl is None else CURVE_TOLERANCE
-    )
+    may_hide = problem.limited or candidate.whirl is not None
+    few_points = error <= (CURVE_TOLERANCE if may_hide else MAX_ERROR_WITH_FEW_POINTS)
     same_steps = np.array_equal(problem.grid.steps, finer.problem.grid.steps)
     # with all intervals halved, as under limits, its own estimate would need twice as many again
     usable = same_steps and (decay_known or finer.problem.grid.inner_modes <= UNRESOLVED_MODES)

@@ -46,6 +46,8 @@ class BoundedSearch:
     iterations: steps of all solves.
     margins: share of its range by which each bound is tightened in each interval, shape
         (2, N, 4 nv + pairs). clearance: bounded distances, or None.
+    tightened: the margins before the last tightening and the excess then, if there was one on this
+        grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve.
     """
@@ -70,6 +72,7 @@ class BoundedSearch:
                 distances, self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
             )
         self.margins = self.no_margins()
+        self.tightened: tuple[Array, Array] | None = None
 
     @property
     def least_distance(self) -> float:

@@ -37,6 +37,8 @@ HALVED_MU = 1e-2
 """First barrier parameter from such a guess, relative to the mean density of the objective."""
 TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
+MAX_TIGHTENING_FACTOR = 8.0
+"""The same where the last tightening reduced the excess by little."""
 EXTRA_TIGHTENING = 5.0
 """Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
@@ -85,17 +87,30 @@ def usable(outcome: Bounded) -> bool:
 
 def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bounded:
     """Solve again with the bounds tightened in proportion to the excess of the interpolant."""
-    tighter = np.where(
-        sides > 0, TIGHTENING_FACTOR * sides + EXTRA_TIGHTENING * search.limits.tolerance, 0.0
-    )
+    factors = _tightening_factors(search, sides)
+    tighter = np.where(sides > 0, factors * sides + EXTRA_TIGHTENING * search.limits.tolerance, 0.0)
     unused = np.isfinite(sides) & (sides < -UNUSED_MARGIN)
     looser = np.where(unused, sides + 0.5 * UNUSED_MARGIN, 0.0)
+    search.tightened = search.margins, sides
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
     mu = share * mean_density(outcome.outputs, objective)
     start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
     return search.solve(outcome.x, start)
+
+
+def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
+    """Ratio of tightening and excess of each bound, by the secant of the last tightening."""
+    if search.tightened is None:
+        return np.full(sides.shape, TIGHTENING_FACTOR)
+    margins, before = search.tightened
+    change = search.margins - margins
+    tightened = (change > 0) & (before > 0) & (sides > 0)
+    reduced = np.subtract(before, sides, where=tightened, out=np.ones_like(sides))
+    rate = np.maximum(reduced, 0.0) / np.where(tightened, change, 1.0)
+    most = MAX_TIGHTENING_FACTOR
+    return np.clip(1.2 / np.maximum(rate, 1.2 / most), TIGHTENING_FACTOR, most)
 
 
 def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> tuple[Bounded, str]:
@@ -117,7 +132,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     search.problem = search.problem.on(grid.halved(chosen))
     search.guess = search.problem.path(guess)
     search.multipliers = None
-    search.margins = search.no_margins()
+    search.margins, search.tightened = search.no_margins(), None
     if usable(outcome) and by_interval.max() <= WARM_EXCESS:
         again = _solved_from(search, search.problem.path(motion))
         if usable(again) or again.stop in STOPPED:
