@@ -39,6 +39,8 @@ SEED, COUNT = 17, 300
 STARTUP, SLOWDOWN = 120.0, 10.0
 """A mutant times out after STARTUP [s] and SLOWDOWN times what its tests took for the map, of the
 processor's time and not of a clock's, which on a shared machine would notice what is no fault."""
+UNKNOWN = 60.0
+"""Time that a file of tests outside the map is expected to take, in [s]."""
 IDLE = 30.0
 """Ratio of a clock's time to the processor's after which tests are taken to wait for each other."""
 PARTS = {
@@ -166,13 +168,14 @@ class TestMap:
             found = self.users(mutation.name)
         if not found:
             found = set().union(*lines.values())
-        return self.ordered(found & self.seconds.keys(), mutant.path) or self.own(mutant.path)
+        return self.unmapped(mutant.path) + self.ordered(found & self.seconds.keys(), mutant.path)
 
-    @staticmethod
-    def own(path: str) -> list[str]:
-        """The module's own test file, for a map of some of the tests only."""
-        file = Path("tests") / Path(path).with_name(f"test_{Path(path).stem}.py")
-        return [str(file)] if (ROOT / file).exists() else [str(file.parent)]
+    def unmapped(self, path: str) -> list[str]:
+        """The module's own test file, or its folder of tests, where the map has none of them."""
+        own = Path("tests") / Path(path).with_name(f"test_{Path(path).stem}.py")
+        name = str(own if (ROOT / own).exists() else own.parent)
+        mapped = any(test.startswith(name) for test in self.seconds)
+        return [] if mapped or not (ROOT / name).exists() else [name]
 
     def users(self, name: str) -> set[str]:
         """The tests of all lines that contain a name."""
@@ -315,10 +318,11 @@ class Runner:
     def chosen(self, mutant: Mutant) -> tuple[list[str], float]:
         chosen, total = [], 0.0
         for test in self.tests.of(mutant)[: self.most]:
-            if chosen and total + self.tests.seconds[test] > self.seconds:
+            took = self.tests.seconds[test] if "::" in test else UNKNOWN
+            if chosen and total + took > self.seconds:
                 continue
             chosen.append(test)
-            total += self.tests.seconds[test]
+            total += took
         return chosen, total
 
     def noticed_by(self, tests: list[str], limit: float) -> str:
@@ -359,7 +363,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--only", default="", help="those of modules whose path matches this")
     parser.add_argument("--tests", type=int, default=150, help="most tests of a mutant")
-    parser.add_argument("--seconds", type=float, default=60.0, help="most time of its tests")
+    parser.add_argument("--seconds", type=float, default=90.0, help="most time of its tests")
     chosen, more = parser.parse_known_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
     if chosen.map:
