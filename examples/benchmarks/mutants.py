@@ -230,20 +230,25 @@ def tested(tree: Path, tests: list[str], limit: float, log: Path) -> str:
         os.setsid()
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit)))
         _run_tests(tree, arguments, log)
-    end = time.monotonic() + IDLE * limit
+    try:
+        return _awaited(pid, time.monotonic() + IDLE * limit, log)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(pid, signal.SIGKILL)
+
+
+def _awaited(pid: int, end: float, log: Path) -> str:
+    """How the tests in a process ended, by its code."""
     while time.monotonic() < end:
         done, status = os.waitpid(pid, os.WNOHANG)
         if done:
-            _end_group(pid)
             code = os.waitstatus_to_exitcode(status)
             if code in (-signal.SIGXCPU, -signal.SIGKILL):
                 return "timeout"
-            if code not in (0, 1, 2) and code >= 0:
+            if code > 2 and not re.search(r"^ERROR tests/", log.read_text(), re.MULTILINE):
                 raise RuntimeError(f"the tests did not run, see {log}")
             return "failed" if code else "passed"
         time.sleep(0.05)
-    _end_group(pid)
-    os.waitpid(pid, 0)
     return "timeout"
 
 
@@ -264,11 +269,6 @@ def _run_tests(tree: Path, arguments: Path, log: Path) -> None:
         code = int(pytest.main([*options, f"@{arguments}"]))
     finally:
         os._exit(code)
-
-
-def _end_group(pid: int) -> None:
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(pid, signal.SIGKILL)
 
 
 def refused_by_types(tree: Path, folder: Path) -> bool:

@@ -112,6 +112,15 @@ def test_nodes_are_sampled_from_the_right_and_the_end_from_the_left(motion: Traj
     np.testing.assert_allclose(at_nodes.q[-1], motion.q[-1], atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("k", "s"), [(0, -1e-9), (0, 1.0 + 1e-9), (0, np.nan), (-1, 0.5), (1000, 0.5), (0.5, 0.5)]
+)
+def test_positions_outside_an_interval_are_refused(motion: Trajectory, k: float, s: float) -> None:
+    for values in (([k], [s]), ([k, 0], [s, 0.5])):
+        with pytest.raises(InputError, match=r"numbers of intervals, 0 to 4, and s positions|s "):
+            motion.sample_intervals(*values)
+
+
 def test_configurations_match_sample(motion: Trajectory) -> None:
     t = np.linspace(0.0, 2.0, 33)
     np.testing.assert_array_equal(motion.configurations(t), motion.sample(t).q)
