@@ -529,3 +529,22 @@ def test_the_full_duration_can_be_sampled_on_nonuniform_grids(scene: Scene) -> N
     np.testing.assert_allclose(uneven.sample(1.5).q[0], [0.3, 0.1], atol=1e-12)
     with pytest.raises(InputError, match="the motion lasts from 0 to"):
         uneven.sample(1.5 + 1e-12)
+
+
+def test_a_file_is_the_same_on_every_system(saved: Path) -> None:
+    """Members are readable by all, as on Unix, with a fixed date."""
+    with zipfile.ZipFile(saved) as archive:
+        for member in archive.infolist():
+            assert member.external_attr == 0o644 << 16
+            assert member.create_system == 3
+            assert member.date_time == (1980, 1, 1, 0, 0, 0)
+            assert member.compress_type == zipfile.ZIP_STORED
+
+
+def test_arrays_in_any_order_of_memory_are_the_same_path(motion: Trajectory, scene: Scene) -> None:
+    path, ld = motion.path, DiscreteLagrangian(scene.effort_lagrangian(), motion.grid)
+    other = DiscretePath(*(np.asfortranarray(array) for array in path.arrays))
+    strided = DiscretePath(*(np.repeat(array, 2, axis=0)[::2] for array in path.arrays))
+    for each in (other, strided):
+        assert all(array.flags.c_contiguous for array in each.arrays)
+        np.testing.assert_array_equal(ld.values(each), ld.values(path))
