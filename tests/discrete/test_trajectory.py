@@ -548,3 +548,15 @@ def test_arrays_in_any_order_of_memory_are_the_same_path(motion: Trajectory, sce
     for each in (other, strided):
         assert all(array.flags.c_contiguous for array in each.arrays)
         np.testing.assert_array_equal(ld.values(each), ld.values(path))
+
+
+@pytest.mark.parametrize("shape", [(3, 2, 1), (1, 5, 1), (3, 2, 4)])
+def test_stored_torques_need_two_points_and_any_number_of_joints(shape: tuple[int, ...]) -> None:
+    values = np.random.default_rng(1).normal(size=shape)
+    torque = StoredTorque(values)
+    np.testing.assert_array_equal(torque(np.zeros(2, dtype=int), np.array([0.0, 1.0])),
+                                  values[0, [0, -1]])  # fmt: skip
+    with pytest.raises(InputError, match="2 or more points"):
+        StoredTorque(values[:, :1])
+    with pytest.raises(InputError, match="2 or more points"):
+        StoredTorque(values[0])

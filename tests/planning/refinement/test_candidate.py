@@ -138,3 +138,16 @@ def test_a_motion_without_estimate_is_not_within_any_tolerance(arm_scene: Scene)
     assert candidate.finer is None
     assert np.isnan(candidate.error)
     assert not candidate.within_tolerance
+
+
+@pytest.mark.parametrize(
+    ("size", "along", "carried"),
+    [(1e-2, 5e-3, True), (1e-2, 2e-2, False), (1e-6, 5e-4, True), (1e-6, 5e-3, False),
+     ("1 mm", 5e-4, True), ("1 mm", 5e-3, False)],
+)  # fmt: skip
+def test_the_curve_is_as_good_as_the_tolerance_or_a_thousandth(
+    arm_scene: Scene, size: float | str, along: float, carried: bool
+) -> None:
+    found = solve_on_grid(reach(arm_scene, "galerkin-2x8", 16))
+    candidate = Candidate.of(found, Tolerance.of(size, arm_scene.robot))
+    assert dataclasses.replace(candidate, along=along).is_carried == carried
