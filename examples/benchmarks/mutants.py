@@ -36,11 +36,13 @@ from mutations import Mutation, is_fault, mutations_of
 
 ROOT = Path(__file__).resolve().parents[2]
 SEED, COUNT = 17, 300
-STARTUP, SLOWDOWN = 120.0, 10.0
+STARTUP, SLOWDOWN = 60.0, 10.0
 """A mutant times out after STARTUP [s] and SLOWDOWN times what its tests took for the map, of the
 processor's time and not of a clock's, which on a shared machine would notice what is no fault."""
 UNKNOWN = 60.0
 """Time that a file of tests outside the map is expected to take, in [s]."""
+NO_IMPORT = r"^(ERROR tests/|ImportError while loading conftest)"
+"""What pytest says where a module raises when it is imported."""
 IDLE = 30.0
 """Ratio of a clock's time to the processor's after which tests are taken to wait for each other."""
 PARTS = {
@@ -245,7 +247,7 @@ def _awaited(pid: int, end: float, log: Path) -> str:
             code = os.waitstatus_to_exitcode(status)
             if code in (-signal.SIGXCPU, -signal.SIGKILL):
                 return "timeout"
-            if code > 2 and not re.search(r"^ERROR tests/", log.read_text(), re.MULTILINE):
+            if code > 2 and not re.search(NO_IMPORT, log.read_text(), re.MULTILINE):
                 raise RuntimeError(f"the tests did not run, see {log}")
             return "failed" if code else "passed"
         time.sleep(0.05)
@@ -293,6 +295,7 @@ class Runner:
     tests: TestMap
     most: int
     seconds: float
+    slowdown: float = SLOWDOWN
     types: bool = True
 
     def run(self, mutant: Mutant) -> dict[str, object]:
@@ -302,7 +305,7 @@ class Runner:
         tests, expected = self.chosen(mutant)
         file.write_text(mutant.mutation.applied(source))
         try:
-            by = self.noticed_by(tests, STARTUP + SLOWDOWN * expected)
+            by = self.noticed_by(tests, STARTUP + self.slowdown * expected)
         finally:
             file.write_text(source)
         return {
@@ -363,6 +366,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=COUNT)
     parser.add_argument("--only", default="", help="those of modules whose path matches this")
     parser.add_argument("--tests", type=int, default=150, help="most tests of a mutant")
+    parser.add_argument("--slowdown", type=float, default=SLOWDOWN, help="until a timeout")
     parser.add_argument("--seconds", type=float, default=90.0, help="most time of its tests")
     chosen, more = parser.parse_known_args()
     chosen.work.mkdir(parents=True, exist_ok=True)
@@ -378,7 +382,9 @@ def main() -> None:
         preload()
         tests, types = TestMap(chosen.work), not chosen.no_types
         tree = copied(chosen.work)
-        runner = Runner(chosen.work, tree, tests, chosen.tests, chosen.seconds, types)
+        runner = Runner(
+            chosen.work, tree, tests, chosen.tests, chosen.seconds, chosen.slowdown, types
+        )
         for mutant in mutants:
             known = results.get(mutant.number)
             if known is not None and (known["by"] or not chosen.again):
