@@ -500,3 +500,16 @@ def test_a_reference_cost_is_the_weighted_square_of_the_distance(two_link: Robot
 )
 def test_coefficients_are_described_as_they_are_given(given: Any, words: str) -> None:
     assert ViscousFriction(given).describe() == f"viscous_friction: {words}"
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [
+        (Custom(torque_of={"elbow": "0.1*q"}), "tau of elbow += 0.1*q"),
+        (Custom(cost="v^2"), "cost += v^2"),
+        (Custom(torque_of={"elbow": "0.1*q"}, cost=2.0), "tau of elbow += 0.1*q; cost += 2.0"),
+        (Custom(), "nothing"),
+    ],
+)
+def test_a_custom_effect_is_described_by_its_formulas(effect: Custom, words: str) -> None:
+    assert effect.describe() == f"custom: {words}"
