@@ -9,8 +9,10 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
-from hovi.planning.refinement.next_grid import interpolated_to
+from hovi.planning.refinement.next_grid import TARGET_SHARE, _demands, interpolated_to
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -64,3 +66,19 @@ def test_on_halved_intervals_it_is_the_curve_up_to_interpolation(
     allowed = {2: 1e-3, 4: 1e-9, 6: 1e-11}[modes]
     found = curve(finer.problem.on(halves), finer)
     np.testing.assert_allclose(found, expected, rtol=0, atol=allowed)
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-7, 1e-9])
+def test_intervals_that_meet_their_demands_meet_the_tolerance(
+    arm_scene: Scene, size: float
+) -> None:
+    """Each takes the same share of the target, so that larger contributions fall further."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid(STEPS, (galerkin(2),) * 4))
+    found = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
+    candidate = Candidate.of(found, Tolerance(size))
+    assert candidate.finer is not None
+    (demand,) = _demands(candidate, candidate.finer)
+    known = contributions(candidate.finer)
+    scale = max(1.0, candidate.error / known.sum())
+    assert demand.power == 2
+    np.testing.assert_allclose(demand.factor * known * scale, TARGET_SHARE * size / 4, rtol=1e-12)

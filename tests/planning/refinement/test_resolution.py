@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import hovi
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import Grid
+from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.resolution import NEARBY, RESOLVED
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -173,3 +175,17 @@ def test_every_success_has_an_error_estimate() -> None:
         assert found.success, found.message
         assert found.error_estimate is not None
         assert 0 < found.error_estimate <= RESOLVED
+
+
+def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> None:
+    ends, times = ([-np.pi / 2, 0.0], [np.pi / 2, 0.0], 2.0), 0
+    for N in (8, 9, 10, 11):
+        found = hovi.plan(arm_scene, *ends, scheme="hermite-simpson", intervals=N, **FAST)
+        if "a finer grid changes its cost by" not in found.message:
+            continue
+        finer = finer_than(dataclasses.replace(found, success=True))
+        assert finer is not None
+        told = 100 * abs(finer.known - finer.cost) / found.cost
+        assert f"a finer grid changes its cost by {told:.2g} %" in found.message
+        times += 1
+    assert times >= 2
