@@ -24,6 +24,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections import Counter, defaultdict
 from dataclasses import dataclass
@@ -357,7 +358,7 @@ def table(results: list[dict[str, object]]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--work", type=Path, default=Path("/tmp/hovi-mutants"))
+    parser.add_argument("--work", type=Path, default=Path(tempfile.gettempdir()) / "hovi-mutants")
     parser.add_argument("--map", action="store_true", help="record which test runs which line")
     parser.add_argument("--again", action="store_true", help="run the survivors again")
     parser.add_argument("--table", action="store_true", help="only print the results so far")
