@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 import pytest
 
 from hovi.discrete.grid import Grid
@@ -25,10 +26,12 @@ from hovi.discrete.guess import (
 )
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from hovi.schemes import by_name
+from hovi.schemes import by_name, galerkin
 from oracles.finite_differences import derivative
+from samples.manifold_robots import chain
 
 Array = npt.NDArray[np.float64]
 
@@ -259,3 +262,24 @@ def test_an_inconsistent_path_is_refused(two_link: Robot, curve: Curve) -> None:
     for other, sentence in bad:
         with np.errstate(invalid="ignore"), pytest.raises(InputError, match=sentence):
             check_path(other, UNEQUAL, two_link)
+
+
+@pytest.mark.parametrize("power", [1, 3, 6])
+@pytest.mark.parametrize("turns", [0.3, 3.2, -5.7])
+def test_all_turns_within_an_interval_count_whenever_they_happen(power: int, turns: float) -> None:
+    """A continuous joint turns by 2 pi turns s^power in one interval: z keeps the full angle."""
+    robot = load_robot(chain([pin.JointModelRUBY()]))
+    T, size = 2.0, 2 * np.pi * turns
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        s = t[:, None] / T
+        angle, v = size * s**power, size * power * s ** (power - 1) / T
+        a = size * power * (power - 1) * s ** max(power - 2, 0) / T**2
+        return np.concatenate([np.cos(angle), np.sin(angle)], axis=1), v, a
+
+    ends = [x for each in (0.0, T) for x in curve(np.array([each]))[:2]]
+    boundary = tuple(x[0] for x in ends)
+    path = path_on_grid(curve, Grid.uniform(T, 1, galerkin(4)), boundary, robot)
+    v0, v1 = (x[0] for x in ends[1::2])
+    assert T**2 * path.z[0, 0] + T * v0 == pytest.approx(size, rel=1e-12)
+    assert T * path.z[0, 1] == pytest.approx(v1 - v0, rel=1e-12)

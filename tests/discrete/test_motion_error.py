@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.discrete.motion_error import deviation, sample_points
+from hovi.discrete.motion_error import deviation, relative_difference, sample_points
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
@@ -71,3 +71,13 @@ def test_an_error_at_the_tip_is_the_largest_of_all_tips(
 def test_no_error_is_measured_at_a_frame_that_does_not_move(reference: Trajectory) -> None:
     with pytest.raises(InputError, match=r"'sonar_ring' .* is fixed to the world.*'left_gripper'"):
         deviation(reference, reference, (1.0, 1.0), "sonar_ring")
+
+
+@pytest.mark.parametrize(
+    ("value", "reference", "expected"),
+    [(3.0, 2.0, 0.5), (-1.0, 2.0, 1.5), (1.0, -2.0, 1.5), (2.0, 2.0, 0.0), (0.0, 0.0, 0.0)],
+)
+def test_relative_differences_are_relative_to_the_reference(
+    value: float, reference: float, expected: float
+) -> None:
+    assert relative_difference(value, reference) == expected

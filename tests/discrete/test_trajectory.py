@@ -112,6 +112,15 @@ def test_nodes_are_sampled_from_the_right_and_the_end_from_the_left(motion: Traj
     np.testing.assert_allclose(at_nodes.q[-1], motion.q[-1], atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("k", "s"), [(0, -1e-9), (0, 1.0 + 1e-9), (0, np.nan), (-1, 0.5), (1000, 0.5), (0.5, 0.5)]
+)
+def test_positions_outside_an_interval_are_refused(motion: Trajectory, k: float, s: float) -> None:
+    for values in (([k], [s]), ([k, 0], [s, 0.5])):
+        with pytest.raises(InputError, match=r"numbers of intervals, 0 to 4, and s positions|s "):
+            motion.sample_intervals(*values)
+
+
 def test_configurations_match_sample(motion: Trajectory) -> None:
     t = np.linspace(0.0, 2.0, 33)
     np.testing.assert_array_equal(motion.configurations(t), motion.sample(t).q)
@@ -520,3 +529,34 @@ def test_the_full_duration_can_be_sampled_on_nonuniform_grids(scene: Scene) -> N
     np.testing.assert_allclose(uneven.sample(1.5).q[0], [0.3, 0.1], atol=1e-12)
     with pytest.raises(InputError, match="the motion lasts from 0 to"):
         uneven.sample(1.5 + 1e-12)
+
+
+def test_a_file_is_the_same_on_every_system(saved: Path) -> None:
+    """Members are readable by all, as on Unix, with a fixed date."""
+    with zipfile.ZipFile(saved) as archive:
+        for member in archive.infolist():
+            assert member.external_attr == 0o644 << 16
+            assert member.create_system == 3
+            assert member.date_time == (1980, 1, 1, 0, 0, 0)
+            assert member.compress_type == zipfile.ZIP_STORED
+
+
+def test_arrays_in_any_order_of_memory_are_the_same_path(motion: Trajectory, scene: Scene) -> None:
+    path, ld = motion.path, DiscreteLagrangian(scene.effort_lagrangian(), motion.grid)
+    other = DiscretePath(*(np.asfortranarray(array) for array in path.arrays))
+    strided = DiscretePath(*(np.repeat(array, 2, axis=0)[::2] for array in path.arrays))
+    for each in (other, strided):
+        assert all(array.flags.c_contiguous for array in each.arrays)
+        np.testing.assert_array_equal(ld.values(each), ld.values(path))
+
+
+@pytest.mark.parametrize("shape", [(3, 2, 1), (1, 5, 1), (3, 2, 4)])
+def test_stored_torques_need_two_points_and_any_number_of_joints(shape: tuple[int, ...]) -> None:
+    values = np.random.default_rng(1).normal(size=shape)
+    torque = StoredTorque(values)
+    np.testing.assert_array_equal(torque(np.zeros(2, dtype=int), np.array([0.0, 1.0])),
+                                  values[0, [0, -1]])  # fmt: skip
+    with pytest.raises(InputError, match="2 or more points"):
+        StoredTorque(values[:, :1])
+    with pytest.raises(InputError, match="2 or more points"):
+        StoredTorque(values[0])

@@ -475,3 +475,41 @@ def test_limits_hold_for_any_cost(two_link: Robot, limits: dict[str, Any]) -> No
         assert np.abs(motion.v).max() <= 2.2 * (1 + 1e-5)
     else:
         assert np.abs(motion.tau[:, 0]).max() <= 14.0 * (1 + 1e-5)
+
+
+def test_a_reference_cost_is_the_weighted_square_of_the_distance(two_link: Robot) -> None:
+    """Zero along the reference itself."""
+    t = np.array([0.0, 0.4, 1.1])
+    reference = np.stack([0.2 * np.ones(3), 0.3 * np.sin(3 * t)], axis=1)
+    cost = ReferenceCost({"shoulder": 0.2, "elbow": "0.3*sin(3*t)"}, 5.0)
+    L, still = Scene(two_link, [cost]).effort_lagrangian(), Scene(two_link).effort_lagrangian()
+    v = a = np.zeros((3, 2))
+    np.testing.assert_allclose(L.value(reference, v, a, t=t), 0.0, atol=1e-14)
+    off = np.array([[0.1, -0.2], [0.0, 0.3], [1.0, 0.0]])
+    value = L.value(reference + off, v, a, t=t) - still.value(reference + off, v, a, t=t)
+    np.testing.assert_allclose(value, 2.5 * np.sum(off**2, axis=1), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (0.5, "0.5 N m s/rad (N s/m) at every joint"),
+        ((0.5, 0.25), "0.5, 0.25 N m s/rad (N s/m)"),
+        ({"elbow": 0.25}, "elbow 0.25 N m s/rad (N s/m)"),
+    ],
+)
+def test_coefficients_are_described_as_they_are_given(given: Any, words: str) -> None:
+    assert ViscousFriction(given).describe() == f"viscous_friction: {words}"
+
+
+@pytest.mark.parametrize(
+    ("effect", "words"),
+    [
+        (Custom(torque_of={"elbow": "0.1*q"}), "tau of elbow += 0.1*q"),
+        (Custom(cost="v^2"), "cost += v^2"),
+        (Custom(torque_of={"elbow": "0.1*q"}, cost=2.0), "tau of elbow += 0.1*q; cost += 2.0"),
+        (Custom(), "nothing"),
+    ],
+)
+def test_a_custom_effect_is_described_by_its_formulas(effect: Custom, words: str) -> None:
+    assert effect.describe() == f"custom: {words}"

@@ -124,3 +124,26 @@ def test_l_d_is_invariant_under_rigid_motions_of_the_world(base: str) -> None:
     np.testing.assert_allclose(
         ld.expand(elsewhere).gradient, ld.expand(path).gradient, rtol=0, atol=1e-9
     )
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_intervals_of_other_schemes_do_not_matter(base: str) -> None:
+    """Values, derivatives and gradients of an interval are those of the interval alone."""
+    robot = load_robot(with_arm(base))
+    names = ("galerkin-2", "taylor-midpoint", "galerkin-0", "galerkin-2", "galerkin-1")
+    grid = Grid(np.array([0.4, 0.25, 0.3, 0.2, 0.35]), tuple(by_name(name) for name in names))
+    L = Scene(robot, [Gravity()]).effort_lagrangian()
+    path, ld = random_path(robot, grid), DiscreteLagrangian(L, grid)
+    values, derivatives, gradient = ld.values(path), ld.derivatives(path), ld.gradient(path)
+    for k, scheme in enumerate(grid.schemes):
+        r = scheme.inner_modes
+        alone = DiscreteLagrangian(L, Grid(grid.steps[k : k + 1], (scheme,)))
+        part = DiscretePath(
+            path.q[k : k + 2], path.v[k : k + 2], path.z[k : k + 1], path.inner[k : k + 1, :r]
+        )
+        np.testing.assert_allclose(values[k], alone.values(part)[0], rtol=1e-12)
+        scale = np.abs(derivatives[k]).max()
+        np.testing.assert_allclose(derivatives[k], alone.derivatives(part)[0], atol=1e-11 * scale)
+        own = alone.gradient(part)[0]
+        np.testing.assert_allclose(gradient[k, : 4 + r], own, atol=1e-11 * np.abs(own).max())
+        assert not gradient[k, 4 + r :].any()

@@ -78,3 +78,24 @@ def test_a_lost_system_does_not_take_others_with_it() -> None:
     assert np.isinf(residual[0])
     assert residual[1] > 0.1
     assert residual[2] < 1e-9
+
+
+def test_the_slowest_component_decides() -> None:
+    """The first component is linear and exact after one step, the second needs several."""
+
+    def system(u: Array) -> tuple[Array, Array]:
+        F = np.stack([u[:, 0] - 1.0, np.exp(u[:, 1]) - 2.0], axis=1)
+        J = np.zeros((len(u), 2, 2))
+        J[:, 0, 0], J[:, 1, 1] = 1.0, np.exp(u[:, 1])
+        return F, J
+
+    for swap in (False, True):
+        order = [1, 0] if swap else [0, 1]
+
+        def turned(u: Array, order: list[int] = order) -> tuple[Array, Array]:
+            F, J = system(u[:, order])
+            return F[:, order], J[:, order][:, :, order]
+
+        root, found = newton(turned, np.zeros((1, 2)))
+        assert found.all()
+        np.testing.assert_allclose(root[:, order], [[1.0, np.log(2.0)]], rtol=0, atol=1e-14)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.effects import Effect, Gravity, JointLimitPotential
+from hovi.effects import Effect, Gravity, JointLimitPotential, PowerCost, ViscousFriction
 from hovi.errors import ModelError, SceneError
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -203,3 +203,14 @@ def test_the_description_says_which_derivatives_are_used(two_link: Robot) -> Non
     assert "analytic (C++)" in Scene(load_robot("kinova")).describe()
     text = Scene(load_robot(chain([pin.JointModelRX(), pin.JointModelSpherical()]))).describe()
     assert "CasADi's, since there are no analytic second derivatives for 'j1'" in text
+
+
+def test_the_graph_of_a_scene_has_its_torques_and_its_cost(two_link: Robot) -> None:
+    effects = [Gravity(9.8), ViscousFriction([0.4, 0.3]), PowerCost(0.5)]
+    scene = Scene(two_link, effects)
+    q, v, a = np.random.default_rng(5).normal(size=(3, 4, 2))
+    found = [scene.graph()(*point, 0.0) for point in zip(q, v, a, strict=True)]
+    tau = np.array([np.asarray(each[0]).ravel() for each in found])
+    np.testing.assert_allclose(tau, scene.inverse_dynamics(q, v, a), rtol=1e-11)
+    cost = [float(each[1]) for each in found]
+    np.testing.assert_allclose(cost, scene.effort_lagrangian().value(q, v, a), rtol=1e-11)

@@ -11,7 +11,11 @@ import pytest
 
 import hovi
 from hovi.errors import InputError
-from hovi.planning.problem.conserved_momentum import falls_freely, free_fall_contradiction
+from hovi.planning.problem.conserved_momentum import (
+    falls_freely,
+    free_fall_contradiction,
+    without_redundancy,
+)
 
 
 @cache
@@ -151,3 +155,31 @@ def test_a_base_with_thrusters_may_go_anywhere() -> None:
     assert solution.success, solution.message
     J = momentum_map(solution)
     assert np.max(np.ptp(J, axis=0)) < 1e-10 * np.max(np.abs(J))
+
+
+@pytest.mark.parametrize(
+    ("arm_rates_free", "turn_free", "moving", "freed"),
+    [
+        (False, False, False, "velocity"),
+        (False, False, True, "velocity"),
+        (True, False, False, ""),
+        (False, True, False, "velocity"),
+        (False, True, True, ""),
+    ],
+)
+def test_only_what_follows_from_the_momenta_is_freed(
+    arm_rates_free: bool, turn_free: bool, moving: bool, freed: str
+) -> None:
+    """The base's velocity, if all joint rates and the inertia about every axis are known."""
+    scene = spacecraft().scene
+    free = np.zeros((2, 2, 9), dtype=bool)
+    free[1, 1, 6:] = arm_rates_free
+    free[1, 0, 3:6] = turn_free
+    v = 0.1 * moving * np.ones(9)
+    found = without_redundancy(scene, v, free)
+    expected = free.copy()
+    expected[1, 0, :3] |= not turn_free
+    expected[1, 1, :6] |= freed == "velocity"
+    np.testing.assert_array_equal(found, expected)
+    free[0, 0, 0] = True  # a free start
+    np.testing.assert_array_equal(without_redundancy(scene, v, free), free)

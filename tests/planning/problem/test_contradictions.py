@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+import pytest
+
 import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
 
 
 def planned(scene: Scene, start: list[float], goal: list[float], T: float, **limits: Any) -> Any:
@@ -23,6 +32,40 @@ def test_a_goal_outside_is_named(arm_scene: Scene) -> None:
     solution = planned(arm_scene, [0, 0], [0, 2], 5.0, q={"elbow": [-1, 1]})
     assert solution.status == "infeasible"
     assert "position of joint 'elbow' at the goal is 2 rad" in solution.message
+
+
+@pytest.mark.parametrize("joint", ["shoulder", "elbow"])
+@pytest.mark.parametrize("end", ["start", "goal"])
+@pytest.mark.parametrize("kind", ["q", "v"])
+@pytest.mark.parametrize("value", [-2.5, 2.5, -0.8, 0.8])
+def test_an_end_outside_on_either_side_is_infeasible_and_one_inside_is_not(
+    arm_scene: Scene, joint: str, end: str, kind: str, value: float
+) -> None:
+    """The range is not symmetric: from -1 to 2."""
+    i = ["shoulder", "elbow"].index(joint)
+    states = {"start": np.zeros((2, 2)), "goal": np.zeros((2, 2))}
+    states[end][int(kind == "v"), i] = value
+    limits = as_limits(arm_scene.robot, {"base": "none", kind: {joint: [-1.0, 2.0]}})
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(9.0, 2, galerkin(1)))
+    ends = (hovi.State(*states[each]) for each in ("start", "goal"))
+    sentence = contradiction(TrajectoryProblem(ld, *ends, limits), limits)
+    assert bool(sentence) == (abs(value) > 1)
+    if sentence:
+        unit = "rad" if kind == "q" else "rad/s"
+        assert f"of joint {joint!r} at the {end} is {value} {unit}, outside its" in sentence
+        assert "[-1, 2]" in sentence
+
+
+@pytest.mark.parametrize(("goal", "joint", "takes"), [
+    ([1.0, 0.3], "shoulder", 2.0), ([0.3, 1.0], "elbow", 2.0), ([-1.0, 0.3], "shoulder", 1.0),
+])  # fmt: skip
+def test_the_slowest_joint_decides_in_the_direction_of_its_motion(
+    arm_scene: Scene, goal: list[float], joint: str, takes: float
+) -> None:
+    limits = {"shoulder": [-1.0, 0.5], "elbow": [-1.0, 0.5]}
+    short = planned(arm_scene, [0, 0], goal, 0.9 * takes, v=limits)
+    assert short.nit == 0
+    assert f"joint {joint!r} has to move by 1 rad, which takes {takes:g} s" in short.message
 
 
 def test_a_via_point_outside_is_named_with_its_time(arm_scene: Scene) -> None:

@@ -7,8 +7,11 @@ import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
 from hovi.errors import InputError
 from hovi.robot.robot import Robot
+from hovi.schemes import galerkin
 
 SCENES = (("ur5_reach", "tool0"), ("panda_reach", "panda_hand"))
 
@@ -249,3 +252,27 @@ def test_a_mistake_in_a_via_point_is_reported_with_its_line_and_a_hint(
     with pytest.raises(hovi.errors.SceneError) as refused:
         hovi.load_task(tmp_path / "scene.toml")
     assert f"line {len(head.splitlines()) + place}: {sentence}" in str(refused.value)
+
+
+def test_via_points_stay_at_their_times_on_other_grids(arm_scene: hovi.Scene) -> None:
+    grid = Grid.uniform(1.0, 4, galerkin(2))
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), grid)
+    vias = (hovi.Via(0.25, hovi.State([0.1, 0.2])), hovi.Via(0.75, hovi.State([0.3, 0.1])))
+    problem = hovi.TrajectoryProblem(ld, hovi.State([0, 0]), hovi.State([0.5, 0.5]), via=vias)
+    finer = grid.halved(np.array([True, False, True, True]))
+    for other in (finer, grid.enriched(2), finer.halved(np.ones(7, dtype=bool))):
+        times = [other.t[each.node] for each in problem.on(other).conditions]
+        assert times == pytest.approx([0.25, 0.75], abs=1e-14)
+
+
+@pytest.mark.parametrize("far", [0, 1])
+def test_one_unreachable_via_point_of_two_is_enough(far: int) -> None:
+    task = hovi.load_task(hovi.example("ur5_reach"))
+    near = hovi.State(np.asarray(task.start.q) + 0.1)
+    goals = [near, near]
+    goals[far] = hovi.FrameGoal("tool0", position=[5.0, 0.0, 0.0])
+    vias = [hovi.Via(t, goal) for t, goal in zip((0.5, 1.0), goals, strict=True)]
+    solution = hovi.plan(task.scene, task.start, task.goal, 2.0, via=vias, limits="none")
+    assert solution.status is hovi.Status.INFEASIBLE
+    assert solution.nit == 0
+    assert f"the via point at {0.5 if far == 0 else 1:g} s" in solution.message

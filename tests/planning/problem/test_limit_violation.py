@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,28 @@ def test_the_worst_is_named_with_joint_time_and_numbers(
     sentence = worst_sentence(motion, limits, two_link)
     for word in ("torque", "'elbow'", "N m", "at t =", "0.5"):
         assert word in sentence
+
+
+@pytest.mark.parametrize(("kind", "unit"), [("q", "rad"), ("v", "rad/s"), ("tau", "N m")])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_the_sentence_has_the_time_and_the_value_of_dense_sampling(
+    motion: Trajectory, two_link: Robot, kind: str, unit: str, sign: float
+) -> None:
+    """The bound is met by the elbow at most of the motion and exceeded once, on one side."""
+    t = np.linspace(0.0, motion.duration, 100_001)
+    values = sign * getattr(motion.sample(t), kind)[:, 1]
+    bound = float(values.max()) - 0.05 * float(np.ptp(values))
+    sides = [-6.0, 6.0] if kind == "q" else [-100.0, 100.0]
+    sides[int(sign > 0)] = sign * bound
+    limits = as_limits(two_link, {"base": "none", kind: {"elbow": sides}})
+    said = re.search(
+        rf"joint 'elbow' reaches (\S+) {unit} at t = (\S+) s, its limit is (\S+)$",
+        worst_sentence(motion, limits, two_link),
+    )
+    assert said is not None
+    assert float(said[1]) == pytest.approx(sign * values.max(), rel=1e-3)
+    assert float(said[2]) == pytest.approx(t[np.argmax(values)], abs=2e-3)
+    assert float(said[3]) == pytest.approx(sign * bound, rel=1e-3)
 
 
 def test_sliding_joints_are_measured_in_metres(panda: Robot) -> None:

@@ -125,3 +125,9 @@ def test_a_robot_in_which_nothing_moves_has_no_length_to_bound() -> None:
     still = load_robot("panda", locked=panda.joint_names)
     with pytest.raises(InputError, match="is fixed to the world, as no joint moves it"):
         Tolerance.of("0.1 mm", still)
+
+
+def test_a_tolerance_without_a_robot_is_at_the_tip() -> None:
+    words = Tolerance(1e-3, Quantity.FRAME).in_words(2e-3)
+    assert words == "2 mm at the tip"
+    assert Tolerance(1e-3, Quantity.FRAME, "tool0").in_words(2e-3) == "2 mm at tool0"

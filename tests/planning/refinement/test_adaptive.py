@@ -11,6 +11,7 @@ from hovi.discrete.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
+from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tolerance
@@ -283,3 +284,25 @@ def test_no_error_below_the_tolerance_of_limits_is_claimed(arm_scene: Scene) -> 
     assert (found.success, accuracy.reached) == (True, False)
     assert accuracy.error >= 1e-4
     assert "stopped early" in found.message
+
+
+def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scene: Scene) -> None:
+    """Under a limit, which takes many grids."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
+    limits = as_limits(arm_scene.robot, {"base": "none", "v": 6.0})
+    first = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits))
+    rounds: list[Round] = []
+
+    def on_round(done: Round) -> None:
+        rounds.append(done)
+        if len(rounds) == 3:
+            raise KeyboardInterrupt
+
+    ended = refine_to_tolerance(first, Tolerance(1e-12), on_round=on_round)
+    finished = rounds[:2]  # the last one was not compared any more
+    best = min(finished, key=lambda done: done.error)
+    assert best is finished[1]
+    assert ended.status is Status.INTERRUPTED
+    assert ended.cost == best.cost
+    assert accuracy_of(ended).error >= best.error
+    assert accuracy_of(ended).error < 0.5 * finished[0].error

@@ -17,6 +17,7 @@ from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
 from hovi.flows.dynamics_replay import replay_dynamics
 from hovi.planning.refinement.certificate import certify, momentum_jump
+from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -317,3 +318,34 @@ def test_a_certificate_without_time_has_what_needs_none(fine: Solution) -> None:
     assert set(found.missing) == {"bound", "errors", "hamiltonian", "residual", "replay"}
     assert set(found.missing.values()) == {"the time limit was reached"}
     assert found.integral == pytest.approx(certify(fine).integral)
+
+
+def test_an_estimate_for_one_tip_certifies_no_other(two_arms: Robot) -> None:
+    """The estimate of a tolerance is taken over exactly where it is of the frame asked for."""
+    start, step = two_arms.neutral(), np.array([0.01, 0.02, 0.6, 0.8])
+    ends = State(start), State(start + step)
+    options = {"limits": "none", "tolerance": "0.1 mm at left_gripper"}
+    solution = plan(Scene(two_arms, [Gravity()]), *ends, 1.0, **options)  # type: ignore[arg-type]
+    assert solution.accuracy is not None
+    known = solution.accuracy.estimate
+    assert known is not None
+    for frame in (None, "left_gripper"):
+        assert certify(solution, frame, estimate=False).errors is known
+    other = certify(solution, "right_gripper").errors
+    measured = estimate_error(solution, "right_gripper")
+    assert other is not None
+    assert measured is not None
+    assert other.frame == "right_gripper"
+    assert other.largest_tip == pytest.approx(measured.largest_tip, rel=1e-12)
+    assert other.largest_tip > 2 * known.largest_tip
+    unknown = certify(solution, "right_gripper", estimate=False)
+    assert unknown.errors is None
+    assert "takes another solve" in unknown.missing["errors"]
+
+
+def test_without_a_tolerance_errors_are_estimated_when_asked_for(fine: Solution) -> None:
+    estimated, skipped = certify(fine), certify(fine, estimate=False)
+    assert estimated.errors is not None
+    assert "errors" not in estimated.missing
+    assert skipped.errors is None
+    assert "plan with a tolerance" in skipped.missing["errors"]

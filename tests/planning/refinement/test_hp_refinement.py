@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.planning.refinement.hp_refinement import DECAY_RANGE, Demand, decay, refined
+from hovi.planning.refinement.hp_refinement import (
+    DECAY_RANGE,
+    Demand,
+    _decay_of_pieces,
+    decay,
+    refined,
+)
 from hovi.schemes import galerkin
 from hovi.schemes.polynomials import interval_rows
 
@@ -32,6 +38,35 @@ def test_the_decay_is_that_of_the_ellipse_of_analyticity() -> None:
     grid = Grid.uniform(1.0, 1, galerkin(14))
     y = 0.3 / 0.5
     assert decay(grid, projected(grid, 0.3))[0] == pytest.approx(np.sqrt(1 + y * y) - y, rel=0.05)
+
+
+@pytest.mark.parametrize("distance", [0.3, 0.5, 1.0])
+def test_with_two_modes_the_decay_is_between_the_lowest_degrees(distance: float) -> None:
+    """From degrees 0 and 1 to degrees 2 and 3, by the Legendre coefficients of a itself."""
+    grid = Grid.uniform(1.0, 1, galerkin(2))
+    x, w = np.polynomial.legendre.leggauss(60)
+    a = 1 / (1 + ((x / 2 + 0.1) / distance) ** 2)
+    c = [np.sqrt(2 * d + 1) * (w / 2 * a) @ np.polynomial.legendre.Legendre.basis(d)(x)
+         for d in range(4)]  # fmt: skip
+    expected = np.sqrt(np.hypot(c[2], c[3]) / np.hypot(c[0], c[1]))
+    s = (x + 1) / 2
+    z = np.array([w / 2 @ (a * (1 - s)), w / 2 @ a])
+    inner = np.einsum("q,qj,q->j", a, interval_rows(s, 2)[:, 2, 3:], w / 2)
+    ends = np.zeros((2, 1))
+    found = decay(grid, DiscretePath(ends, ends, z[None, :, None], inner[None, :, None]))
+    assert found[0] == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("distance", [0.05, 0.2, 0.5])
+def test_the_predicted_decay_of_pieces_is_that_of_the_ellipse_of_each(distance: float) -> None:
+    """The poles are as far from the piece in the middle, in half lengths, times their number."""
+    grid = Grid.uniform(1.0, 1, galerkin(16))
+    rho = decay(grid, projected(grid, distance))
+    predicted = _decay_of_pieces(rho)[0]
+    assert predicted[0] == pytest.approx(rho[0], rel=1e-12)
+    assert (np.diff(predicted) < 0).all()
+    thirds = Grid.uniform(1.0, 3, galerkin(8))
+    assert predicted[2] == pytest.approx(decay(thirds, projected(thirds, distance))[1], rel=0.1)
 
 
 def test_intervals_away_from_a_singularity_decay_faster() -> None:

@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.limit_sensitivity import SHIFT, cost_of_tolerance
 from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
 
 HANG, GOAL = [-np.pi / 2, 0.0], [0.3, 0.7]
 
@@ -51,3 +58,12 @@ def test_a_tolerance_below_the_cost_of_that_of_limits_is_not_reached(arm_scene: 
     assert not found.accuracy.reached
     assert found.accuracy.error >= cost_of_tolerance(found) > 1e-6
     assert "the tolerance of limits allows no smaller error" in found.message
+
+
+def test_a_motion_that_costs_nothing_has_no_error_under_limits(two_link: Robot) -> None:
+    """At rest without gravity."""
+    ld = DiscreteLagrangian(Scene(two_link).effort_lagrangian(), Grid.uniform(1.0, 4, galerkin(2)))
+    limits = as_limits(two_link, {"base": "none", "v": 1.0, "tau": 1.0})
+    still = solve_on_grid(TrajectoryProblem(ld, State([0.3, 0.1]), State([0.3, 0.1]), limits))
+    assert still.success
+    assert cost_of_tolerance(dataclasses.replace(still, cost=0.0)) == 0.0

@@ -13,6 +13,7 @@ import hovi
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.resolution import NEARBY, RESOLVED, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -213,3 +214,17 @@ def test_a_motion_of_half_an_hour_on_few_intervals_is_no_minimum(name: str, sche
     found = hovi.plan_task(dataclasses.replace(task, duration=2000.0), **options, starts=1)
     assert not found.success
     assert found.status in (Status.UNRESOLVED, Status.DIVERGED)
+
+
+def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> None:
+    ends, times = ([-np.pi / 2, 0.0], [np.pi / 2, 0.0], 2.0), 0
+    for N in (8, 9, 10, 11):
+        found = hovi.plan(arm_scene, *ends, scheme="hermite-simpson", intervals=N, **FAST)
+        if "a finer grid changes its cost by" not in found.message:
+            continue
+        finer = finer_than(dataclasses.replace(found, success=True))
+        assert finer is not None
+        told = 100 * abs(finer.known - finer.cost) / found.cost
+        assert f"a finer grid changes its cost by {told:.2g} %" in found.message
+        times += 1
+    assert times >= 2

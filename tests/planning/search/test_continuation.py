@@ -21,6 +21,7 @@ from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from hovi.system.deadline import Deadline
+from hovi.system.interruption import interrupted, interruptible
 from samples.paper_arm import HANG, REACH_Q
 from samples.uneven_chain import uneven_chain
 
@@ -134,6 +135,18 @@ def test_an_interrupt_ends_the_continuation_with_the_best_so_far(
     assert found.cost == failed.cost
     assert "was ended by interrupted" in found.message
     assert calls <= 31
+
+
+def test_an_interrupt_between_two_stages_ends_the_whole_call(job: Job, failed: Solution) -> None:
+    def interrupt(text: str, share: float) -> None:
+        raise KeyboardInterrupt
+
+    @interruptible
+    def call() -> bool:
+        solve_by_continuation(job, failed, progress=interrupt)
+        return interrupted()
+
+    assert call()
 
 
 def test_a_continuation_that_fails_names_what_was_tried(job: Job) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -69,6 +70,34 @@ def test_the_duration_found_is_where_a_sweep_has_its_minimum() -> None:
         ).cost
         + WEIGHT * T
     )
+
+
+def told(message: str, words: str) -> float:
+    """The number before these words of a message."""
+    found = re.search(rf"([0-9.e+-]+){words}", message)
+    assert found is not None, message
+    return float(found[1])
+
+
+@pytest.mark.parametrize("limit", [None, 3])
+def test_the_told_costs_are_those_of_the_motion_and_of_its_time(limit: int | None) -> None:
+    """For a minimum, and for the best motion where the search ends before one is found."""
+    options = {} if limit is None else {"max_iterations": limit, "continuation": False}
+    found = reach((0.5, 4.0), time_weight=WEIGHT, **options)
+    T = found.trajectory.duration
+    assert found.success == (limit is None)
+    assert abs(T - 1.0) > 0.05
+    effort = found.problem.ld.action(found.trajectory.path)
+    assert found.cost == pytest.approx(effort + WEIGHT * T, rel=1e-12)
+    if found.success:
+        assert told(found.message, " of it for time") == pytest.approx(WEIGHT * T, rel=1e-5)
+        assert told(found.message, ", [0-9.]+ of it") == pytest.approx(found.cost, rel=1e-9)
+        assert found.minima == (found.cost,)
+    else:
+        words = re.search(r"Time adds ([0-9.]+) to the cost", found.message)
+        assert words is not None, found.message
+        assert float(words[1].rstrip(".")) == pytest.approx(WEIGHT * T, rel=1e-5)
+        assert found.minima == ()
 
 
 def test_a_large_weight_ends_at_the_bound() -> None:

@@ -104,3 +104,9 @@ def test_a_job_is_pickled_without_its_guess(arm_scene: Scene) -> None:
     job = Job(arm_scene, motion.grid, hovi.State(HANG), hovi.State(REACH_Q), options)
     again = pickle.loads(pickle.dumps(job))
     assert (again.options.guess, again.options.starts) == ("cubic", 7)
+
+
+@pytest.mark.parametrize("via", [5, 0.5, [None], {"a": 1}, [hovi.State([0.0])]])
+def test_via_points_are_a_list_of_them(via: Any) -> None:
+    with pytest.raises(InputError, match="via"):
+        PlanOptions(via=via)

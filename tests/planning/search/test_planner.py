@@ -25,7 +25,7 @@ from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from hovi.schemes import by_name, galerkin
+from hovi.schemes import by_name, galerkin, is_galerkin
 from samples.manifold_robots import half_turning
 from samples.paper_arm import HANG, REACH_COST, REACH_Q, REACH_V
 
@@ -165,6 +165,24 @@ def test_a_plan_under_limits_can_be_replanned(arm_scene: Scene) -> None:
     again = planned.replan(goal=State(REACH_Q + 0.001, REACH_V))
     assert again.status is Status.MINIMUM
     np.testing.assert_array_equal(again.trajectory.q[-1], REACH_Q + 0.001)
+
+
+def test_a_refinement_begins_with_the_grid_of_a_guess_only_if_that_is_usual(
+    arm_scene: Scene,
+) -> None:
+    """Galerkin tables on more intervals than the first grid would have."""
+    for scheme, intervals, kept in (
+        ("galerkin-3", 70, True),
+        ("galerkin-3", 4, False),
+        ("taylor-midpoint", 70, False),
+    ):
+        first = plan(arm_scene, HANG, GOAL, 1.0, scheme=scheme, intervals=intervals, limits="none")
+        options = {"guess": first.trajectory, "tolerance": 1e-5, "limits": "none"}
+        found = plan(arm_scene, HANG, GOAL, 1.0, **options)  # type: ignore[arg-type]
+        assert found.accuracy is not None
+        assert found.accuracy.reached
+        assert (found.accuracy.rounds[0].intervals == intervals) == kept
+        assert all(is_galerkin(each) for each in found.trajectory.grid.schemes)
 
 
 # Many starts

@@ -287,3 +287,18 @@ def test_the_exact_model_has_the_same_inertia_in_any_algebra(arm_scene: Scene, g
         objective(arm_scene, grid, path, algebra).negative_eigenvalues(path) for algebra in ALGEBRAS
     }
     assert len(counts) == 1
+
+
+@pytest.mark.parametrize("algebra", ALGEBRAS)
+def test_the_size_of_a_step_is_its_largest_change_in_either_direction(
+    arm_scene: Scene, algebra: LinearAlgebra
+) -> None:
+    path = random_path(GRIDS["other steps"], 2, seed=4)
+    action = objective(arm_scene, GRIDS["other steps"], path, algebra)
+    model = action.model(path, None, None)
+    for seed in range(6):
+        step = model.random_vector(seed)
+        size = action.relative_size(path, step, model)
+        assert size > 0
+        assert action.relative_size(path, -step, model) == size
+        assert action.relative_size(path, -3 * step, model) == pytest.approx(3 * size, rel=1e-12)

@@ -30,7 +30,7 @@ from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from hovi.schemes import by_name
+from hovi.schemes import by_name, galerkin
 from hovi.system.deadline import Deadline, OutOfTimeError
 from oracles.finite_differences import derivative
 from oracles.ipopt_oracle import least_action
@@ -676,3 +676,28 @@ def test_an_arm_replans_to_a_goal_nearby_in_at_most_four_steps() -> None:
         motion = motion.replan(goal=goal)
         assert motion.status is Status.MINIMUM
         assert motion.nit <= 4
+
+
+def test_a_replan_starts_from_the_motion_that_is_given(arm_scene: Scene) -> None:
+    """Of two minima, with the elbow on either side, each leads to one of its own kind."""
+    task = State([0.9, 1.2]), State([-0.9, 1.2])
+    grid = Grid.uniform(2.0, 16, galerkin(2))
+    scene = Scene(arm_scene.robot, [Gravity(9.8)])
+    problem = TrajectoryProblem(DiscreteLagrangian(scene.effort_lagrangian(), grid), *task)
+    t = np.linspace(0.0, 1.0, 17)[:, None]
+    found = []
+    for bump in (0.0, 2.5):
+        path = guess_path(problem, "cubic")
+        q = path.q + bump * np.array([1.0, -1.0]) * np.sin(np.pi * t) ** 2
+        v = path.v + bump * np.array([1.0, -1.0]) * np.pi / 2 * np.sin(2 * np.pi * t)
+        bent = DiscretePath(q, v, regularized(scene.robot, grid, q, v), path.inner)
+        found.append(solve_on_grid(problem, bent))
+    one, other = found
+    assert one.success
+    assert other.success
+    assert abs(one.cost - other.cost) > 1e-2 * one.cost
+    for origin, guess in ((one, other), (other, one)):
+        again = origin.replan(goal=State([-0.89, 1.2]), guess=guess)
+        assert abs(again.cost - guess.cost) < 0.1 * abs(one.cost - other.cost)
+        unchanged = origin.replan(goal=State([-0.89, 1.2]))
+        assert abs(unchanged.cost - origin.cost) < 0.1 * abs(one.cost - other.cost)

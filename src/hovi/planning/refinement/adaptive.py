@@ -13,8 +13,8 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Accuracy, Quantity, Round, Tolerance
-from hovi.planning.refinement.candidate import Candidate, least_error
+from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
+from hovi.planning.refinement.candidate import Candidate
 from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
@@ -185,7 +185,7 @@ class _Search:
         if self.deadline.passed:
             return "the time limit was reached"
         assert solution.problem is not None
-        if self._at_floor(candidate):
+        if candidate.is_at_floor:
             bound = "the tolerance of limits" if solution.problem.limited else "rounding"
             return f"{bound} allows no smaller error"
         whirling, nearly = candidate.whirl, candidate.difference <= MAX_ERROR_OF_DECAY
@@ -199,11 +199,6 @@ class _Search:
         if self.rounds[-1].points > MAX_POINTS:
             return f"a grid has {self.rounds[-1].points:,} points"
         return ""
-
-    def _at_floor(self, candidate: Candidate) -> bool:
-        """Whether most of the cost's error is one that no grid reduces."""
-        cost = self.tolerance.quantity is Quantity.COST and candidate.is_carried
-        return cost and bool(candidate.error <= 2 * least_error(candidate.solution))
 
     def _next(self, candidate: Candidate) -> Candidate:
         """The solution on the next grid, which may be that of the finer solution."""
@@ -234,7 +229,9 @@ class _Search:
         if chosen.contradicted > 0:
             finer = None
             reason = f"{reason}, and on a finer grid the solver reached another minimum"
-        reached = bool(chosen.error <= self.tolerance.size) and chosen.is_carried
+        reached = (
+            bool(chosen.error <= self.tolerance.size) and chosen.is_carried and chosen.is_trusted
+        )
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,

@@ -98,6 +98,18 @@ class Candidate:
         return self.along <= self._largest_along and self.passive_share <= NEGLIGIBLE_SHARE
 
     @property
+    def is_trusted(self) -> bool:
+        """Whether the error of the cost is not small by cancellation of contributions only."""
+        return bool(self.uncancelled <= CANCELLATION_LIMIT * self.tolerance.size)
+
+    @property
+    def is_at_floor(self) -> bool:
+        """Whether most of the cost's error is one that no grid reduces."""
+        known = max(self.error, self.uncancelled / CANCELLATION_LIMIT)
+        cost = self.tolerance.quantity is Quantity.COST and self.is_carried
+        return cost and bool(known <= 2 * least_error(self.solution))
+
+    @property
     def passive_share(self) -> float:
         """Largest relative torque of a passive joint along the motion."""
         return 0.0 if self.passive is None else self.passive.share

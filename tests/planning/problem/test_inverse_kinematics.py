@@ -1,0 +1,48 @@
+"""Configurations that meet a goal, from seeds all over the ranges of the joints."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import hovi
+from hovi.planning.problem.inverse_kinematics import _seeds, inverse_kinematics
+from hovi.robot.robot import Robot
+
+
+@pytest.mark.parametrize("limited", [False, True])
+def test_seeds_begin_nearby_and_cover_the_ranges(ur5: Robot, limited: bool) -> None:
+    """Every other one is anywhere within the limits, and within a turn without them."""
+    near = 0.3 * np.ones(6)
+    lower = np.array([-1.0, -2.0, 0.5, -3.0, -0.1, -9.0]) if limited else np.full(6, -np.inf)
+    upper = np.array([2.0, -0.5, 2.5, 3.0, 0.1, 9.0]) if limited else np.full(6, np.inf)
+    seeds = list(_seeds(ur5, near, lower, upper))
+    np.testing.assert_array_equal(seeds[0], near)
+    anywhere = np.array(seeds[2::2])
+    low, high = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    assert (anywhere >= low).all()
+    assert (anywhere <= high).all()
+    share = (anywhere - low) / (high - low)
+    assert (share.min(axis=0) < 0.25).all()
+    assert (share.max(axis=0) > 0.75).all()
+    nearby = np.abs(np.array(seeds[1::2]) - near)
+    assert nearby.max() <= 1.0
+    assert (nearby[0] <= 0.2).all()
+
+
+@pytest.mark.parametrize("signs", [*itertools.product([-1, 1], repeat=2)])
+def test_a_goal_is_met_within_limits_on_every_side(ur5: Robot, signs: tuple[int, int]) -> None:
+    """The limits leave one branch of the elbow and one half of the first joint's turn."""
+    q = np.array([1.2 * signs[0], -1.0, 1.1 * signs[1], 0.4, 0.6, 0.2])
+    pose = ur5.frame_position("tool0", q[None])[0]
+    lower, upper = np.full(6, -3.0), np.full(6, 3.0)
+    lower[0], upper[0] = sorted((0.2 * signs[0], 3.0 * signs[0]))
+    lower[2], upper[2] = sorted((0.2 * signs[1], 3.0 * signs[1]))
+    goal = hovi.FrameGoal("tool0", position=pose)
+    found = inverse_kinematics(ur5, goal, np.zeros(6), lower, upper)
+    assert found.reason == ""
+    assert (found.q >= lower).all()
+    assert (found.q <= upper).all()
+    np.testing.assert_allclose(ur5.frame_position("tool0", found.q[None])[0], pose, atol=1e-7)

@@ -1,0 +1,36 @@
+"""A motion that exceeds a limit between its points is no minimum within the limits."""
+
+from __future__ import annotations
+
+import pytest
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.planning.problem.limit_violation import excess_along
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods import limits_between_points
+from hovi.planning.solver.solver import solve_on_grid
+from hovi.planning.solver.status import Status
+from hovi.scene.scene import Scene
+from hovi.schemes import galerkin
+from samples.paper_arm import HANG, REACH_Q, REACH_V
+
+
+@pytest.mark.parametrize("rounds", [0, 40])
+def test_limits_that_hold_at_the_points_only_are_not_met(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch, rounds: int
+) -> None:
+    """Without a round that tightens bounds, the solve ends with the motion and says so."""
+    monkeypatch.setattr(limits_between_points, "MAX_ROUNDS", rounds)
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(1)))
+    limits = as_limits(arm_scene.robot, {"base": "none", "a": 30.0})
+    problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits)
+    found = solve_on_grid(problem)
+    excess = excess_along(found.trajectory, limits).worst
+    assert found.success == (excess <= limits.tolerance) == (rounds > 0)
+    if rounds == 0:
+        assert excess > 1e-3
+        assert found.status is Status.INFEASIBLE
+        assert "between the quadrature points, at which limits are imposed" in found.message
