@@ -102,19 +102,36 @@ def test_the_highest_of_several_extremes_along_a_bound_is_found(
     """v = 0.9 + 0.1 T_9 + tilt: extremes of nearly one height, the highest between samples."""
     T9 = np.polynomial.Chebyshev.basis(9, domain=[0, 1])
     v = 0.9 + 0.1 * T9 + tilt * np.polynomial.Chebyshev.basis(1, domain=[0, 1])
+    _require_the_highest(v, arm_scene, two_link)
+
+
+def test_an_extreme_next_to_no_extreme_of_the_samples_is_found(
+    arm_scene: Scene, two_link: Robot
+) -> None:
+    """Of samples every 1/32 those at 15/16, 31/32 and 1 ascend, and the peak is before 31/32."""
+    x = np.polynomial.Polynomial([0.0, 1.0])
+    v = 1.0 + 5e-6 - 100.0 * (x - 0.955) ** 2 * ((x - 1.0) ** 2 + 4e-5)
+    samples = v(np.array([15, 30, 31, 32]) / [16, 32, 32, 32])
+    assert samples[1] < samples[2] < samples[3] < 1.0 < v(0.955)
+    _require_the_highest(v, arm_scene, two_link)
+
+
+def _require_the_highest(
+    v: np.polynomial.Chebyshev | np.polynomial.Polynomial, scene: Scene, robot: Robot
+) -> None:
+    """The excess of a motion with this velocity in one interval is that of dense sampling."""
     q, a = v.integ(), v.deriv()
 
     def curve(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         return tuple(np.stack([f(t), 0 * t], axis=1) for f in (q, v, a))  # type: ignore[return-value]
 
-    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 1, galerkin(9)))
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 1, galerkin(9)))
     problem = TrajectoryProblem(ld, State([q(0.0), 0.0]), State([q(1.0), 0.0]))
     ends = curve(np.array([0.0, 1.0]))
     boundary = ends[0][0], ends[1][0], ends[0][1], ends[1][1]
-    path = path_on_grid(curve, ld.grid, boundary, two_link)
-    motion = problem.trajectory(path)
+    motion = problem.trajectory(path_on_grid(curve, ld.grid, boundary, robot))
     s = np.linspace(0.0, 1.0, 100_001)
     np.testing.assert_allclose(motion.sample(s).v[:, 0], v(s), atol=1e-10)
-    limits = as_limits(two_link, {"base": "none", "v": [1.0, 1.0]})
+    limits = as_limits(robot, {"base": "none", "v": [1.0, 1.0]})
     excess = excess_along(motion, limits)
     assert 2 * excess.upper[0, 1, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)

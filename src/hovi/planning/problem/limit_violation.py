@@ -53,16 +53,17 @@ class Excess:
 def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     """The extremes of q, v, a and tau along the interpolant, compared with the limits.
 
-    Every interval is sampled, and again more densely around all extremes that are near a bound: a
-    motion along a bound has several, and the largest one is not always next to the largest sample.
+    Every interval is sampled, and again more densely around all extremes that are near a bound, and
+    wherever the curvature of the samples allows an excess between them: a motion along a bound has
+    several extremes, and the largest one is not always next to the largest sample.
     """
     raise_if_late()
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     s = np.linspace(0.0, 1.0, SAMPLES)
     outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
     outputs = outputs.reshape(N, SAMPLES, 4, nv)
-    lower, at_lower = _Side(trajectory, -1.0, limits.lower, limits.ranges).extremes(outputs)
-    upper, at_upper = _Side(trajectory, 1.0, limits.upper, limits.ranges).extremes(outputs)
+    lower, at_lower = _Side(trajectory, limits, -1.0, limits.lower).extremes(outputs)
+    upper, at_upper = _Side(trajectory, limits, 1.0, limits.upper).extremes(outputs)
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -70,13 +71,13 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 class _Side:
     """The lower or the upper bounds of a motion's outputs.
 
-    sign: -1 for lower bounds, 1 for upper ones. bound, ranges: shape (4, nv).
+    sign: -1 for lower bounds, 1 for upper ones. bound: shape (4, nv).
     """
 
     trajectory: Trajectory
+    limits: Limits
     sign: float
     bound: Array
-    ranges: Array
 
     def extremes(self, outputs: Array) -> tuple[Array, Array]:
         """The largest excess in each interval, and its relative position, (N, 4, nv) each.
@@ -84,11 +85,13 @@ class _Side:
         outputs: of all samples, shape (N, SAMPLES, 4, nv).
         """
         raise_if_late()
-        excess = self.sign * (outputs - self.bound) / self.ranges
+        excess = self.sign * (outputs - self.bound) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = index / (SAMPLES - 1)
-        k, sample, kind, joint = np.nonzero(_near_extremes(excess, largest))
+        k, sample, kind, joint = np.nonzero(
+            _near_extremes(excess, largest) | _may_exceed(excess, self.limits.tolerance)
+        )
         if len(k) == 0:
             return largest, s
         found, at = self._refined(k, sample / (SAMPLES - 1), kind, joint)
@@ -109,7 +112,7 @@ class _Side:
             outputs = _outputs(self.trajectory, np.repeat(k, SAMPLES), around.ravel())
             values = outputs.reshape(len(k), SAMPLES, 4, -1)[rows, :, kind, joint]
             excess = self.sign * (values - self.bound[kind, joint][:, None])
-            excess /= self.ranges[kind, joint][:, None]
+            excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
             at, width = around[rows, best], width / (SAMPLES - 1)
         return excess[rows, best], at
@@ -132,6 +135,17 @@ def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
         peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
     highest = (excess == largest[:, None]) & (excess > -REFINEMENT_SHARE)
     return np.asarray(peak & np.isfinite(excess) & (highest | (excess > -PEAK_SHARE)))
+
+
+def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
+    """Samples next to which a parabola through three of them may exceed a bound.
+
+    excess: of the samples, shape (N, SAMPLES, 4, nv). tolerance: of an excess.
+    """
+    with np.errstate(invalid="ignore"):
+        bend = np.abs(np.diff(excess, 2, axis=1))
+        bend = np.concatenate([bend[:, :1], bend, bend[:, -1:]], axis=1)
+        return np.asarray(excess + 0.5 * bend > tolerance) & np.isfinite(excess)
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
