@@ -212,7 +212,7 @@ def floating_jet(t: float, q: Array, v: Array, a: Array) -> Jet:
     )
 
 
-@pytest.mark.parametrize("name", ["two_link", "panda", "kinova"])
+@pytest.mark.parametrize("name", ["two_link", "panda", "kinova", "z1"])
 def test_a_moving_base_matches_a_driven_floating_robot(name: str, models: Path) -> None:
     place = models / "two_link.urdf" if name == "two_link" else name
     robot, floating = load_robot(place), load_robot(place, free_flyer=True)

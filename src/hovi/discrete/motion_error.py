@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -42,6 +43,11 @@ class MotionError:
     tip_at_nodes: Array = field(repr=False)
     frame: str
     sliding: npt.NDArray[np.bool_] = field(repr=False)
+
+    def scaled(self, factor: float) -> MotionError:
+        """All differences times a factor."""
+        names = "cost", "q", "v", "tau", "tip", "q_at_nodes", "tip_at_nodes"
+        return dataclasses.replace(self, **{name: factor * getattr(self, name) for name in names})
 
     @property
     def angle(self) -> float:

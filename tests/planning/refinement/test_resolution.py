@@ -147,6 +147,26 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
 
 
+def test_no_estimate_is_kept_from_a_motion_at_rest(two_link: Robot) -> None:
+    """All motions near rest are small, and most of them are not resolved by this grid."""
+    scene = Scene(two_link, [hovi.effects.JointSprings(1e3)])
+    grid, rest = Grid.uniform(2.0, 4, by_name("galerkin-2x8")), hovi.State([0.0, 0.0])
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    still = hovi.solve(hovi.TrajectoryProblem(ld, rest, rest))
+    assert still.success
+    moved = still.replan(goal=[1e-4, -1e-4])
+    assert moved.problem is not None
+    alone = hovi.solve(moved.problem)
+    assert (moved.status, alone.status) == (Status.UNRESOLVED, Status.UNRESOLVED)
+
+
+def test_passive_joints_at_rest_carry_nothing(two_link: Robot) -> None:
+    hanging = Scene(two_link, [hovi.effects.Gravity()], passive=["shoulder"])
+    found = hovi.plan(hanging, [-np.pi / 2, 0.0], [-np.pi / 2, 0.0], 2.0, limits="none")
+    assert found.status is Status.MINIMUM, found.message
+    assert found.cost < 1e-20
+
+
 def test_a_replanned_motion_that_its_grid_does_not_resolve_is_unresolved(
     arm_scene: Scene,
 ) -> None:

@@ -232,13 +232,14 @@ class _Search:
         reached = (
             bool(chosen.error <= self.tolerance.size) and chosen.is_carried and chosen.is_trusted
         )
+        estimated = dataclasses.replace(solution, error_estimate=known)
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,
             reached,
             "" if reached else reason,
             tuple(self.rounds),
-            None if finer is None else partial(estimate_against, solution, finer, self._frame),
+            None if finer is None else partial(estimate_against, estimated, finer, self._frame),
             chosen.along,
         )
         steps = sum(done.nit for done in self.rounds) or solution.nit

@@ -14,7 +14,12 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.motion_error import relative_difference
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
-from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against, finer_than
+from hovi.planning.refinement.error_estimate import (
+    LIMITED_SAFETY_FACTOR,
+    FinerSolution,
+    estimate_against,
+    finer_than,
+)
 from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian
 from hovi.planning.refinement.passive_torque import (
@@ -38,8 +43,6 @@ ROUNDING_FLOOR = 1e-14
 """Smallest estimate of the relative error of the cost."""
 LOOSE_SAFETY_FACTOR = 3.0
 """Factor on estimates above CURVE_TOLERANCE, where the finer solution is not much better."""
-LIMITED_SAFETY_FACTOR = 1.5
-"""Factor on estimates under limits, where the finer solution is not much better."""
 CONTRADICTION_RATIO = 10.0
 """Ratio of the difference of costs on two grids to their estimated errors above which the solver
 is taken to have reached another minimum."""
@@ -83,7 +86,6 @@ class Candidate:
             errors = _errors_of_cost(solution, finer, tolerance)
             return cls(solution, tolerance, finer, *errors, along, passive)
         error = tolerance.measure(estimate_against(solution, finer, tolerance.frame))
-        error *= LIMITED_SAFETY_FACTOR if finer.problem.limited else 1.0
         return cls(solution, tolerance, finer, error, error, along, passive)
 
     @property

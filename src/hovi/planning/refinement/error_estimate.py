@@ -10,6 +10,7 @@ The Hessian of the first step gives the contribution of each interval to the err
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,6 +32,8 @@ from hovi.planning.solver.solver import Solution, solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
+LIMITED_SAFETY_FACTOR = 1.5
+"""Factor on estimates under limits, where the finer solution is not much better."""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
@@ -52,9 +55,16 @@ def estimate_error(solution: Solution, frame: str | None = None) -> MotionError 
 def estimate_against(
     solution: Solution, finer: FinerSolution, frame: str | None = None
 ) -> MotionError:
-    """The error of a solution relative to a given finer one; frame as above."""
-    costs = finer.known, finer.cost
-    return deviation(solution.trajectory, finer.trajectory, costs, frame)
+    """The error of a solution relative to a given finer one; frame as above.
+
+    Within limits times LIMITED_SAFETY_FACTOR; that of the cost is at least the solution's
+    error_estimate.
+    """
+    error = deviation(solution.trajectory, finer.trajectory, (finer.known, finer.cost), frame)
+    if finer.problem.limited:
+        error = error.scaled(LIMITED_SAFETY_FACTOR)
+    known = solution.error_estimate
+    return error if known is None else dataclasses.replace(error, cost=max(error.cost, known))
 
 
 def finer_than(solution: Solution, time_limit: float | None = None) -> FinerSolution | None:

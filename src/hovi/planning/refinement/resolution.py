@@ -35,6 +35,8 @@ RESOLVED = 0.01
 NEARBY = 0.05
 """Change of q, and of T v, in [rad] or [m], up to which a motion near one that passed is not
 compared with a finer one again."""
+NEARBY_COST = 0.5
+"""Relative change of the cost up to which that holds: near rest small motions differ much."""
 NEGLIGIBLE = 1e-12
 """Cost that counts as none, relative to that of torques of the size of the inertial torque."""
 
@@ -110,7 +112,7 @@ def resolved(solution: Solution) -> Solution:
     if reason:
         return _unresolved(solution, reason)
     assert solution.error_estimate is not None
-    passed = Resolution(solution.trajectory.path, solution.error_estimate)
+    passed = Resolution(solution.trajectory.path, solution.cost, solution.error_estimate)
     return dataclasses.replace(solution, check=passed)
 
 
@@ -119,7 +121,7 @@ def _checked(solution: Solution) -> tuple[Solution, str]:
     reason = _fault_on_curve(solution)
     if not reason and solution.error_estimate is None:
         solution, reason = _compared_with_finer(solution)
-    elif not reason:
+    elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
     return solution, reason or _fault_of_whirling(solution)
 
@@ -141,11 +143,12 @@ def unresolved_if_whirling(solution: Solution) -> Solution:
 class Resolution:
     """The check of motions that are replanned from a resolved one.
 
-    path: of the resolved motion. estimate: of the relative error of its cost, kept for motions that
-    are NEARBY.
+    path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
+    motions that are NEARBY.
     """
 
     path: DiscretePath
+    cost: float
     estimate: float
 
     def __call__(self, solution: Solution) -> Solution:
@@ -160,7 +163,8 @@ class Resolution:
     def _is_near(self, solution: Solution) -> bool:
         problem, path = solution.problem, solution.trajectory.path
         assert problem is not None
-        if path.q.shape != self.path.q.shape:
+        change = abs(solution.cost - self.cost)
+        if path.q.shape != self.path.q.shape or change > NEARBY_COST * abs(self.cost):
             return False
         dq = problem.robot.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
@@ -183,12 +187,23 @@ def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:
         return ""  # both are that close to the cost of the same finer solution
     action = problem.ld.action(solution.trajectory.path)
     integral = integral_along(problem.ld.lagrangian, solution.trajectory).value
-    least = NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
-    if abs(action - integral) <= RESOLVED * max(abs(integral), least):
+    if abs(action - integral) <= RESOLVED * max(abs(integral), _least_cost(problem)):
         return ""
     return (
         f"its cost is {action:.6g} at the quadrature points, but {integral:.6g} along its own curve"
     )
+
+
+def _costs_nothing(solution: Solution) -> bool:
+    """Whether the cost is one of rounding errors, whose relative error says nothing."""
+    assert solution.problem is not None
+    known = solution.error_estimate is not None
+    return known and abs(solution.cost) <= RESOLVED * _least_cost(solution.problem)
+
+
+def _least_cost(problem: TrajectoryProblem) -> float:
+    """The cost to which differences are relative at least."""
+    return NEGLIGIBLE * problem.inertial_torque**2 * problem.grid.duration
 
 
 def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str:
@@ -214,9 +229,10 @@ def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost
     compared = _with_estimate(solution, estimate)
-    if difference <= RESOLVED * abs(solution.cost):
+    assert solution.problem is not None
+    if difference <= RESOLVED * max(abs(finer.known), _least_cost(solution.problem)):
         return compared, ""
-    return compared, _cost_change(difference / abs(solution.cost))
+    return compared, _cost_change(difference / abs(finer.known))
 
 
 def _fault_of_whirling(solution: Solution) -> str:

@@ -29,7 +29,7 @@ from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 
-COARSE_INTERVALS = 60
+COARSE_INTERVALS = 80
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""
 EXPLORATION_SHARE = 0.7
 """Share of the time limit for the exploration, if its minima are refined afterwards."""
