@@ -254,14 +254,14 @@ def test_around_an_obstacle_the_best_duration_is_cheaper_than_its_neighbours(
 ) -> None:
     scene, ball = hovi.Scene(two_link, []), hovi.Sphere([0.85, 0.0, -1.7], 0.15)
     ends, options = ([-np.pi / 2, 0.0], [0.3, 0.7]), {"obstacles": [ball], "limits": "none"}
-    found = hovi.plan(scene, *ends, (1.25, 1.55), time_weight=30.0, intervals=24, **options)
+    found = hovi.plan(scene, *ends, (1.25, 1.55), time_weight=30.0, intervals=12, **options)
     assert found.success, found.message
     assert found.duration_derivative == pytest.approx(-30.0, rel=1e-6)
     T = found.trajectory.duration
     for each in (0.95 * T, 1.05 * T):
-        near = hovi.plan(scene, *ends, each, intervals=24, **options)
+        near = hovi.plan(scene, *ends, each, intervals=12, **options)
         assert near.cost + 30.0 * each > found.cost
-    bare = hovi.plan(scene, *ends, T, intervals=24, limits="none")
+    bare = hovi.plan(scene, *ends, T, intervals=12, limits="none")
     assert bare.cost + 30.0 * T < found.cost * (1 - 0.01)
 
 

@@ -230,9 +230,9 @@ def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
         estimate *= finer.known / solution.cost
     compared = _with_estimate(solution, estimate)
     assert solution.problem is not None
-    if difference <= RESOLVED * max(abs(finer.known), _least_cost(solution.problem)):
+    if difference <= RESOLVED * max(abs(solution.cost), _least_cost(solution.problem)):
         return compared, ""
-    return compared, _cost_change(difference / abs(finer.known))
+    return compared, _cost_change(difference / abs(solution.cost))
 
 
 def _fault_of_whirling(solution: Solution) -> str:
