@@ -15,6 +15,7 @@ from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.search.planner import plan
+from hovi.planning.solver import action_objective
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.system.interruption import (
@@ -88,7 +89,7 @@ def test_an_interrupt_anywhere_ends_every_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also where Python discards the exception, as in a destructor, and only the record remains."""
-    jets, calls = DiscreteLagrangian.jets, 0
+    jets, calls = action_objective._jets, 0
 
     def interrupting(self: DiscreteLagrangian, path: DiscretePath) -> Any:
         nonlocal calls
@@ -99,7 +100,7 @@ def test_an_interrupt_anywhere_ends_every_search(
                 raise KeyboardInterrupt
         return jets(self, path)
 
-    monkeypatch.setattr(DiscreteLagrangian, "jets", interrupting)
+    monkeypatch.setattr(action_objective, "_jets", interrupting)
     arguments = {"goal": REACH, "duration": 1.0, "limits": "none", "intervals": 12} | SEARCHES[
         search
     ]
