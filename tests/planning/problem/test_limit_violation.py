@@ -135,3 +135,14 @@ def _require_the_highest(
     limits = as_limits(robot, {"base": "none", "v": [1.0, 1.0]})
     excess = excess_along(motion, limits)
     assert 2 * excess.upper[0, 1, 0] == pytest.approx(v(s).max() - 1.0, abs=1e-8)
+
+
+def test_extremes_next_to_the_ends_of_a_polynomial_of_high_degree_are_found(
+    arm_scene: Scene, two_link: Robot
+) -> None:
+    """Near the ends it oscillates faster than samples at equal distances tell."""
+    T = np.polynomial.Chebyshev.basis(11, domain=[0, 1])
+    at = (1 + np.cos(np.pi * 2 / 11)) / 2  # the third extreme from the end, where T = 1
+    for tilt in np.linspace(-0.004, 0.004, 9):
+        line = tilt * np.polynomial.Chebyshev([-(2 * at - 1), 1.0], domain=[0, 1])
+        _require_the_highest(0.95 + 0.05 * T + 4e-5 + line, arm_scene, two_link)

@@ -17,6 +17,10 @@ Index = npt.NDArray[np.intp]
 
 SAMPLES = 33
 """Samples per interval in the first pass, both ends included."""
+POSITIONS = (1.0 - np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))) / 2
+"""Their positions, closer at both ends, where polynomials of high degree oscillate faster."""
+REFINED_SAMPLES = 25
+"""Samples of each further pass, between the neighbours of an extreme sample."""
 REFINEMENT_SHARE = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
 as a share of its range."""
@@ -59,8 +63,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     """
     raise_if_late()
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
-    s = np.linspace(0.0, 1.0, SAMPLES)
-    outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
+    outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N))
     outputs = outputs.reshape(N, SAMPLES, 4, nv)
     lower, at_lower = _Side(trajectory, limits, -1.0, limits.lower).extremes(outputs)
     upper, at_upper = _Side(trajectory, limits, 1.0, limits.upper).extremes(outputs)
@@ -88,33 +91,37 @@ class _Side:
         excess = self.sign * (outputs - self.bound) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
-        s = index / (SAMPLES - 1)
+        s = POSITIONS[index]
         k, sample, kind, joint = np.nonzero(
             _near_extremes(excess, largest) | _may_exceed(excess, self.limits.tolerance)
         )
         if len(k) == 0:
             return largest, s
-        found, at = self._refined(k, sample / (SAMPLES - 1), kind, joint)
+        found, at = self._refined(k, sample, kind, joint)
         for row in np.argsort(found):  # the largest of each interval and output comes last
             entry = k[row], kind[row], joint[row]
             if found[row] >= largest[entry]:
                 largest[entry], s[entry] = found[row], at[row]
         return largest, s
 
-    def _refined(self, k: Index, at: Array, kind: Index, joint: Index) -> tuple[Array, Array]:
-        """The excess at M extremes and their positions, from two denser samplings around them.
+    def _refined(self, k: Index, sample: Index, kind: Index, joint: Index) -> tuple[Array, Array]:
+        """The excess at M extremes and their positions, from three denser samplings around them.
 
-        k: intervals. at: positions of the extreme samples. kind, joint: of the outputs. All (M,).
+        k: intervals. sample: the extreme samples. kind, joint: of the outputs. All (M,).
         """
-        width, rows = 1.0 / (SAMPLES - 1), np.arange(len(k))
-        for _ in range(2):
-            around = np.clip(at[:, None] + width * np.linspace(-1, 1, SAMPLES), 0.0, 1.0)
-            outputs = _outputs(self.trajectory, np.repeat(k, SAMPLES), around.ravel())
-            values = outputs.reshape(len(k), SAMPLES, 4, -1)[rows, :, kind, joint]
+        rows = np.arange(len(k))
+        begin = POSITIONS[np.maximum(sample - 1, 0)]
+        end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
+        for _ in range(3):
+            step = (end - begin) / (REFINED_SAMPLES - 1)
+            around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
+            outputs = _outputs(self.trajectory, np.repeat(k, REFINED_SAMPLES), around.ravel())
+            values = outputs.reshape(len(k), REFINED_SAMPLES, 4, -1)[rows, :, kind, joint]
             excess = self.sign * (values - self.bound[kind, joint][:, None])
             excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
-            at, width = around[rows, best], width / (SAMPLES - 1)
+            at = around[rows, best]
+            begin, end = np.maximum(at - step, 0.0), np.minimum(at + step, 1.0)
         return excess[rows, best], at
 
 
