@@ -181,9 +181,8 @@ if {busy}:
 else:
     pids = set(dict(results_in_workers(work, range(4), 2, Deadline())).values())
     child = os.fork()
-    if child == 0:
-        time.sleep(3600)
-    print(*pids, child, sep="\\n", flush=True)
+    if child != 0:
+        print(*pids, child, flush=True)
     time.sleep(3600)
 """
 
@@ -211,7 +210,8 @@ def test_a_forked_child_does_not_keep_workers_alive() -> None:
         text=True,
     )
     assert parent.stdout is not None
-    *pids, child = (int(parent.stdout.readline()) for _ in range(3))
+    *pids, child = map(int, parent.stdout.readline().split())  # one worker or two, as it came
+    assert pids
     parent.kill()
     parent.wait()
     try:
