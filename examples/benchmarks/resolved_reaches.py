@@ -183,7 +183,7 @@ def _confirms(finer: hovi.Solution, plan: hovi.Solution) -> bool:
 def _quarters(grid: hovi.Grid) -> hovi.Grid:
     """The grid with every interval cut into four."""
     for _ in range(2):
-        grid = grid.halved(np.ones(grid.intervals, dtype=bool))
+        grid = grid.halved()
     return grid
 
 

@@ -149,7 +149,7 @@ def _reference(solution: hovi.Solution) -> hovi.Solution:
     grid, problem = solution.trajectory.grid, solution.problem
     assert problem is not None
     tables = tuple(galerkin(scheme.inner_modes + 6) for scheme in grid.schemes)
-    fine = hovi.Grid(grid.steps, tables).halved(np.ones(grid.intervals, dtype=bool))
+    fine = hovi.Grid(grid.steps, tables).halved()
     return solve_on_grid(problem.on(fine), solution.trajectory)
 
 

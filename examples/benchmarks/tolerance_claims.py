@@ -77,8 +77,8 @@ def measure(arm: str, limits: str, count: int, seed: int) -> list[Claim]:
 def _true_error(plan: hovi.Solution) -> float:
     """The relative distance of the cost from that of a finer solution near the plan."""
     problem = plan.problem
-    grid = problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
-    more = grid.halved(np.ones(grid.intervals, dtype=bool))
+    grid = problem.grid.halved()
+    more = grid.halved()
     grid = more if problem.limited else grid.enriched(4)
     finer = solve_on_grid(problem.on(grid), plan.trajectory, max_iterations=2000)
     return abs(plan.cost / finer.cost - 1) if finer.success else np.nan

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.scene.lagrangian import Lagrangian
-from hovi.scene.scene import Scene
+from samples.joint_lagrangian import JointLagrangian
 
 Array = npt.NDArray[np.float64]
 
@@ -20,20 +19,10 @@ FREE_HORIZONS = {4.4: 0, 4.6: 1, 7.8: 2, 11.0: 3}
 
 
 @dataclass(frozen=True, eq=False)
-class OscillatingLagrangian(Lagrangian):
+class OscillatingLagrangian(JointLagrangian):
     """L = 1/2 sum (a_i^2 - bend_i v_i^2): joints that do not interact."""
 
-    scene: Scene
     bends: tuple[float, ...]
-    order: int = 2
-
-    @property
-    def nq(self) -> int:
-        return self.scene.robot.nq
-
-    @property
-    def nv(self) -> int:
-        return self.scene.robot.nv
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         return np.asarray(np.sum(jet[2] ** 2 - np.array(self.bends) * jet[1] ** 2, axis=1) / 2)

@@ -15,6 +15,7 @@ from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS
+from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.inactive_limits import far_from_limits
 from hovi.planning.search.homotopies import lighter_rotors
 from hovi.planning.search.job import Job, Progress, split_for_charts
@@ -23,7 +24,6 @@ from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
-from hovi.schemes import galerkin
 from hovi.system.interruption import raise_if_interrupted
 
 LIMITED_TOLERANCE = 1e-2
@@ -130,7 +130,7 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
     """The motion that follows from that with heavy rotors, as they become lighter."""
     if isinstance(task.duration, tuple):
         raise UnmeasurableError("rotors need a fixed duration.")
-    grid = Grid.uniform(task.duration, ROTOR_INTERVALS, galerkin(4, points=10))
+    grid = Grid.uniform(task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4))
     options = task.options.on(task.scene.robot)
     job = split_for_charts(Job(task.scene, grid, task.start, task.goal, options), options.guess)
     guess: str | Trajectory = options.guess

@@ -7,8 +7,6 @@ import time
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.measures import Thresholds
 from hovi.accuracy.reference_motion import ReferenceMotion
@@ -171,7 +169,7 @@ class _Halving:
                 self.late = solution.status is Status.TIME_LIMIT
             if self.converged or failures > (MAX_FAILURES if self.change is None else 0):
                 break
-            grid = _halved(solution.trajectory.grid)
+            grid = solution.trajectory.grid.halved()
 
     @property
     def converged(self) -> bool:
@@ -192,7 +190,7 @@ class _Halving:
             intervals = _first_intervals(grid)
             return Grid.uniform(self._problem.grid.duration, intervals, galerkin(INNER_MODES))
         fewer = LIMITED_MODES - grid.inner_modes
-        return _halved(grid.enriched(fewer) if fewer > 0 else grid)
+        return (grid.enriched(fewer) if fewer > 0 else grid).halved()
 
     def _add(self, solution: Solution) -> None:
         fine = _reference(solution.trajectory, solution.cost)
@@ -216,10 +214,6 @@ def _first_intervals(grid: Grid) -> int:
     while intervals * (INNER_MODES + 2) < modes and intervals < MAX_INTERVALS:
         intervals *= 2
     return intervals
-
-
-def _halved(grid: Grid) -> Grid:
-    return grid.halved(np.ones(grid.intervals, dtype=bool))
 
 
 def _with_strict_limits(problem: TrajectoryProblem) -> TrajectoryProblem:

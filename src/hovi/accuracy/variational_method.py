@@ -92,7 +92,7 @@ class VariationalMethod(Method):
             try:
                 return grid, on_grid(self._problem, grid).path(self._guess)
             except ChartError:
-                grid = grid.halved(np.ones(grid.intervals, dtype=bool))
+                grid = grid.halved()
         raise UnmeasurableError("an orientation of the guess turns too far within an interval.")
 
 

@@ -77,11 +77,13 @@ class Grid:
         """
         return Grid(self.steps * (duration / self.duration), self.schemes)
 
-    def halved(self, chosen: npt.NDArray[np.bool_]) -> Grid:
+    def halved(self, chosen: npt.NDArray[np.bool_] | None = None) -> Grid:
         """The grid with the chosen intervals bisected.
 
-        chosen: shape (N,).
+        chosen: shape (N,); all of them if None.
         """
+        if chosen is None:
+            chosen = np.ones(self.intervals, dtype=bool)
         require_shape("chosen", chosen, self.intervals)
         parts = np.where(chosen, 2, 1)
         schemes = [s for s, count in zip(self.schemes, parts, strict=True) for _ in range(count)]

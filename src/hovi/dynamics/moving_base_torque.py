@@ -15,6 +15,7 @@ from hovi.dynamics.mimic_kernel import rnea_kernel
 from hovi.dynamics.point_function import PointFunction, default_threads
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.dynamics.torque_model import times
+from hovi.robot.model import with_distinct_frames
 
 Array = npt.NDArray[np.float64]
 
@@ -38,18 +39,10 @@ def on_base_joints(model: pin.Model) -> pin.Model:
     frame = base.addFrame(
         pin.Frame("moving base", parent, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME)
     )
-    moved = pin.appendModel(base, _with_numbered_frames(model), frame, pin.SE3.Identity())
+    moved = pin.appendModel(base, with_distinct_frames(model)[0], frame, pin.SE3.Identity())
     moved.gravity.linear = model.gravity.linear
     moved.armature = np.concatenate([np.zeros(BASE_DOF), model.armature])
     return moved
-
-
-def _with_numbered_frames(model: pin.Model) -> pin.Model:
-    """A copy whose frames have different names: a URDF may name a link and a joint alike."""
-    copy = model.copy()
-    for number, frame in enumerate(copy.frames):
-        frame.name = f"{number} {frame.name}"
-    return copy
 
 
 def base_jet(base: ca.SX, t: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:

@@ -88,14 +88,9 @@ def _reduced(
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
     """Model and geometry with joints fixed at q.
 
-    Pinocchio looks frames up by name alone and refuses a link that has the name of a joint, so such
-    links are renamed in between.
+    Frames that share a name have others in between.
     """
-    joints, original, model = set(model.names), dict[str, str](), model.copy()
-    for frame in model.frames:
-        if frame.type != pin.JOINT and frame.name in joints:
-            name, frame.name = frame.name, f"{frame.name}/link"
-            original[frame.name] = name
+    model, original = with_distinct_frames(model)
     if shapes:
         reduced, found = pin.buildReducedModel(model, shapes, ids, q)
         shapes = list(found)
@@ -104,6 +99,21 @@ def _reduced(
     for frame in reduced.frames:
         frame.name = original.get(frame.name, frame.name)
     return reduced, shapes
+
+
+def with_distinct_frames(model: pin.Model) -> tuple[pin.Model, dict[str, str]]:
+    """A copy whose frames have different names, and the original names by those that are new.
+
+    Pinocchio looks frames up by name alone and refuses a name that it finds twice, as where a URDF
+    names a link and a joint alike. Frames of moving joints keep their names.
+    """
+    copy, names, original = model.copy(), set(model.names), dict[str, str]()
+    for number, frame in enumerate(copy.frames):
+        if frame.type != pin.JOINT and frame.name in names:
+            name, frame.name = frame.name, f"{number} {frame.name}"
+            original[frame.name] = name
+        names.add(frame.name)
+    return copy, original
 
 
 def locked_model(

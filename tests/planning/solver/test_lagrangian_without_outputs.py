@@ -16,29 +16,19 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
-from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from samples.joint_lagrangian import JointLagrangian
 
 Array = npt.NDArray[np.float64]
 START, GOAL, T = np.array([-1.0, 0.3]), np.array([0.8, -0.5]), 1.3
 
 
 @dataclass(frozen=True, eq=False)
-class LeastAcceleration(Lagrangian):
+class LeastAcceleration(JointLagrangian):
     """L = 1/2 |a|^2 + 1/4 s sum a_i^4."""
 
-    scene: Scene
     stiffening: float = 0.0
-    order: int = 2
-
-    @property
-    def nq(self) -> int:
-        return self.scene.robot.nq
-
-    @property
-    def nv(self) -> int:
-        return self.scene.robot.nv
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         a = jet[2]

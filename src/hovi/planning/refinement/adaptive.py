@@ -15,7 +15,11 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
 from hovi.planning.refinement.candidate import Candidate
-from hovi.planning.refinement.error_estimate import FinerSolution, estimate_against
+from hovi.planning.refinement.error_estimate import (
+    FinerSolution,
+    estimate_against,
+    with_estimate,
+)
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
@@ -232,14 +236,14 @@ class _Search:
         reached = (
             bool(chosen.error <= self.tolerance.size) and chosen.is_carried and chosen.is_trusted
         )
-        estimated = dataclasses.replace(solution, error_estimate=known)
+        solution = with_estimate(solution, known)
         accuracy = Accuracy(
             self.tolerance,
             chosen.error,
             reached,
             "" if reached else reason,
             tuple(self.rounds),
-            None if finer is None else partial(estimate_against, estimated, finer, self._frame),
+            None if finer is None else partial(estimate_against, solution, finer, self._frame),
             chosen.along,
         )
         steps = sum(done.nit for done in self.rounds) or solution.nit
@@ -247,7 +251,6 @@ class _Search:
         if solution.success:
             message = f"a minimum of cost {solution.cost:.10g} after {steps} steps"
             message += f" on {len(self.rounds)} grids" if len(self.rounds) > 1 else ""
-        metadata = {**solution.trajectory.metadata, "error_estimate": known}
         if interrupted() and not reached:
             if solution.success:
                 message = (
@@ -256,10 +259,8 @@ class _Search:
             solution = dataclasses.replace(solution, success=False, status=Status.INTERRUPTED)
         return dataclasses.replace(
             solution,
-            trajectory=dataclasses.replace(solution.trajectory, metadata=metadata),
             message=f"{message.removesuffix('.')}; {accuracy}",
             nit=steps,
-            error_estimate=known,
             accuracy=accuracy,
         )
 

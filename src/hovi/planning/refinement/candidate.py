@@ -102,7 +102,7 @@ class Candidate:
     @property
     def is_trusted(self) -> bool:
         """Whether the error of the cost is not small by cancellation of contributions only."""
-        return bool(self.uncancelled <= CANCELLATION_LIMIT * self.tolerance.size)
+        return _trusted(self.uncancelled, self.tolerance)
 
     @property
     def is_at_floor(self) -> bool:
@@ -198,10 +198,11 @@ def _errors_of_cost(
 
 
 def _accepted(error: float, uncancelled: float, tolerance: Tolerance) -> bool:
-    return (
-        error <= ACCEPTED_SHARE * tolerance.size
-        and uncancelled <= CANCELLATION_LIMIT * tolerance.size
-    )
+    return error <= ACCEPTED_SHARE * tolerance.size and _trusted(uncancelled, tolerance)
+
+
+def _trusted(uncancelled: float, tolerance: Tolerance) -> bool:
+    return bool(uncancelled <= CANCELLATION_LIMIT * tolerance.size)
 
 
 def error_of_cost(solution: Solution, finer: FinerSolution) -> float:

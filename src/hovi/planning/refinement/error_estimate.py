@@ -67,6 +67,17 @@ def estimate_against(
     return error if known is None else dataclasses.replace(error, cost=max(error.cost, known))
 
 
+def with_estimate(solution: Solution, estimate: float | None) -> Solution:
+    """The solution with the estimate of its cost's relative error, also in the metadata."""
+    trajectory = with_metadata(solution.trajectory, error_estimate=estimate)
+    return dataclasses.replace(solution, trajectory=trajectory, error_estimate=estimate)
+
+
+def with_metadata(trajectory: Trajectory, **entries: object) -> Trajectory:
+    """The motion with more entries in its metadata, or with others."""
+    return dataclasses.replace(trajectory, metadata={**trajectory.metadata, **entries})
+
+
 def finer_than(solution: Solution, time_limit: float | None = None) -> FinerSolution | None:
     """The finer solution that `estimate_error` compares with. time_limit: in [s]."""
     problem = solution.problem
@@ -114,7 +125,7 @@ def finer_solution(
     time_limit: of a full solve, in [s].
     """
     if problem.limited:
-        halves = problem.on(problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool)))
+        halves = problem.on(problem.grid.halved())
         curve = stretched(problem.trajectory(path), problem.grid.duration)
         return _solved(halves, halves.path(curve), problem, path, time_limit)
     fine = problem.finer

@@ -34,7 +34,7 @@ def next_grid(candidate: Candidate) -> Grid:
     problem, finer = candidate.solution.problem, candidate.finer
     assert problem is not None
     if finer is None:
-        return problem.grid.halved(np.ones(problem.grid.intervals, dtype=bool))
+        return problem.grid.halved()
     demands = [*_demands(candidate, finer), *_passive_demands(candidate)]
     rho = _decay(candidate, finer)
     error = np.inf if candidate.error_of_cost is None else candidate.error_of_cost
@@ -52,7 +52,7 @@ def next_grid(candidate: Candidate) -> Grid:
         return grid
     if decay_known or grid.inner_modes < UNRESOLVED_MODES:
         return grid.enriched(MORE_MODES)
-    return grid.halved(np.ones(grid.intervals, dtype=bool))
+    return grid.halved()
 
 
 def interpolated_to(finer: FinerSolution, problem: TrajectoryProblem) -> DiscretePath:

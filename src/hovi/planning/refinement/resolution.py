@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
-from hovi.planning.refinement.error_estimate import finer_than
+from hovi.planning.refinement.error_estimate import finer_than, with_estimate, with_metadata
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
 from hovi.planning.refinement.whirling import UNUSABLE_RATIO, whirl, whirl_without_minimum
 from hovi.planning.solver.methods.method import Method, Report
@@ -135,7 +134,7 @@ def unresolved_if_whirling(solution: Solution) -> Solution:
         solution,
         status=Status.UNRESOLVED,
         message=f"{solution.message.rstrip('.')}: {whirling}.",
-        trajectory=_with_metadata(solution.trajectory, status=str(Status.UNRESOLVED)),
+        trajectory=with_metadata(solution.trajectory, status=str(Status.UNRESOLVED)),
     )
 
 
@@ -158,7 +157,7 @@ class Resolution:
         reason = _fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
-        return dataclasses.replace(_with_estimate(solution, self.estimate), check=self)
+        return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
 
     def _is_near(self, solution: Solution) -> bool:
         problem, path = solution.problem, solution.trajectory.path
@@ -228,7 +227,7 @@ def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
     estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost
-    compared = _with_estimate(solution, estimate)
+    compared = with_estimate(solution, estimate)
     assert solution.problem is not None
     if difference <= RESOLVED * max(abs(solution.cost), _least_cost(solution.problem)):
         return compared, ""
@@ -253,15 +252,6 @@ def _fault_of_estimate(estimate: float | None) -> str:
 
 def _cost_change(change: float) -> str:
     return f"a finer grid changes its cost by {100 * change:.2g} %"
-
-
-def _with_estimate(solution: Solution, estimate: float) -> Solution:
-    trajectory = _with_metadata(solution.trajectory, error_estimate=estimate)
-    return dataclasses.replace(solution, trajectory=trajectory, error_estimate=estimate)
-
-
-def _with_metadata(trajectory: Trajectory, **entries: Any) -> Trajectory:
-    return dataclasses.replace(trajectory, metadata={**trajectory.metadata, **entries})
 
 
 def _unresolved(solution: Solution, reason: str) -> Solution:
@@ -291,7 +281,7 @@ def _failed(solution: Solution, status: Status, message: str) -> Solution:
         success=False,
         status=status,
         message=message,
-        trajectory=_with_metadata(solution.trajectory, status=str(status)),
+        trajectory=with_metadata(solution.trajectory, status=str(status)),
         minima=(),
         check=None,
     )

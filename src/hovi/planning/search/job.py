@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self
 
-import numpy as np
-
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
@@ -99,4 +97,4 @@ def split_for_charts(job: Job, guess: str | Trajectory) -> Job:
         except ChartError:
             if 2 * job.grid.intervals > MAX_CHART_INTERVALS:
                 raise
-        job = job.on(job.grid.halved(np.ones(job.grid.intervals, dtype=bool)))
+        job = job.on(job.grid.halved())

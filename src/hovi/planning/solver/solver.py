@@ -142,18 +142,7 @@ def solve_on_grid(
 ) -> Solution:
     """A motion that makes the discrete action stationary, without a check between the points.
 
-    problem: the boundary data and the discrete Lagrangian.
-    guess: "cubic", "minimum-jerk", a Trajectory (on any grid), or a DiscretePath on this grid.
-    max_iterations: maximum number of steps; with limits or constraints, per round.
-    time_limit: in [s]. At either limit the best motion so far is returned.
-    escape_saddles: whether to leave saddles along negative curvature; False stops there with
-        status SADDLE.
-    report: called with the number of each step and the least cost so far.
-    method: minimisation method; None for the first suitable one of
-        hovi.planning.solver.methods.choice.
-    With limits, `cost` belongs to the motion that satisfies them everywhere, and intervals may
-    have been split.
-    Raises InputError for a guess or a method that does not fit the problem.
+    Arguments, cost and errors as of `hovi.solve`, which checks the motion.
     """
     began = time.perf_counter()
     method = method or method_for(problem)

@@ -39,6 +39,8 @@ TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
 MAX_TIGHTENING_FACTOR = 8.0
 """The same where the last tightening reduced the excess by little."""
+SECANT_FACTOR = 1.2
+"""Ratio of tightening and what the secant of the last one asks for."""
 EXTRA_TIGHTENING = 5.0
 """Additional tightening, in tolerances, to end the rounds early."""
 UNUSED_MARGIN = 1e-3
@@ -109,8 +111,8 @@ def _tightening_factors(search: BoundedSearch, sides: Array) -> Array:
     tightened = (change > 0) & (before > 0) & (sides > 0)
     reduced = np.subtract(before, sides, where=tightened, out=np.ones_like(sides))
     rate = np.maximum(reduced, 0.0) / np.where(tightened, change, 1.0)
-    most = MAX_TIGHTENING_FACTOR
-    return np.clip(1.2 / np.maximum(rate, 1.2 / most), TIGHTENING_FACTOR, most)
+    slowest = SECANT_FACTOR / MAX_TIGHTENING_FACTOR
+    return np.maximum(SECANT_FACTOR / np.maximum(rate, slowest), TIGHTENING_FACTOR)
 
 
 def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> tuple[Bounded, str]:
