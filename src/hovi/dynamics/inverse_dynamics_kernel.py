@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.shapes import numbers_of
 from hovi.dynamics.joint_tree import JointTree, read_joint_tree
 from hovi.errors import InputError, ModelError
 from hovi.robot.space.joint_kinds import kind_of
@@ -147,10 +148,7 @@ class InverseDynamicsKernel:
 
 def _numbers(name: str, x: Array, shape: tuple[int, ...] | None = None) -> Array:
     """x as contiguous doubles of a shape; None for any of one dimension or more."""
-    try:
-        x = np.ascontiguousarray(x, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be an array of numbers: {error}.") from error
+    x = np.ascontiguousarray(numbers_of(name, x))
     if shape not in (None, x.shape):
         raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
     return x

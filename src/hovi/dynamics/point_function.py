@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.shapes import numbers_of
 from hovi.dynamics.function_cache import compiled
 from hovi.errors import InputError
 
@@ -57,10 +58,8 @@ class PointFunction:
 
     def __call__(self, *arguments: Array) -> list[Array]:
         """Evaluate at P points; arguments of shape (P, width). Raises InputError for others."""
-        try:
-            arrays = [np.ascontiguousarray(argument, dtype=np.float64) for argument in arguments]
-        except (TypeError, ValueError, OverflowError) as error:
-            raise InputError(f"{self.function.name()} takes arrays of numbers: {error}.") from error
+        name = f"an argument of {self.function.name()}"
+        arrays = [np.ascontiguousarray(numbers_of(name, each)) for each in arguments]
         points = len(arrays[0])
         self._check(arrays, points)
         results = [np.empty((points, *reversed(shape))) for shape in self._shapes]

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, nearest
 
 Array = npt.NDArray[np.float64]
@@ -49,8 +50,8 @@ class Obstacle(ABC):
         """Store a field as nested tuples of finite numbers. Raises InputError."""
         value = getattr(self, key)
         try:
-            numbers = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
+            numbers = numbers_of(key, value)
+        except InputError:
             numbers = np.full((), np.nan)
         if numbers.shape != shape or not np.isfinite(numbers).all():
             size = f"{' x '.join(str(n) for n in shape)} finite numbers" if shape else "a number"

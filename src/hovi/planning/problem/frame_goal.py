@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import numbers_of
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
 from hovi.planning.problem.node_conditions import Condition
@@ -189,10 +190,7 @@ class FrameCondition(Condition):
 
 
 def _numbers(name: str, value: Any) -> Array:
-    try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"the {name} of a frame goal must be numeric, got {value!r}.") from None
+    return numbers_of(f"the {name} of a frame goal", value)
 
 
 def _vector(name: str, value: npt.ArrayLike) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.checks.shapes import require_shape
+from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees
@@ -227,8 +227,8 @@ def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]
 
 def _pair(kind: str, name: str, value: Any) -> tuple[float, float]:
     try:
-        numbers = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
+        numbers = numbers_of(name, value)
+    except InputError:
         numbers = np.full(3, np.nan)
     if numbers.ndim == 0 and numbers > 0:
         return -float(numbers), float(numbers)

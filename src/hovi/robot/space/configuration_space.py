@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.checks.shapes import require_rows
+from hovi.checks.shapes import numbers_of, require_rows
 from hovi.errors import InputError
 from hovi.robot.space.groups import GROUPS, SE2, SO2, Group, Layout, differenced, integrated
 from hovi.robot.space.joint_kinds import COMPOSITE, kind_of
@@ -125,7 +125,7 @@ class ConfigurationSpace:
 
     def integrate(self, q: Array, dq: Array) -> Array:
         """q (+) dq: configurations (..., nq), tangent vectors (..., nv) -> (..., nq)."""
-        q, dq = np.asarray(q, dtype=np.float64), np.asarray(dq, dtype=np.float64)
+        q, dq = numbers_of("q", q), numbers_of("dq", dq)
         if self.vector:
             require_rows((("q", q, self.nq), ("dq", dq, self.nv)))
             return q + dq
@@ -133,7 +133,7 @@ class ConfigurationSpace:
 
     def difference(self, q0: Array, q1: Array) -> Array:
         """q1 (-) q0: the tangent vector of least angles that moves q0 to q1, (..., nv)."""
-        q0, q1 = np.asarray(q0, dtype=np.float64), np.asarray(q1, dtype=np.float64)
+        q0, q1 = numbers_of("q0", q0), numbers_of("q1", q1)
         if self.vector:
             require_rows((("q0", q0, self.nq), ("q1", q1, self.nq)))
             return q1 - q0

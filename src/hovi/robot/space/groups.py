@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import groups as native
+from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -138,7 +139,7 @@ def _common_rows(*arrays: Array) -> tuple[int, ...]:
 def _rows(x: Array, lead: tuple[int, ...]) -> Array:
     """(..., n) as contiguous rows (P, n)."""
     full = x if x.shape[:-1] == lead else np.broadcast_to(x, (*lead, x.shape[-1]))
-    return np.ascontiguousarray(full, dtype=np.float64).reshape(-1, x.shape[-1])
+    return np.ascontiguousarray(numbers_of("rows", full)).reshape(-1, x.shape[-1])
 
 
 _COORDINATES = ("x", "y", "z", "rx", "ry", "rz")

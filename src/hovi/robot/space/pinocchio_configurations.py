@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -56,9 +57,9 @@ def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: 
     Raises InputError.
     """
     try:
-        vector = np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{name} must be {len(entries)} numbers, not {value!r}.") from error
+        vector = numbers_of(name, value).copy()
+    except InputError:
+        raise InputError(f"{name} must be {len(entries)} numbers, not {value!r}.") from None
     if vector.shape != (len(entries),):
         raise InputError(
             f"{name} has shape {vector.shape}, expected ({len(entries)},): "
