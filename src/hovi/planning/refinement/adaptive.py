@@ -148,9 +148,10 @@ class _Search:
         """Run the rounds after the first; returns why they ended early, or ""."""
         if self.restart is not None and _hides(candidate):
             candidate = self.best = self._evaluated(self.restart())
-        stalled = 0
+        stalled = alone = 0
         while not candidate.within_tolerance:
-            reason = self._stop_reason(candidate, stalled)
+            alone = alone + 1 if candidate.finer is None else 0
+            reason = self._stop_reason(candidate, stalled, alone)
             if reason:
                 return reason
             previous, candidate = candidate, self._next(candidate)
@@ -180,7 +181,7 @@ class _Search:
             self.on_round(done)
         return candidate
 
-    def _stop_reason(self, candidate: Candidate, stalled: int) -> str:
+    def _stop_reason(self, candidate: Candidate, stalled: int, alone: int) -> str:
         """Why no finer grid is tried; "" if one is."""
         raise_if_interrupted()
         solution = candidate.solution
@@ -194,7 +195,9 @@ class _Search:
             return f"{bound} allows no smaller error"
         whirling, nearly = candidate.whirl, candidate.difference <= MAX_ERROR_OF_DECAY
         grids = len(self.rounds)
-        if whirling is not None and whirling.is_hopeless(grids=grids, nearly_resolved=nearly):
+        if whirling is not None and whirling.is_hopeless(
+            grids=grids, alone=alone, nearly_resolved=nearly
+        ):
             return f"joint {whirling.joint!r} whirls at {whirling.speed:.3g} rad/s"
         if stalled >= MAX_STALLED_ROUNDS:
             return f"the last {MAX_STALLED_ROUNDS} grids did not reduce the error"

@@ -20,7 +20,13 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import error_of_cost
 from hovi.planning.refinement.error_estimate import finer_than, with_estimate, with_metadata
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import UNUSABLE_RATIO, whirl, whirl_without_minimum
+from hovi.planning.refinement.whirling import (
+    DOUBTFUL_RATIO,
+    MAX_WHIRLING_ERROR,
+    UNUSABLE_RATIO,
+    whirl,
+    whirl_without_minimum,
+)
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -96,7 +102,8 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
-    (d) no light joint without limits whirls faster than UNUSABLE_RATIO allows.
+    (d) no light joint without limits whirls faster than UNUSABLE_RATIO allows, or than
+        DOUBTFUL_RATIO in a motion whose error is above MAX_WHIRLING_ERROR.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -118,7 +125,7 @@ def resolved(solution: Solution) -> Solution:
 def _checked(solution: Solution) -> tuple[Solution, str]:
     """The solution with an estimate, and why it is no minimum along its way, or ""."""
     reason = _fault_on_curve(solution)
-    if not reason and solution.error_estimate is None:
+    if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason = _compared_with_finer(solution)
     elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
@@ -238,9 +245,14 @@ def _fault_of_whirling(solution: Solution) -> str:
     """Why (d) does not hold; "" if it does."""
     assert solution.problem is not None
     whirling = None if solution.problem.limited else whirl(solution)
-    if whirling is None or whirling.ratio <= UNUSABLE_RATIO:
+    if whirling is None:
         return ""
-    return f"at {whirling.speed:.3g} rad/s a finer grid may find another motion"
+    error = solution.error_estimate
+    near = _costs_nothing(solution) or error is None or error <= MAX_WHIRLING_ERROR
+    if whirling.ratio <= (UNUSABLE_RATIO if near else DOUBTFUL_RATIO):
+        return ""
+    known = "" if error is None else f", with an error of {100 * error:.2g} % of the cost,"
+    return f"at {whirling.speed:.3g} rad/s{known} a finer grid may find another motion"
 
 
 def _fault_of_estimate(estimate: float | None) -> str:

@@ -23,13 +23,20 @@ WHIRLING_RATIO = 10.0
 2 for a smooth motion from rest to rest."""
 MAX_GRIDS = 6
 """Maximum number of grids that are tried for a whirling motion."""
+MAX_GRIDS_ALONE = 3
+"""The same for grids in a row with no solution near theirs on a finer grid."""
 MAX_INERTIA_SHARE = 0.03
 """Largest inertia of a joint that counts as whirling, relative to that of the heaviest: the torque
 that spins a heavier one shows in the cost. `hovi info` warns of far lighter ones only."""
 HOPELESS_RATIO = 40.0
 """The same ratio above which finer grids are not tried for a motion that is not resolved."""
+DOUBTFUL_RATIO = 20.0
+"""The same ratio above which a grid is trusted only with an error below MAX_WHIRLING_ERROR."""
 UNUSABLE_RATIO = 60.0
 """The same ratio above which no grid is trusted: a minimum on one grid is none on a finer one."""
+MAX_WHIRLING_ERROR = 1e-3
+"""Largest relative error of the cost where a joint whirls fast: with more, grids finer than the one
+that it was compared with tend to find another motion."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +52,15 @@ class Whirl:
     ratio: float
     inertia: float
 
-    def is_hopeless(self, *, grids: int, nearly_resolved: bool) -> bool:
+    def is_hopeless(self, *, grids: int, alone: int, nearly_resolved: bool) -> bool:
         """Whether no finer grid is to be tried.
 
-        grids: number of those that were tried. nearly_resolved: whether the costs on the last one
-        and a finer one are close.
+        grids: number of those that were tried. alone: of the last ones in a row with no solution
+        nearby on a finer grid. nearly_resolved: whether the costs on the last one and a finer one
+        are close.
         """
         largest = UNUSABLE_RATIO if nearly_resolved else HOPELESS_RATIO
-        return self.ratio > largest or grids >= MAX_GRIDS
+        return self.ratio > largest or grids >= MAX_GRIDS or alone >= MAX_GRIDS_ALONE
 
     def __str__(self) -> str:
         """What it does, and what helps."""
@@ -93,7 +101,7 @@ def whirl_without_minimum(solution: Solution) -> Whirl | None:
     if solution.status is not Status.ITERATION_LIMIT or problem is None or problem.limited:
         return None
     found = whirl(solution)
-    hopeless = found is not None and found.is_hopeless(grids=0, nearly_resolved=False)
+    hopeless = found is not None and found.is_hopeless(grids=0, alone=0, nearly_resolved=False)
     return found if hopeless else None
 
 
