@@ -24,6 +24,7 @@ from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.refinement.next_grid import MAX_ERROR_OF_DECAY, interpolated_to, next_grid
+from hovi.planning.refinement.whirling import MAX_WORK
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -213,19 +214,25 @@ class _Search:
         assert problem is not None
         grid = next_grid(candidate)
         if finer is None:
-            return self._evaluated(self._solved(problem.on(grid), candidate.solution.trajectory))
+            fine = problem.on(grid)
+            return self._evaluated(self._solved(fine, candidate.solution.trajectory, candidate))
         if grid is finer.problem.grid:
             solution = finer.finish()
             fine = finer.problem
         else:
             fine = problem.on(grid)
             solution = _solved_nearby(finer, fine)
-        return self._evaluated(solution or self._solved(fine, interpolated_to(finer, fine)))
+        if solution is None:
+            solution = self._solved(fine, interpolated_to(finer, fine), candidate)
+        return self._evaluated(solution)
 
-    def _solved(self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath) -> Solution:
-        """Solve with the remaining time."""
-        steps = self.max_iterations
-        left = self.deadline.seconds_left
+    def _solved(
+        self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath, last: Candidate
+    ) -> Solution:
+        """Solve with the remaining time, from the last candidate's motion or a finer one."""
+        steps, left = self.max_iterations, self.deadline.seconds_left
+        if last.whirl is not None:
+            steps = min(steps, MAX_WORK // problem.grid.intervals)
         return solve_on_grid(problem, guess, max_iterations=steps, time_limit=left)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
