@@ -13,7 +13,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import misfit
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError, InputError, nearest
-from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 from hovi.schemes.polynomials import interval_rows
 
 Array = npt.NDArray[np.float64]
@@ -39,30 +39,30 @@ class Curve(Protocol):
         """The curve at t."""
 
 
-def cubic(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+def cubic(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
     """The cubic through both ends, x(t) of q0 (+) x: the minimizer of 1/2 |x''|^2.
 
     boundary: (q0, v0, q1, v1). duration: T, in [s].
     """
     q0, v0, q1, v1 = boundary
     T = duration
-    x1 = robot.difference(q0, q1)
-    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
+    x1 = coordinates.difference(q0, q1)
+    dx1 = coordinates.chart.rates(x1[None], v1[None])[0][0]
     local = np.stack([T * v0, x1 - T * v0, T * (dx1 - v0)])  # h v0, Z0, Z1
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
         jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
-        return _in_chart(robot, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
+        return _in_chart(coordinates, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
 
     return curve
 
 
-def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
+def minimum_jerk(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
     """The quintic through both ends with x'' = 0 there; arguments as for `cubic`."""
     q0, v0, q1, v1 = boundary
     T = duration
-    x1 = robot.difference(q0, q1)
-    dx1 = robot.chart.rates(x1[None], v1[None])[0][0]
+    x1 = coordinates.difference(q0, q1)
+    dx1 = coordinates.chart.rates(x1[None], v1[None])[0][0]
     power = np.arange(6)[:, None]
     conditions = np.zeros((6, 6))
     for row, (s, derivative) in enumerate([(0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2)]):
@@ -70,7 +70,7 @@ def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
             conditions[row, j] = np.prod(range(j - derivative + 1, j + 1)) * float(s) ** (
                 j - derivative
             )
-    zero = np.zeros(robot.nv)
+    zero = np.zeros(coordinates.nv)
     ends = np.stack([zero, T * v0, zero, x1, T * dx1, zero])
     c = np.linalg.solve(conditions, ends)  # (6, n)
 
@@ -79,19 +79,19 @@ def minimum_jerk(robot: Robot, boundary: Boundary, duration: float) -> Curve:
         x = (s**power).T @ c
         dx = (power[1:] * s ** power[:-1]).T @ c[1:]
         ddx = (power[2:] * power[1:-1] * s ** power[:-2]).T @ c[2:]
-        return _in_chart(robot, q0, x, dx / T, ddx / T**2)
+        return _in_chart(coordinates, q0, x, dx / T, ddx / T**2)
 
     return curve
 
 
 def _in_chart(
-    robot: Robot, q0: Array, x: Array, dx: Array, ddx: Array
+    coordinates: Coordinates, q0: Array, x: Array, dx: Array, ddx: Array
 ) -> tuple[Array, Array, Array]:
     """The jet of q0 (+) x(t)."""
-    return robot.chart.jet(np.broadcast_to(q0, (len(x), robot.nq)), x, dx, ddx)
+    return coordinates.chart.jet(np.broadcast_to(q0, (len(x), coordinates.nq)), x, dx, ddx)
 
 
-def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
+def with_bump(base: Curve, coordinates: Coordinates, duration: float, seed: int) -> Curve:
     """A curve plus a smooth random bump that vanishes with its rate at both ends.
 
     x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed,
@@ -102,7 +102,7 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
     random = np.random.default_rng(seed)
     j = np.arange(1, BUMP_MODES + 1)
     amplitude = random.uniform(*BUMP_AMPLITUDES)
-    c = amplitude * random.standard_normal((BUMP_MODES, robot.nv)) / np.sqrt(j)[:, None]
+    c = amplitude * random.standard_normal((BUMP_MODES, coordinates.nv)) / np.sqrt(j)[:, None]
     w = np.pi / duration
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
@@ -112,12 +112,12 @@ def with_bump(base: Curve, robot: Robot, duration: float, seed: int) -> Curve:
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
         ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
-        return robot.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
+        return coordinates.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
 
     return curve
 
 
-def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curve:
+def with_turns(base: Curve, coordinates: Coordinates, duration: float, turns: Array) -> Curve:
     """A curve plus full turns, distributed over the duration by a cubic at rest at both ends.
 
     turns: rotation vectors over 2 pi in the tangent space, shape (nv,): see `State.turns_on`.
@@ -128,21 +128,21 @@ def with_turns(base: Curve, robot: Robot, duration: float, turns: Array) -> Curv
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
-        return robot.chart.composed(
-            base(t), _modulo_period(robot, x * angle), dx * angle, ddx * angle
+        return coordinates.chart.composed(
+            base(t), _modulo_period(coordinates, x * angle), dx * angle, ddx * angle
         )
 
     return curve
 
 
-def _modulo_period(robot: Robot, x: Array) -> Array:
+def _modulo_period(coordinates: Coordinates, x: Array) -> Array:
     """Rotation vectors (M, nv) modulo 4 pi, the period of a quaternion.
 
     The rates of a chart are exact up to 2 pi only. About a fixed axis J(x) x' = x', so they are the
     same after the reduction.
     """
     left = x.copy()
-    for factor in robot.space.curved:
+    for factor in coordinates.space.curved:
         axes = [factor.v.start + i for i in factor.group.angular]
         size = np.linalg.norm(x[:, axes], axis=1, keepdims=True)
         full = 4 * np.pi * np.round(size / (4 * np.pi))
@@ -150,18 +150,18 @@ def _modulo_period(robot: Robot, x: Array) -> Array:
     return left
 
 
-NAMED: dict[str, Callable[[Robot, Boundary, float], Curve]] = {
+NAMED: dict[str, Callable[[Coordinates, Boundary, float], Curve]] = {
     "cubic": cubic,
     "minimum-jerk": minimum_jerk,
 }
 """Guesses by their name in files and on the command line."""
 
 
-def named_curve(name: str, robot: Robot, boundary: Boundary, duration: float) -> Curve:
+def named_curve(name: str, coordinates: Coordinates, boundary: Boundary, duration: float) -> Curve:
     """The guess with a name. Raises InputError for an unknown name."""
     if name not in NAMED:
         raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
-    return NAMED[name](robot, boundary, duration)
+    return NAMED[name](coordinates, boundary, duration)
 
 
 def stretched(trajectory: Trajectory, duration: float) -> Curve:
@@ -175,24 +175,26 @@ def stretched(trajectory: Trajectory, duration: float) -> Curve:
     return curve
 
 
-def path_on_grid(curve: Curve, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+def path_on_grid(
+    curve: Curve, grid: Grid, boundary: Boundary, coordinates: Coordinates
+) -> DiscretePath:
     """The curve on a grid: its nodes, and its acceleration projected on the inner modes.
 
     The ends are exactly the boundary data.
     """
     q, v, _ = (x.copy() for x in curve(grid.t))
     q[0], v[0], q[-1], v[-1] = boundary
-    rotation = None if robot.vector_joints else _rotation(curve, grid, robot)
-    inner = _inner_modes(curve, grid, robot, q)
-    return DiscretePath(q, v, regularized(robot, grid, q, v, rotation), inner)
+    rotation = None if coordinates.vector_joints else _rotation(curve, grid, coordinates)
+    inner = _inner_modes(curve, grid, coordinates, q)
+    return DiscretePath(q, v, regularized(coordinates, grid, q, v, rotation), inner)
 
 
-def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
-    """Raise InputError for a path that does not match its grid and robot, or is inconsistent."""
-    N, r, n = grid.intervals, grid.inner_modes, robot.nv
-    shapes = {"q": (N + 1, robot.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
+def check_path(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> None:
+    """Raise InputError for a path that does not match its grid, or contradicts itself."""
+    N, r, n = grid.intervals, grid.inner_modes, coordinates.nv
+    shapes = {"q": (N + 1, coordinates.nq), "v": (N + 1, n), "z": (N, 2, n), "inner": (N, r, n)}
     fits = [array.shape for array in path.arrays] == list(shapes.values())
-    if fits and robot.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT_TOLERANCE:
+    if fits and coordinates.vector_joints and misfit(path.arrays, grid.steps) <= MISFIT_TOLERANCE:
         return
     for name, shape in shapes.items():
         array = getattr(path, name)
@@ -202,8 +204,8 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
                 "pass a Trajectory to change grids."
             )
     h = grid.steps[:, None]
-    rotation = None if robot.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
-    gap = (regularized(robot, grid, path.q, path.v, rotation) - path.z) * h[..., None] ** 2
+    rotation = None if coordinates.vector_joints else h * path.v[:-1] + h**2 * path.z[:, 0]
+    gap = (regularized(coordinates, grid, path.q, path.v, rotation) - path.z) * h[..., None] ** 2
     if np.abs(gap).max() > MISFIT_TOLERANCE * max(1.0, np.abs(path.q).max()):
         raise InputError(
             "the guess's z does not match its q and v: on vector spaces "
@@ -211,13 +213,15 @@ def check_path(path: DiscretePath, grid: Grid, robot: Robot) -> None:
         )
 
 
-def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> DiscretePath:
+def moved(
+    path: DiscretePath, grid: Grid, boundary: Boundary, coordinates: Coordinates
+) -> DiscretePath:
     """A path plus the cubic that moves its ends to other boundary data."""
     q0, v0, q1, v1 = boundary
     old = path.q[0], path.v[0], path.q[-1], path.v[-1]
     if [x.tolist() for x in old] == [x.tolist() for x in boundary]:
         return path
-    dq0, dq1 = robot.difference(old[0], q0), robot.difference(old[2], q1)
+    dq0, dq1 = coordinates.difference(old[0], q0), coordinates.difference(old[2], q1)
     ends = np.stack([dq0, v0 - old[1], dq1, v1 - old[3]])  # (4, n)
     T, s = grid.duration, grid.t / grid.duration
     local = np.stack([T * ends[1], ends[2] - ends[0] - T * ends[1], T * (ends[3] - ends[1])])
@@ -226,15 +230,15 @@ def moved(path: DiscretePath, grid: Grid, boundary: Boundary, robot: Robot) -> D
     # for a cubic z1 is the mean acceleration, and z0 = a/2 + h j/6 with the jerk j
     jerk = np.diff(TTda, axis=0) / h
     z = np.stack([TTda[:-1] / 2 + h * jerk / 6, TTda[:-1] + h * jerk / 2], axis=1) / T**2
-    q = robot.integrate(path.q, ends[0] + dq)
+    q = coordinates.integrate(path.q, ends[0] + dq)
     q[0], q[-1] = q0, q1
     v = path.v + Tdv / T
     v[0], v[-1] = v0, v1
-    return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, robot)
+    return with_ends_of_nodes(DiscretePath(q, v, path.z + z, path.inner), grid, coordinates)
 
 
 def regularized(
-    robot: Robot, grid: Grid, q: Array, v: Array, rotation: Array | None = None
+    coordinates: Coordinates, grid: Grid, q: Array, v: Array, rotation: Array | None = None
 ) -> Array:
     """z0 = (x1 - h v0)/h^2 and z1 = (x1' - v0)/h of every interval, shape (N, 2, nv).
 
@@ -245,27 +249,27 @@ def regularized(
     h = grid.steps[:, None]
     dx1 = v[1:]
     if rotation is None:
-        x1 = robot.difference(q[:-1], q[1:])
+        x1 = coordinates.difference(q[:-1], q[1:])
     else:
-        x1 = robot.space.difference_near(q[:-1], q[1:], rotation)
-    if not robot.space.flat:
-        dx1 = robot.chart.rates(x1, dx1)[0]
+        x1 = coordinates.space.difference_near(q[:-1], q[1:], rotation)
+    if not coordinates.space.flat:
+        dx1 = coordinates.chart.rates(x1, dx1)[0]
     return np.stack([(x1 - h * v[:-1]) / h**2, (dx1 - v[:-1]) / h], axis=1)
 
 
-def with_ends_of_nodes(path: DiscretePath, grid: Grid, robot: Robot) -> DiscretePath:
+def with_ends_of_nodes(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> DiscretePath:
     """A path with z recomputed from its nodes on noncommutative groups, and unchanged elsewhere."""
-    if robot.space.flat:
+    if coordinates.space.flat:
         return path
     h = grid.steps[:, None]
     rotation = h * path.v[:-1] + h**2 * path.z[:, 0]
-    z, known = path.z.copy(), regularized(robot, grid, path.q, path.v, rotation)
-    for factor in robot.space.curved:
+    z, known = path.z.copy(), regularized(coordinates, grid, path.q, path.v, rotation)
+    for factor in coordinates.space.curved:
         z[:, :, factor.v] = known[:, :, factor.v]
     return DiscretePath(path.q, path.v, z, path.inner)
 
 
-def _rotation(curve: Curve, grid: Grid, robot: Robot) -> Array:
+def _rotation(curve: Curve, grid: Grid, coordinates: Coordinates) -> Array:
     """The integral of v over every interval, by Gauss quadrature, shape (N, nv).
 
     Raises ChartError if an orientation rotates by more than MAX_ROTATION in an interval.
@@ -273,24 +277,25 @@ def _rotation(curve: Curve, grid: Grid, robot: Robot) -> Array:
     x, w = np.polynomial.legendre.leggauss(ROTATION_POINTS)
     t = grid.t[:-1, None] + grid.steps[:, None] * (x + 1) / 2
     v = curve(t.ravel())[1].reshape(grid.intervals, ROTATION_POINTS, -1)
-    for factor in robot.space.curved:
+    for factor in coordinates.space.curved:
         speed = np.linalg.norm(v[:, :, [factor.v.start + i for i in factor.group.angular]], axis=2)
         turn = grid.steps * (speed @ (w / 2))  # (N,)
         if turn.max() > MAX_ROTATION:
+            joint = coordinates.joint_at(factor.v.start)
             raise ChartError(
-                f"the guess rotates joint {robot.joint_at(factor.v.start)!r} by {turn.max():.3g} "
-                f"rad within an interval, and a chart covers up to {MAX_ROTATION:.3g} rad: use "
+                f"the guess rotates joint {joint!r} by {turn.max():.3g} rad "
+                f"within an interval, and a chart covers up to {MAX_ROTATION:.3g} rad: use "
                 f"{int(np.ceil(grid.intervals * turn.max() / MAX_ROTATION))} or more intervals."
             )
     return np.asarray(grid.steps[:, None] * np.einsum("q,kqn->kn", w / 2, v))
 
 
-def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
+def _inner_modes(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Array) -> Array:
     """c_j = integral of b_j x'' over the interval, by Gauss quadrature, shape (N, r, n).
 
     nodes: configurations, shape (N + 1, nq).
     """
-    n = robot.nv
+    n = coordinates.nv
     inner = np.zeros((grid.intervals, grid.inner_modes, n))
     for scheme, index in grid.groups:
         r = scheme.inner_modes
@@ -299,9 +304,9 @@ def _inner_modes(curve: Curve, grid: Grid, robot: Robot, nodes: Array) -> Array:
         s, projection = _projection(r)
         t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
         q, v, a = curve(t.ravel())
-        if not robot.space.flat:
-            local = robot.difference(np.repeat(nodes[:-1][index], len(s), axis=0), q)
-            a = robot.chart.rates(local, v, a)[1]
+        if not coordinates.space.flat:
+            local = coordinates.difference(np.repeat(nodes[:-1][index], len(s), axis=0), q)
+            a = coordinates.chart.rates(local, v, a)[1]
         inner[index, :r] = np.matmul(projection, a.reshape(len(index), len(s), n))
     return inner
 

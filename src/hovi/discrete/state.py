@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError, nearest
-from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -51,38 +51,38 @@ class State:
                 f"{self.turns!r}."
             )
 
-    def on(self, robot: Robot, name: str) -> tuple[Array, Array]:
+    def on(self, coordinates: Coordinates, name: str) -> tuple[Array, Array]:
         """q and v as checked arrays.
 
         name: of the state in messages, such as "start".
         Raises InputError for wrong shapes and numbers that are not finite.
         """
-        q = robot.check_configuration(self.q, name)
-        v = np.zeros(robot.nv) if self.v is None else self.v
-        return q, robot.check_velocity(v, f"{name}.v")
+        q = coordinates.check_configuration(self.q, name)
+        v = np.zeros(coordinates.nv) if self.v is None else self.v
+        return q, coordinates.check_velocity(v, f"{name}.v")
 
-    def free_on(self, robot: Robot, name: str) -> Mask:
+    def free_on(self, coordinates: Coordinates, name: str) -> Mask:
         """Which components of q (in the tangent space) and of v are free, shape (2, nv).
 
         Raises InputError for an unknown joint, and for parts of a joint's configuration that cannot
         be free by themselves.
         """
         rows = [
-            _chosen_coordinates(robot, name, key, joints)
+            _chosen_coordinates(coordinates, name, key, joints)
             for key, joints in (("free", self.free), ("free_velocity", self.free_velocity))
         ]
-        for factor in robot.space.factors:
-            _check_part(robot, name, factor.v.start, rows[0][factor.v], factor.group.angular)
+        for factor in coordinates.space.factors:
+            _check_part(coordinates, name, factor.v.start, rows[0][factor.v], factor.group.angular)
         return np.stack(rows)
 
-    def turns_on(self, robot: Robot, name: str) -> Array:
+    def turns_on(self, coordinates: Coordinates, name: str) -> Array:
         """Rotation vectors over 2 pi in the tangent space, shape (nv,).
 
         Raises InputError for a joint without full turns, or turns that are not integers.
         """
-        full = np.zeros(robot.nv)
+        full = np.zeros(coordinates.nv)
         for joint, turns in self.turns.items():
-            indices = _rotation_indices(robot, name, joint)
+            indices = _rotation_indices(coordinates, name, joint)
             given = np.atleast_1d(np.asarray(turns, dtype=np.float64))
             size = float(np.linalg.norm(given)) if np.isfinite(given).all() else 0.5
             if given.shape != (len(indices),) or abs(size - round(size)) > 1e-9:
@@ -92,7 +92,9 @@ class State:
         return full
 
 
-def _check_part(robot: Robot, state: str, first: int, free: Mask, angular: Sequence[int]) -> None:
+def _check_part(
+    coordinates: Coordinates, state: str, first: int, free: Mask, angular: Sequence[int]
+) -> None:
     """Raise InputError for free parts of a configuration that are not invariant under motion.
 
     The position, one rotation, all rotations or everything can be free; other parts are coupled to
@@ -102,47 +104,48 @@ def _check_part(robot: Robot, state: str, first: int, free: Mask, angular: Seque
     linear = np.delete(free, list(angular))
     if turns.any() and not free.all() and (linear.any() or 1 < turns.sum() < len(turns)):
         raise InputError(
-            f"{state}.free: of joint {robot.joint_at(first)!r} only the position, one rotation, "
-            "all rotations or everything can be free."
+            f"{state}.free: of joint {coordinates.joint_at(first)!r} only the position, one "
+            "rotation, all rotations or everything can be free."
         )
 
 
-def _rotation_indices(robot: Robot, state: str, joint: str) -> list[int]:
+def _rotation_indices(coordinates: Coordinates, state: str, joint: str) -> list[int]:
     """Indices in v of the rotation of a joint that can make full turns."""
     rotations = {}
-    for factor in robot.space.factors:
-        name = robot.joint_at(factor.v.start)
+    for factor in coordinates.space.factors:
+        name = coordinates.joint_at(factor.v.start)
         rotations[name] = [factor.v.start + i for i in factor.group.angular]
     if joint not in rotations:
         known = nearest(str(joint), rotations) if rotations else "it has none."
         raise InputError(
-            f"{state}.turns: robot {robot.name!r} has no joint {joint!r} that can make full turns: "
+            f"{state}.turns: {coordinates.owner} has no joint {joint!r} that can make full turns: "
             f"{known}"
         )
     return rotations[joint]
 
 
-def _chosen_coordinates(robot: Robot, state: str, key: str, joints: Sequence[str]) -> Mask:
-    chosen = np.zeros(robot.nv, dtype=bool)
+def _chosen_coordinates(
+    coordinates: Coordinates, state: str, key: str, joints: Sequence[str]
+) -> Mask:
+    chosen = np.zeros(coordinates.nv, dtype=bool)
     for joint in joints:
         if joint == ALL:
-            return np.ones(robot.nv, dtype=bool)
-        if joint in robot.coordinate_names:
-            chosen[robot.coordinate_names.index(joint)] = True
+            return np.ones(coordinates.nv, dtype=bool)
+        if joint in coordinates.coordinate_names:
+            chosen[coordinates.coordinate_names.index(joint)] = True
             continue
-        if joint not in robot.joint_names:
-            hint = robot.hint(str(joint), (*robot.joint_names, ALL))
-            raise InputError(f"{state}.{key}: robot {robot.name!r} has no joint {joint!r}: {hint}")
-        member = robot.model.joints[robot.model.getJointId(joint)]
-        chosen[member.idx_v : member.idx_v + member.nv] = True
+        if joint not in coordinates.joint_names:
+            hint = coordinates.hint(str(joint), (*coordinates.joint_names, ALL))
+            raise InputError(f"{state}.{key}: {coordinates.owner} has no joint {joint!r}: {hint}")
+        chosen[coordinates.entries_of(joint)] = True
     return chosen
 
 
-def as_state(state: State | npt.ArrayLike | str, robot: Robot) -> State:
+def as_state(state: State | npt.ArrayLike | str, coordinates: Coordinates) -> State:
     """A configuration at rest or the name of a pose of the robot as a State; a State unchanged.
 
     Raises InputError for an unknown pose.
     """
     if isinstance(state, str):
-        return State(robot.pose(state))
+        return State(coordinates.pose(state))
     return state if isinstance(state, State) else State(state)

@@ -28,7 +28,8 @@ _TOLERANCE = 1e-12
 class StoredTorque:
     """Torques at the C Chebyshev points of each of N intervals.
 
-    values: joint effort, shape (N, C, nv), C >= 2, in [N m] or [N].
+    values: joint effort, shape (N, C, nv), C >= 2, in [N m] or [N]; (N, C, 0) for a motion without
+        torques, of a Lagrangian that has none.
     """
 
     values: Array
@@ -40,6 +41,11 @@ class StoredTorque:
                 f"stored torques need the shape (intervals, 2 or more points, nv), "
                 f"not {self.values.shape}."
             )
+
+    @classmethod
+    def none(cls, intervals: int) -> StoredTorque:
+        """No torques, on N intervals."""
+        return cls(np.zeros((intervals, 2, 0)))
 
     @classmethod
     def fit(cls, torque: Callable[[Index, Array], Array], intervals: int) -> StoredTorque:

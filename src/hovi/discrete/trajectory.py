@@ -42,7 +42,7 @@ class Sample(NamedTuple):
     q: configuration, shape (M, nq), in [rad] or [m].
     v: velocity, shape (M, nv), per [s].
     a: acceleration, shape (M, nv), per [s^2].
-    tau: joint effort, shape (M, nv), in [N m] or [N].
+    tau: joint effort, shape (M, nv), in [N m] or [N]; (M, 0) for a Lagrangian without torques.
     """
 
     q: Array
@@ -59,7 +59,8 @@ class Trajectory:
     grid: the intervals, each with its step and scheme.
     path: nodes, regularized coordinates and inner modes.
     momenta: p and p~ at the nodes, shape (N + 1, 2, nv).
-    scene: None for a loaded motion of a robot that was given as a Pinocchio model.
+    scene: None for a Lagrangian without one, and for a loaded motion of a robot that was given as
+        a Pinocchio model.
     metadata: JSON-compatible data about the origin (cost, status, versions), without wall times.
     torque: torques by interval if there is no scene to compute them.
     """
@@ -290,8 +291,8 @@ def _check_shapes(trajectory: Trajectory) -> None:
         "momenta": (trajectory.momenta, (N + 1, 2, nv)),
     }
     if trajectory.torque is not None:
-        points = trajectory.torque.values.shape[1]
-        expected["tau"] = (trajectory.torque.values, (N, points, nv))
+        points, given = trajectory.torque.values.shape[1:]
+        expected["tau"] = (trajectory.torque.values, (N, points, nv if given else 0))
     for name, (array, shape) in expected.items():
         if array.shape != shape:
             raise InputError(f"{name} has shape {array.shape}; the grid and robot need {shape}.")

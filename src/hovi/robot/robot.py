@@ -28,9 +28,9 @@ from hovi.robot.mass_matrix import check_mass_matrix
 from hovi.robot.mimic_model import Coupling, PortableModel, couplings_of
 from hovi.robot.source import RobotSource
 from hovi.robot.space import pinocchio_configurations as configuration
-from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace, configuration_space
-from hovi.robot.space.joint_kinds import LENGTH, Units, coordinate_units
+from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.space.joint_kinds import Units, coordinate_units
 from hovi.robot.srdf import Srdf, parse_srdf
 from hovi.robot.tip_frame import is_moved, tip_frames
 
@@ -39,7 +39,7 @@ Array = npt.NDArray[np.float64]
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(Coordinates):
     """A robot, created by `load_robot`.
 
     name: the user's name for it.
@@ -58,6 +58,11 @@ class Robot:
         return f"<Robot {self.name!r}: nq = {self.nq}, nv = {self.nv}>"
 
     # Sizes and names
+
+    @property
+    def owner(self) -> str:
+        """The robot by its name, for messages."""
+        return f"robot {self.name!r}"
 
     @cached_property
     def nq(self) -> int:
@@ -90,11 +95,6 @@ class Robot:
         """Units of q, v, a and tau at each coordinate, (nv,)."""
         return coordinate_units(self.model)
 
-    @property
-    def sliding(self) -> npt.NDArray[np.bool_]:
-        """Which coordinates are lengths rather than angles, (nv,)."""
-        return np.array([units == LENGTH for units in self.coordinate_units], dtype=bool)
-
     @cached_property
     def space(self) -> ConfigurationSpace:
         """The configuration space as a product of vector spaces and groups.
@@ -102,11 +102,6 @@ class Robot:
         Not valid if there are joints of an unsupported kind: see `unplanned_joints`.
         """
         return self._space[0]
-
-    @cached_property
-    def chart(self) -> Chart:
-        """The charts q0 (+) x of the configuration space."""
-        return Chart(self.space)
 
     @property
     def unplanned_joints(self) -> tuple[str, ...]:
@@ -131,8 +126,13 @@ class Robot:
         """The joint that the entry of v at an index belongs to. Raises InputError without one."""
         if not 0 <= index < self.nv:
             raise InputError(f"v has entries 0 to {self.nv - 1}, not {index}.")
-        pairs = ((n, self.model.joints[self.model.getJointId(n)]) for n in self.joint_names)
-        return next(n for n, joint in pairs if joint.idx_v <= index < joint.idx_v + joint.nv)
+        pairs = ((name, self.entries_of(name)) for name in self.joint_names)
+        return next(name for name, part in pairs if part.start <= index < part.stop)
+
+    def entries_of(self, joint: str) -> slice:
+        """The entries of v of one of the `joint_names`."""
+        member = self.model.joints[self.model.getJointId(joint)]
+        return slice(member.idx_v, member.idx_v + member.nv)
 
     @cached_property
     def manifold_joints(self) -> tuple[str, ...]:
@@ -144,11 +144,6 @@ class Robot:
     def vector_joints(self) -> bool:
         """Whether every joint has nq = nv, so that configurations form a vector space."""
         return not self.manifold_joints
-
-    @property
-    def curved_space(self) -> ConfigurationSpace | None:
-        """The configuration space; None if it is a vector space."""
-        return None if self.vector_joints else self.space
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
@@ -348,11 +343,6 @@ class Robot:
             configuration.entry_names(self.model, "nq"),
             configuration.manifold_hint(self.model),
         )
-
-    @check_arguments_except("v")
-    def check_velocity(self, v: npt.ArrayLike, name: str) -> Array:
-        """`v` as a finite float array (nv,). Raises InputError naming the joint."""
-        return configuration.check_vector(v, name, self.coordinate_names)
 
     def check_mass_matrix(self) -> None:
         """Raise ModelError if M(q) is singular to working precision."""

@@ -11,7 +11,9 @@ from hovi.dynamics.point_function import PointFunction
 from hovi.errors import InputError
 from hovi.robot.space import tangent
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -22,11 +24,21 @@ class CasadiLagrangian(Lagrangian):
     jet: symbols (q, v, a, ...), k + 1 columns of length n; q has length nq if there is a space.
     expression: L as a function of them. [ColomboFerraroMartin2016, section 2]
     space: the configuration space; None if it is a vector space.
+    time: the symbol of t, in [s], if L depends on it.
+    scene: of the robot whose motion L is about, if it is about one: its motions can be replayed,
+        and their torques sampled.
+    Raises InputError for jets of other shapes, and expressions of other symbols.
     """
 
     @check_arguments
     def __init__(
-        self, jet: list[ca.SX], expression: ca.SX, space: ConfigurationSpace | None = None
+        self,
+        jet: list[ca.SX],
+        expression: ca.SX,
+        space: ConfigurationSpace | None = None,
+        *,
+        time: ca.SX | None = None,
+        scene: Scene | None = None,
     ) -> None:
         if len(jet) < 2 or not all(each.is_column() and each.numel() for each in jet):
             raise InputError(
@@ -37,11 +49,13 @@ class CasadiLagrangian(Lagrangian):
         self.jet = list(jet)
         self.expression = expression
         self._space = space
+        self._timed, self.scene = time is not None, scene
         nothing = ca.SX(0, 1)
         symbols = jet[0], ca.vertcat(*jet[1:]), nothing, nothing
         hessian, gradient = tangent.hessian(expression, symbols, space)
-        self._value = PointFunction(ca.Function("L", jet, [expression]))
-        self._expand = PointFunction(ca.Function("L_expand", jet, [expression, gradient, hessian]))
+        arguments = jet if time is None else [*jet, time]
+        self._value = _point_function("L", arguments, [expression])
+        self._expand = _point_function("L_expand", arguments, [expression, gradient, hessian])
 
     @property
     def nq(self) -> int:
@@ -58,12 +72,45 @@ class CasadiLagrangian(Lagrangian):
         """The configuration space; None if it is a vector space."""
         return self._space
 
+    @property
+    def coordinates(self) -> Coordinates:
+        """Those of the scene's robot, or else q[0], q[1], ..."""
+        return super().coordinates if self.scene is None else self.scene.robot
+
+    @property
+    def timed(self) -> bool:
+        """Whether L depends on time."""
+        return self._timed
+
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """L at P points, shape (P,)."""
-        return self._value(*jet)[0]
+        return self._value(*self._arguments(jet, t))[0]
 
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
         """Value, gradient and Hessian: see Lagrangian.evaluate."""
-        value, gradient, hessian = self._expand(*jet)
+        value, gradient, hessian = self._expand(*self._arguments(jet, t))
         shape = (len(value), self.order + 1, self.nv)
         return value, gradient.reshape(shape), hessian.reshape(*shape, *shape[1:])
+
+    def _arguments(self, jet: tuple[Array, ...], t: Array | None) -> tuple[Array, ...]:
+        """The jet, and the times as a column if L depends on them."""
+        if not self.timed:
+            return jet
+        if t is None:
+            raise InputError("this Lagrangian depends on time: give t, one time per point.")
+        return *jet, t[:, None]
+
+
+def _point_function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> PointFunction:
+    """A function of points. Raises InputError for symbols that are no arguments."""
+    used, known = (
+        {str(symbol) for symbol in ca.symvar(ca.vertcat(*map(ca.vec, each)))}
+        for each in (results, arguments)
+    )
+    names = sorted(used - known)
+    if names:
+        raise InputError(
+            f"the expression of a Lagrangian has symbols that are not in its jet: "
+            f"{', '.join(names)}; pass that of time as `time`, and give all others a value."
+        )
+    return PointFunction(ca.Function(name, arguments, results))

@@ -15,6 +15,7 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
 from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms, add_weights
 from hovi.scene.squared_effort import expand_squares, predict, weighted_square
+from hovi.scene.terms import SceneTerms
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +26,10 @@ class EffortScene(Protocol):
     @property
     def robot(self) -> Robot:
         """The robot."""
+
+    @property
+    def terms(self) -> SceneTerms:
+        """The contributions of its effects."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +66,16 @@ class EffortLagrangian(Lagrangian):
     def space(self) -> ConfigurationSpace | None:
         """The robot's configuration space; None if it is a vector space."""
         return self.scene.robot.curved_space
+
+    @property
+    def coordinates(self) -> Robot:
+        """Those of the robot's joints."""
+        return self.scene.robot
+
+    @property
+    def timed(self) -> bool:
+        """Whether an effect depends on time."""
+        return bool(self.scene.terms.timed)
 
     @property
     def output_weight(self) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.coordinates import Coordinates, NamedCoordinates
 
 Array = npt.NDArray[np.float64]
 
@@ -83,6 +84,17 @@ class Lagrangian(ABC):
     def space(self) -> ConfigurationSpace | None:
         """The configuration space; None if it is a vector space."""
         return None
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The space and names of the coordinates: q[0], q[1], ... if they are nobody's joints."""
+        names = tuple(f"q[{i}]" for i in range(self.nv))
+        return NamedCoordinates(names, self.space or ConfigurationSpace((self.nv,)))
+
+    @property
+    def timed(self) -> bool:
+        """Whether L depends on time."""
+        return False
 
     @abstractmethod
     def value(self, *jet: Array, t: Array | None = None) -> Array:

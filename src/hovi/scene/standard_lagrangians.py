@@ -53,7 +53,7 @@ def mechanics(scene: Scene) -> CasadiLagrangian:
     if inertia is not None:
         A = ca.Function("A", [scene.terms.symbols.q], [inertia])(q)
         L += ca.bilin(A, v, v) / 2
-    return CasadiLagrangian([q, v], L, scene.robot.curved_space)
+    return CasadiLagrangian([q, v], L, scene.robot.curved_space, scene=scene)
 
 
 @check_arguments
@@ -72,4 +72,5 @@ def riemannian_cubic(scene: Scene) -> CasadiLagrangian:
     q, (v, a) = ca.SX.sym("q", scene.robot.nq), (ca.SX.sym(x, scene.robot.nv) for x in "va")
     force = functions.inverse_dynamics(q, v, a)
     covariant = ca.solve(functions.mass_matrix(q), force)
-    return CasadiLagrangian([q, v, a], ca.dot(force, covariant) / 2, scene.robot.curved_space)
+    L = ca.dot(force, covariant) / 2
+    return CasadiLagrangian([q, v, a], L, scene.robot.curved_space, scene=scene)

@@ -103,7 +103,9 @@ def _replay_json(replay: DynamicsReplay) -> dict[str, Any]:
     }
 
 
-def _peak(peak: Peak) -> str:
+def _peak(peak: Peak | None) -> str:
+    if peak is None:
+        return "unknown"
     return f"{peak.value:.4g} at {peak.joint}, {peak.t:.3g} s"
 
 

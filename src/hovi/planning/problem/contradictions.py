@@ -11,7 +11,7 @@ from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -26,14 +26,14 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     Checks the ends, the via points, and the mean velocities that the duration requires.
     """
     q0, v0, q1, v1 = problem.boundary
-    names, space = problem.robot.coordinate_names, problem.robot.space
+    names, space = problem.coordinates.coordinate_names, problem.coordinates.space
     q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
     for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
         for row in (0, 1):
             held = ~problem.free_ends[i, row]
-            sentence = _outside(problem.robot, end, row, state[row], limits, held)
+            sentence = _outside(problem.coordinates, end, row, state[row], limits, held)
             if sentence:
                 return sentence
     return (
@@ -45,8 +45,10 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
 
 def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
     """Which end exceeds a torque limit at rest, as the end of a sentence; "" if none does."""
+    if not problem.about_robot:
+        return ""
     q0, v0, q1, v1 = problem.boundary
-    zero = np.zeros((1, problem.robot.nv))
+    zero = np.zeros((1, problem.coordinates.nv))
     for i, (end, q, v) in enumerate((("start", q0, v0), ("goal", q1, v1))):
         if np.any(v != 0) or problem.free_ends[i].any():
             continue
@@ -57,20 +59,22 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
             bound = limits.upper[3, i] if tau[i] > 0 else limits.lower[3, i]
             return (
                 f"; holding the robot still at the {end} takes {tau[i]:.4g} "
-                f"{problem.robot.coordinate_units[i].tau} at joint "
-                f"{problem.robot.coordinate_names[i]!r}, whose limit is {bound:.4g}"
+                f"{problem.coordinates.coordinate_units[i].tau} at joint "
+                f"{problem.coordinates.coordinate_names[i]!r}, whose limit is {bound:.4g}"
             )
     return ""
 
 
-def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, held: Mask) -> str:
+def _outside(
+    coordinates: Coordinates, end: str, row: int, values: Array, limits: Limits, held: Mask
+) -> str:
     """Which prescribed component of an end's q or v is outside its limits; "" if none is."""
     outside = np.maximum(limits.lower[row] - values, values - limits.upper[row])
     outside = np.where(held, outside / limits.ranges[row], -np.inf)
     i = int(np.argmax(outside))
     if outside[i] <= limits.tolerance:
         return ""
-    name, unit = robot.coordinate_names[i], robot.coordinate_units[i][row]
+    name, unit = coordinates.coordinate_names[i], coordinates.coordinate_units[i][row]
     return (
         f"the {KIND_NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
         f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; change the "
@@ -80,14 +84,14 @@ def _outside(robot: Robot, end: str, row: int, values: Array, limits: Limits, he
 
 def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
     """Which via point is outside the limits; "" if none is."""
-    space, t = problem.robot.space, problem.grid.t
+    space, t = problem.coordinates.space, problem.grid.t
     for each in problem.conditions:
         via = each.condition
         if not isinstance(via, JointCondition):
             continue
         end = f"via point at {t[each.node]:g} s"
         for row, values in enumerate((space.coordinates(via.target), via.velocity)):
-            sentence = _outside(problem.robot, end, row, values, limits, via.held[row])
+            sentence = _outside(problem.coordinates, end, row, values, limits, via.held[row])
             if sentence:
                 return sentence
     return ""
@@ -121,7 +125,7 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
 def _duration_too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
     """Which joint cannot cover its distance at its velocity limit in time; "" if all can."""
     q0, _, q1, _ = problem.boundary
-    distance = problem.robot.difference(q0, q1)
+    distance = problem.coordinates.difference(q0, q1)
     T = problem.grid.duration
     fastest = np.where(distance >= 0, limits.upper[1], -limits.lower[1])
     needed = np.abs(distance) / np.maximum(fastest, 1e-300)
@@ -129,7 +133,7 @@ def _duration_too_short(problem: TrajectoryProblem, limits: Limits, names: tuple
     i = int(np.argmax(needed))
     if needed[i] <= T:
         return ""
-    units = problem.robot.coordinate_units[i]
+    units = problem.coordinates.coordinate_units[i]
     return (
         f"joint {names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}, which takes "
         f"{needed[i]:.4g} s at its velocity limit of {fastest[i]:.4g} {units.v}, longer than the "

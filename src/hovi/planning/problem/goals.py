@@ -17,6 +17,7 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +59,11 @@ class GoalState:
 
 
 def goal_state(
-    goal: State | FrameGoal, name: str, robot: Robot, near: Array, limits: Limits | None
+    goal: State | FrameGoal,
+    name: str,
+    coordinates: Coordinates,
+    near: Array,
+    limits: Limits | None,
 ) -> GoalState:
     """A state at the goal: the goal itself, or by inverse kinematics.
 
@@ -69,23 +74,25 @@ def goal_state(
         return GoalState(goal)
     if not isinstance(goal, FrameGoal):
         raise InputError(f"the {name} must be a State or a FrameGoal, got {type(goal).__name__}.")
-    reached = _solved_inverse_kinematics(robot, goal, near.tobytes(), limits)
+    if not isinstance(coordinates, Robot):
+        raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
+    reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
     state = State(reached.q, free=(ALL,), free_velocity=tuple(goal.free_velocity))
     reason = reached.reason and (
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
         f"move the {name} closer or give its FrameGoal a guess"
     )
-    return GoalState(state, (_condition(robot, goal),), reason)
+    return GoalState(state, (_condition(coordinates, goal),), reason)
 
 
-def via_conditions(via: Via, reached: GoalState, robot: Robot) -> tuple[Condition, ...]:
+def via_conditions(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Condition, ...]:
     """The equations of a via point. reached: a state that meets its goal."""
     if reached.conditions:
         return reached.conditions
-    q, v = reached.state.on(robot, "via")
-    held = ~reached.state.free_on(robot, "via")
+    q, v = reached.state.on(coordinates, "via")
+    held = ~reached.state.free_on(coordinates, "via")
     held[1] &= reached.state.v is not None
-    return (JointCondition(robot, q, v, held),)
+    return (JointCondition(coordinates, q, v, held),)
 
 
 @lru_cache(maxsize=256)

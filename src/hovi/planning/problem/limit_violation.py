@@ -10,6 +10,8 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
 from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.robot.space.coordinates import Coordinates
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
@@ -127,9 +129,14 @@ class _Side:
 
 def _outputs(trajectory: Trajectory, k: Index, s: Array) -> Array:
     """(q, v, a, tau) at relative positions s in intervals k, shape (M, 4, nv)."""
-    q, v, a, tau = trajectory.sample_intervals(k, s)
-    q = q if trajectory.space is None else trajectory.space.coordinates(q)
-    return np.stack([q, v, a, tau], axis=1)
+    return _stacked(trajectory.sample_intervals(k, s), trajectory.space)
+
+
+def _stacked(motion: Sample, space: ConfigurationSpace | None) -> Array:
+    """(q, v, a, tau), shape (M, 4, nv); zeros for the torques of a motion without any."""
+    q = motion.q if space is None else space.coordinates(motion.q)
+    tau = motion.tau if motion.tau.shape[1] > 0 else np.zeros_like(motion.v)
+    return np.stack([q, motion.v, motion.a, tau], axis=1)
 
 
 def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
@@ -155,7 +162,7 @@ def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
         return np.asarray(excess + 0.5 * bend > tolerance) & np.isfinite(excess)
 
 
-def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
+def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordinates) -> str:
     """The limit that is exceeded most: kind, joint, time, value and bound."""
     excess = excess_along(trajectory, limits)
     above = excess.upper.max() >= excess.lower.max()
@@ -166,9 +173,9 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, robot: Robot) -> str:
     value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
     bound = (limits.upper if above else limits.lower)[kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    unit = robot.coordinate_units[joint][kind]
+    unit = coordinates.coordinate_units[joint][kind]
     return (
-        f"the {KIND_NAMES[KINDS[kind]]} of joint {robot.coordinate_names[joint]!r} reaches "
+        f"the {KIND_NAMES[KINDS[kind]]} of joint {coordinates.coordinate_names[joint]!r} reaches "
         f"{value:.4g} {unit} at t = {t:.3g} s, its limit is {bound:.4g}"
     )
 
@@ -184,8 +191,5 @@ def closeness(trajectory: Trajectory, limits: Limits) -> Array:
 
 def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> npt.NDArray[np.bool_]:
     """Which of q, v, a and tau are at a bound, shape (M, 4, nv)."""
-    q = motion.q
-    if robot is not None and not robot.vector_joints:
-        q = robot.space.coordinates(q)
-    outputs = np.stack([q, motion.v, motion.a, motion.tau], axis=1)
+    outputs = _stacked(motion, None if robot is None else robot.curved_space)
     return np.asarray(limits.excess(outputs) >= -AT_LIMIT)

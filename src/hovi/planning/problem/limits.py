@@ -15,6 +15,7 @@ from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
@@ -122,9 +123,9 @@ class Limits:
         return Limits(self.lower + shift, self.upper - shift, self.tolerance)
 
 
-def no_limits(robot: Robot) -> Limits:
+def no_limits(coordinates: Coordinates) -> Limits:
     """Limits without any bound."""
-    shape = (4, robot.nv)
+    shape = (4, coordinates.nv)
     return Limits(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
@@ -141,38 +142,38 @@ def urdf_limits(robot: Robot) -> Limits:
     return Limits(lower, upper)
 
 
-def as_limits(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Limits:
+def as_limits(coordinates: Coordinates, limits: str | Limits | Mapping[str, Any]) -> Limits:
     """Limits from a name or a mapping, as `plan` and scene files accept them.
 
-    limits: "urdf", "none", a Limits, or a mapping with any of `base` ("urdf", the default, or
-        "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or a list of
-        numbers x for -x and x, a list of pairs (lower, upper), or a mapping from joint names to
-        either.
-    Raises InputError for unknown keys or joints and for bounds that do not fit the robot. Warns of
-    ranges of angles that look like degrees.
+    limits: "urdf" (of a robot), "none", a Limits, or a mapping with any of `base` ("urdf", the
+        default, or "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or
+        a list of numbers x for -x and x, a list of pairs (lower, upper), or a mapping from joint
+        names to either.
+    Raises InputError for unknown keys or joints and for bounds that do not fit the
+    coordinates. Warns of ranges of angles that look like degrees.
     """
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _warned_of_degrees(robot, _by_name(robot, limits))
+        return _warned_of_degrees(coordinates, _by_name(coordinates, limits))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
             raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
-    base = _by_name(robot, limits.get("base", "urdf"))
+    base = _by_name(coordinates, limits.get("base", "urdf"))
     lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):
-        for i, (low, high) in _entries(robot, kind, limits.get(kind, {})).items():
+        for i, (low, high) in _entries(coordinates, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
     lower[lower < -UNBOUNDED], upper[upper > UNBOUNDED] = -np.inf, np.inf
     chosen = Limits(lower, upper, _number(limits, "tolerance", TOLERANCE))
-    return _warned_of_degrees(robot, chosen.with_margin(_number(limits, "margin", 0.0)))
+    return _warned_of_degrees(coordinates, chosen.with_margin(_number(limits, "margin", 0.0)))
 
 
-def _warned_of_degrees(robot: Robot, limits: Limits) -> Limits:
+def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
     """The limits, after a warning if the ranges of angles look like degrees."""
     lower, upper = limits.lower[KINDS.index("q")], limits.upper[KINDS.index("q")]
-    suspicion = ranges_in_degrees(robot.coordinate_names, ~robot.sliding, lower, upper)
+    suspicion = ranges_in_degrees(coordinates.coordinate_names, ~coordinates.sliding, lower, upper)
     if suspicion:
         warnings.warn(f"{suspicion}; limits are in radians.", HoviWarning, stacklevel=3)
     return limits
@@ -185,40 +186,43 @@ def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
     return float(value)
 
 
-def _by_name(robot: Robot, name: Any) -> Limits:
-    known = {"urdf": urdf_limits, "none": no_limits}
-    if not isinstance(name, str) or name not in known:
+def _by_name(coordinates: Coordinates, name: Any) -> Limits:
+    if name == "none":
+        return no_limits(coordinates)
+    if name != "urdf":
         raise InputError(f"limits are 'urdf', 'none' or given by kind, not {name!r}.")
-    return known[name](robot)
+    if not isinstance(coordinates, Robot):
+        raise InputError(f"{coordinates.owner} has no URDF: limits need base = 'none' here.")
+    return urdf_limits(coordinates)
 
 
-def _entries(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
+def _entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
     """Bounds by index in v, from any of the accepted forms."""
-    found = _pairs(robot, kind, given)
-    if kind == "q" and not robot.vector_joints:
+    found = _pairs(coordinates, kind, given)
+    if kind == "q" and not coordinates.vector_joints:
         for i in found:
-            if i not in robot.space.plain[1] and isinstance(given, Mapping):
+            if i not in coordinates.space.plain[1] and isinstance(given, Mapping):
                 raise InputError(
-                    f"limits.q: {robot.coordinate_names[i]!r} has no position limits, as the "
+                    f"limits.q: {coordinates.coordinate_names[i]!r} has no position limits, as the "
                     "joint is continuous or floating; leave it out."
                 )
-        found = {i: pair for i, pair in found.items() if i in robot.space.plain[1]}
+        found = {i: pair for i, pair in found.items() if i in coordinates.space.plain[1]}
     return found
 
 
-def _pairs(robot: Robot, kind: str, given: Any) -> dict[int, tuple[float, float]]:
-    names = robot.coordinate_names
+def _pairs(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:
+    names = coordinates.coordinate_names
     if isinstance(given, Mapping):
         for name in given:
             if name not in names:
                 raise InputError(
-                    f"limits.{kind}: robot {robot.name!r} has no joint {name!r}: "
-                    f"{robot.hint(str(name), names)}"
+                    f"limits.{kind}: {coordinates.owner} has no joint {name!r}: "
+                    f"{coordinates.hint(str(name), names)}"
                 )
         return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
     if isinstance(given, float | int | np.number):
-        given = [given] * robot.nv
-    if not isinstance(given, Sequence | np.ndarray) or len(given) != robot.nv:
+        given = [given] * coordinates.nv
+    if not isinstance(given, Sequence | np.ndarray) or len(given) != coordinates.nv:
         raise InputError(
             f"limits.{kind} must have one entry for each of {', '.join(names)}, got {given!r}."
         )

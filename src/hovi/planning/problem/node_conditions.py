@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import pinocchio as pin
 
-from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
 
@@ -62,7 +61,7 @@ class JointCondition(Condition):
     are prescribed, shape (2, nv).
     """
 
-    robot: Robot
+    coordinates: Coordinates
     target: Array
     velocity: Array
     held: npt.NDArray[np.bool_]
@@ -74,10 +73,12 @@ class JointCondition(Condition):
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         """The prescribed components of (q (-) target, v - velocity), and their Jacobian."""
-        n = self.robot.nv
+        n = self.coordinates.nv
         J = np.eye(2 * n).reshape(2, n, 2, n)
-        if not self.robot.vector_joints:
-            J[0, :, 0] = pin.dDifference(self.robot.model, self.target, q, pin.ARG1)
+        if not self.coordinates.vector_joints:
+            J[0, :, 0] = self.coordinates.chart.end_slope(
+                self.coordinates.difference(self.target, q)
+            )
         return self._error(q, v)[self.held], J[self.held]
 
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
@@ -90,8 +91,8 @@ class JointCondition(Condition):
         error = np.abs(self._error(q, v)) * self.held
         row, i = np.unravel_index(int(np.argmax(error)), error.shape)
         kind = ("position", "velocity")[row]
-        joint = self.robot.coordinate_names[i]
+        joint = self.coordinates.coordinate_names[i]
         return f"the {kind} of joint {joint!r} misses it by {error[row, i]:.3g}"
 
     def _error(self, q: Array, v: Array) -> Array:
-        return np.stack([self.robot.difference(self.target, q), v - self.velocity])
+        return np.stack([self.coordinates.difference(self.target, q), v - self.velocity])

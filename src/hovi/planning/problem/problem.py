@@ -6,6 +6,7 @@ import copy
 import dataclasses
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import Boundary, Curve, path_on_grid
 from hovi.discrete.state import State
+from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, ModelError
 from hovi.planning.clearance.clearance import Clearance
@@ -28,6 +30,7 @@ from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
 from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.scene import Scene, require_known_joints
 from hovi.schemes import require_regular
 
@@ -48,7 +51,7 @@ class TrajectoryProblem:
     D2 L_d(k) + D4 L_d(k-1) = 0 at the inner nodes are its first-order conditions.
     [ColomboFerraroMartin2016, section 3]
 
-    ld: the discrete Lagrangian on a grid; its Lagrangian belongs to a scene.
+    ld: the discrete Lagrangian on a grid, of order 2: the effort of a scene, or any other.
     start: state at t = 0. goal: state at t = T, or a task-space goal.
     limits: bounds along the motion; none if None.
     via: via points, at nodes of the grid.
@@ -76,43 +79,48 @@ class TrajectoryProblem:
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
-        require_plannable(self.scene)
+        _require_order_of(self.ld)
+        if self.about_robot:
+            require_plannable(self.scene)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
             raise InputError("passive joints need a Lagrangian of torques: leave them out.")
-        robot, N = self.robot, self.grid.intervals
-        start = self.start.on(robot, "start")
-        end = goal_state(self.goal, "goal", robot, start[0], self.limits)
-        goal = end.state.on(robot, "goal")
+        coordinates, N = self.coordinates, self.grid.intervals
+        start = self.start.on(coordinates, "start")
+        end = goal_state(self.goal, "goal", coordinates, start[0], self.limits)
+        goal = end.state.on(coordinates, "goal")
         conditions = [NodeCondition(N, condition) for condition in end.conditions]
         unreachable = end.reason
         for via in self.via:
             reached = goal_state(
-                via.goal, f"via point at {via.time:g} s", robot, start[0], self.limits
+                via.goal, f"via point at {via.time:g} s", coordinates, start[0], self.limits
             )
             node = self.grid.node_at(via.time)
             conditions += [
-                NodeCondition(node, each) for each in via_conditions(via, reached, robot)
+                NodeCondition(node, each) for each in via_conditions(via, reached, coordinates)
             ]
             unreachable = unreachable or reached.reason
-        free = self.start.free_on(robot, "start"), end.state.free_on(robot, "goal")
+        free = (
+            self.start.free_on(coordinates, "start"),
+            end.state.free_on(coordinates, "goal"),
+        )
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
-        unreachable = unreachable or free_fall_contradiction(
-            self.scene, self.boundary, self.free_ends, self.grid.duration
-        )
+        if self.about_robot:
+            unreachable = unreachable or free_fall_contradiction(
+                self.scene, self.boundary, self.free_ends, self.grid.duration
+            )
+            known = without_redundancy(self.scene, goal[1], self.free_ends)
+            object.__setattr__(self, "free_ends", known)
         object.__setattr__(self, "unreachable", unreachable)
-        object.__setattr__(
-            self, "free_ends", without_redundancy(self.scene, goal[1], self.free_ends)
-        )
-        object.__setattr__(self, "turns", end.state.turns_on(robot, "goal"))
+        object.__setattr__(self, "turns", end.state.turns_on(coordinates, "goal"))
         _ = self.distances  # raises for missing collision shapes
 
     @cached_property
     def structure(self) -> ActionStructure:
         """Block structure of the action's Hessian on this grid."""
         free = self.free_ends if self.free_ends.any() else None
-        return ActionStructure(self.grid, self.robot.nv, free)
+        return ActionStructure(self.grid, self.coordinates.nv, free)
 
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
@@ -143,22 +151,32 @@ class TrajectoryProblem:
     def path(self, curve: Curve) -> DiscretePath:
         """A curve sampled on the grid, with the problem's ends in fixed components."""
         q, v, _ = curve(np.array([0.0, self.grid.duration]))
-        return path_on_grid(curve, self.grid, self.ends(q, v), self.robot)
+        return path_on_grid(curve, self.grid, self.ends(q, v), self.coordinates)
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
         momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
-        return Trajectory(self.grid, path, momenta, self.scene)
+        return self.motion(path, momenta, {})
+
+    def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
+        """A path on the grid as a trajectory; arguments as for Trajectory."""
+        if self.about_robot:
+            return Trajectory(self.grid, path, momenta, self.scene, metadata)
+        metadata = {**metadata, "coordinates": list(self.coordinates.coordinate_names)}
+        if self.coordinates.curved_space is not None:
+            metadata["space"] = list(self.coordinates.space.parts)
+        none = StoredTorque.none(self.grid.intervals)
+        return Trajectory(self.grid, path, momenta, None, metadata, none)
 
     def ends(self, q: Array, v: Array) -> Boundary:
         """The boundary data, with free components from the ends of q (M, nq) and v (M, nv)."""
         q0, v0, q1, v1 = self.boundary
         if not self._has_free_ends:
             return self.boundary
-        robot, free = self.robot, self.free_ends
+        on, free = self.coordinates, self.free_ends
         q = np.stack(
             [
-                robot.integrate(a, np.where(free[i, 0], robot.difference(a, b), 0.0))
+                on.integrate(a, np.where(free[i, 0], on.difference(a, b), 0.0))
                 for i, (a, b) in enumerate(((q0, q[0]), (q1, q[-1])))
             ]
         )
@@ -167,14 +185,19 @@ class TrajectoryProblem:
 
     @cached_property
     def inertial_torque(self) -> float:
-        """max diag M(q0) / T^2: torque scale of a motion by 1 rad or 1 m, in [N m] or [N]."""
+        """max diag M(q0) / T^2: torque scale of a motion by 1 rad or 1 m, in [N m] or [N].
+
+        0 without a robot.
+        """
+        if not self.about_robot:
+            return 0.0
         mass = MassMatrix(self.scene.model)(self.boundary[0][None])[0]
         return float(np.max(np.diag(mass))) / self.grid.duration**2
 
     @property
     def passive(self) -> npt.NDArray[np.intp]:
         """Indices in v of the passive joints."""
-        return self.scene.passive_coordinates
+        return self.scene.passive_coordinates if self.about_robot else np.zeros(0, np.intp)
 
     @cached_property
     def torque_moments(self) -> TorqueMoments | None:
@@ -213,18 +236,41 @@ class TrajectoryProblem:
         """The grid of the motion."""
         return self.ld.grid
 
+    @cached_property
+    def about_robot(self) -> bool:
+        """Whether the Lagrangian belongs to a scene, and so to a robot."""
+        return isinstance(getattr(self.ld.lagrangian, "scene", None), Scene)
+
     @property
     def scene(self) -> Scene:
-        """The scene that the Lagrangian belongs to."""
-        scene = getattr(self.ld.lagrangian, "scene", None)
-        if isinstance(scene, Scene):
+        """The scene that the Lagrangian belongs to. Raises InputError if it is about no robot."""
+        if self.about_robot:
+            scene: Scene = self.ld.lagrangian.scene  # type: ignore[attr-defined]
             return scene
-        raise InputError("a trajectory problem needs the effort Lagrangian of a Scene.")
+        raise InputError(
+            "frames, obstacles, passive joints and tolerances in lengths need a robot, and this "
+            "problem's Lagrangian is about none: use one of a Scene."
+        )
 
     @property
     def robot(self) -> Robot:
-        """The robot of the scene."""
+        """The robot of the scene. Raises InputError as `scene` does."""
         return self.scene.robot
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """The robot, or the coordinates of a Lagrangian that is about none."""
+        return self.scene.robot if self.about_robot else self.ld.lagrangian.coordinates
+
+
+def _require_order_of(ld: DiscreteLagrangian) -> None:
+    """Raise InputError for a Lagrangian that is not of order 2."""
+    order = ld.lagrangian.order
+    if order != 2:
+        raise InputError(
+            f"a trajectory problem takes Lagrangians of order 2, this one is of order {order}: use "
+            "hovi.flow for its initial value problem."
+        )
 
 
 @lru_cache(maxsize=64)

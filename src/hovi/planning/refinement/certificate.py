@@ -71,7 +71,7 @@ class Certificate:
     errors: MotionError | None
     hamiltonian: NodalHamiltonian | None
     residual: float | None
-    torque: Peak
+    torque: Peak | None
     velocity: Peak
     replay: DynamicsReplay | None
     missing: dict[str, str] = field(default_factory=dict)
@@ -106,7 +106,8 @@ def certify(
     problem, trajectory = solution.problem, solution.trajectory
     if problem is None:
         raise InputError("this solution has no problem; call plan again instead.")
-    problem.robot.measured_frames(frame)  # raises for a frame that is unknown or fixed
+    if problem.about_robot or frame is not None:
+        problem.robot.measured_frames(frame)  # raises for a frame that is unknown or fixed
     missing: dict[str, str] = {}
     deadline, report = Deadline(time_limit), progress or (lambda name: None)
 
@@ -121,6 +122,8 @@ def certify(
             return None
 
     torque, velocity = _peaks(trajectory)
+    if torque is None:
+        missing["torque"] = "the motion has no torques"
     integral = integral_along(problem.ld.lagrangian, trajectory)
     return Certificate(
         status=solution.status,
@@ -190,14 +193,15 @@ def _is_measured_at(frame: str | None, solution: Solution) -> bool:
     return of(frame) == of(accuracy.tolerance.frame)
 
 
-def _peaks(trajectory: Trajectory) -> tuple[Peak, Peak]:
-    """The largest torque and velocity, from samples of every interval."""
+def _peaks(trajectory: Trajectory) -> tuple[Peak | None, Peak]:
+    """The largest torque, if there are any, and velocity, from samples of every interval."""
     N = trajectory.grid.intervals
     k = np.repeat(np.arange(N), PEAK_SAMPLES)
     s = np.tile(np.linspace(0.0, 1.0, PEAK_SAMPLES), N)
     motion = trajectory.sample_intervals(k, s)
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    return _peak(motion.tau, trajectory, t), _peak(motion.v, trajectory, t)
+    torque = _peak(motion.tau, trajectory, t) if motion.tau.size else None
+    return torque, _peak(motion.v, trajectory, t)
 
 
 def _peak(values: Array, trajectory: Trajectory, t: Array) -> Peak:

@@ -33,7 +33,7 @@ def interpolated_slopes(
     for jet, t, numbers in parts:
         scheme = ld.grid.schemes[numbers[0]]
         points = len(scheme.points)
-        y = lagrangian.output(*jet, t=t).reshape(-1, points, m)
+        y = lagrangian.output(*jet, t=t).reshape(len(t) // points, points, m)
         series[numbers[::points], :points] = scheme.series @ y
     nodes, slopes = ld.grid.t, []
     for t in other.point_times:

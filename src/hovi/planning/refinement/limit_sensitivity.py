@@ -40,7 +40,7 @@ def cost_of_tolerance(solution: Solution) -> float:
 def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:
     """Ranges of (q, v, a), shape (3 nv,), and of the outputs; 0 where there is no limit."""
     outputs = len(problem.ld.lagrangian.output_weight)
-    limits, nv = problem.limits, problem.robot.nv
+    limits, nv = problem.limits, problem.coordinates.nv
     ranges = np.zeros((4, nv))
     if limits is not None:
         ranges[limits.bounded] = limits.ranges[limits.bounded]

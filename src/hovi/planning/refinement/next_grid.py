@@ -47,7 +47,7 @@ def next_grid(candidate: Candidate) -> Grid:
     change = rho**MORE_MODES
     if usable and all(demand.remaining(change) <= FINER_GRID_RATIO for demand in demands):
         return finer.problem.grid
-    grid = refined(problem.grid, rho, demands, problem.robot.nv, decay_known, few_points)
+    grid = refined(problem.grid, rho, demands, problem.coordinates.nv, decay_known, few_points)
     if not _same_grid(grid, problem.grid):
         return grid
     if decay_known or grid.inner_modes < UNRESOLVED_MODES:

@@ -51,7 +51,7 @@ def nodal_hamiltonian(problem: TrajectoryProblem, trajectory: Trajectory) -> Nod
         raise InputError("with limits a does not follow from p~ alone")
     if problem.constrained:
         raise InputError("with equality constraints a does not follow from p~ alone")
-    if problem.scene.terms.timed:
+    if problem.ld.lagrangian.timed:
         raise InputError("the cost or the torques depend on time, and so does H")
     lagrangian, p = problem.ld.lagrangian, trajectory.momenta
     a = _accelerations(lagrangian, trajectory)

@@ -172,7 +172,7 @@ class Resolution:
         change = abs(solution.cost - self.cost)
         if path.q.shape != self.path.q.shape or change > NEARBY_COST * abs(self.cost):
             return False
-        dq = problem.robot.difference(self.path.q, path.q)
+        dq = problem.coordinates.difference(self.path.q, path.q)
         dv = problem.grid.duration * (path.v - self.path.v)
         return bool(max(np.abs(dq).max(), np.abs(dv).max()) <= NEARBY)
 

@@ -6,6 +6,7 @@ With equality constraints it is their augmented Lagrangian, see hovi.planning.so
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -25,7 +26,6 @@ from hovi.optimize.trust_region import Objective
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.multipliers import Multipliers, Residuals, node_residuals
-from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,6 @@ MAX_BAND_INTERVALS = 1000
 _expand = without_checks(DiscreteLagrangian.expand)
 _jets = without_checks(DiscreteLagrangian.jets)
 _predict = without_checks(DiscreteLagrangian.predict)
-_integrate = without_checks(Robot.integrate)
 _new_path = without_checks(DiscretePath)
 
 
@@ -70,6 +69,8 @@ class ActionObjective(Objective[DiscretePath]):
         self.problem = problem
         self.multipliers = multipliers
         self.moments = problem.torque_moments
+        on = problem.coordinates
+        self._integrate = partial(without_checks(type(on).integrate), on)
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= MAX_BAND_INTERVALS
@@ -147,7 +148,7 @@ class ActionObjective(Objective[DiscretePath]):
     def residuals(self, x: DiscretePath) -> Residuals:
         """Residuals of the equality constraints."""
         torques = self.outputs(x)
-        largest = max(self._least_torque(x), *(float(np.max(np.abs(tau))) for tau in torques))
+        largest = max(self._least_torque(x), *(np.abs(tau).max(initial=0.0) for tau in torques))
         if self.moments is None:
             passive = [tau[:, self.problem.passive] for tau in torques]
         else:
@@ -264,10 +265,10 @@ class ActionObjective(Objective[DiscretePath]):
         """The path moved by a step: nodes by `integrate`, everything else added."""
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
-        path = _new_path(_integrate(self.problem.robot, x.q, dq), *moved)
+        path = _new_path(self._integrate(x.q, dq), *moved)
         if self.ld.chart is None:
             return path
-        return with_ends_of_nodes(path, self.problem.grid, self.problem.robot)
+        return with_ends_of_nodes(path, self.problem.grid, self.problem.coordinates)
 
     def relative_size(self, x: DiscretePath, step: Array, model: QuadraticModel) -> float:
         """The largest change of q, T v or h^2 c, relative to that of q and T v (at least one)."""

@@ -69,5 +69,5 @@ def _first_non_finite(values: npt.NDArray[Any]) -> tuple[int, ...] | None:
 
 
 def _joint(problem: TrajectoryProblem, i: int) -> str:
-    names = problem.robot.coordinate_names
+    names = problem.coordinates.coordinate_names
     return f"joint {names[min(i, len(names) - 1)]!r}"

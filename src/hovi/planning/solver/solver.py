@@ -26,7 +26,7 @@ from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
-from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline, OutOfTimeError
@@ -108,13 +108,13 @@ class Solution:
             raise InputError("this solution has no problem; call plan again instead.")
         old = self.problem
         problem = old.between(
-            old.start if start is None else as_state(start, old.robot),
-            old.goal if goal is None else _as_goal(goal, old.robot),
+            old.start if start is None else as_state(start, old.coordinates),
+            old.goal if goal is None else _as_goal(goal, old.coordinates),
         )
         origin = self if guess is None else guess
         path = origin.trajectory.path
         if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
-            path = moved(path, problem.grid, problem.boundary, problem.robot)
+            path = moved(path, problem.grid, problem.boundary, problem.coordinates)
         if problem.limited or not problem.plain:
             found = solve_on_grid(problem, path, **options)
         else:
@@ -123,8 +123,10 @@ class Solution:
         return found if self.check is None else self.check(found)
 
 
-def _as_goal(goal: State | FrameGoal | npt.ArrayLike | str, robot: Robot) -> State | FrameGoal:
-    return goal if isinstance(goal, FrameGoal) else as_state(goal, robot)
+def _as_goal(
+    goal: State | FrameGoal | npt.ArrayLike | str, coordinates: Coordinates
+) -> State | FrameGoal:
+    return goal if isinstance(goal, FrameGoal) else as_state(goal, coordinates)
 
 
 @check_arguments
@@ -183,7 +185,7 @@ def _trajectory(result: MethodResult) -> Trajectory:
         metadata["clearance"] = problem.clearance.to_dict()
     derivatives = problem.ld.derivatives(result.path, result.forces, result.jets)
     momenta = accumulated_momenta(derivatives)
-    return Trajectory(problem.grid, result.path, momenta, problem.scene, metadata)
+    return problem.motion(result.path, momenta, metadata)
 
 
 def _solution(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
@@ -227,18 +229,18 @@ def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> Me
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
     """A guess as a path on the problem's grid, with the problem's boundary data."""
-    robot, grid, boundary = problem.robot, problem.grid, problem.boundary
+    coordinates, grid, boundary = problem.coordinates, problem.grid, problem.boundary
     if isinstance(guess, DiscretePath):
-        check_path(guess, grid, robot)
-        return moved(guess, grid, problem.ends(guess.q, guess.v), robot)
+        check_path(guess, grid, coordinates)
+        return moved(guess, grid, problem.ends(guess.q, guess.v), coordinates)
     if isinstance(guess, str):
-        curve = named_curve(guess, robot, boundary, grid.duration)
+        curve = named_curve(guess, coordinates, boundary, grid.duration)
         if problem.turns.any():
-            curve = with_turns(curve, robot, grid.duration, problem.turns)
+            curve = with_turns(curve, coordinates, grid.duration, problem.turns)
         return problem.path(curve)
-    if guess.v.shape[1] != robot.nv:
+    if guess.v.shape[1] != coordinates.nv:
         raise InputError(
-            f"the guess has {guess.v.shape[1]} velocities, but robot {robot.name!r} has "
-            f"{robot.nv}; use a motion of the same robot."
+            f"the guess has {guess.v.shape[1]} velocities, but {coordinates.owner} has "
+            f"{coordinates.nv}; use a motion of the same one."
         )
     return problem.path(stretched(guess, grid.duration))

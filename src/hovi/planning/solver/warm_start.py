@@ -30,7 +30,7 @@ def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 
         H and need one gradient each.
     """
     ends = problem.ends(solved.q, solved.v)
-    path = moved(solved, problem.grid, ends, problem.robot)
+    path = moved(solved, problem.grid, ends, problem.coordinates)
     if not problem.plain:
         return path
     objective = ActionObjective(problem)
@@ -68,7 +68,7 @@ def _columns(objective: ActionObjective, old: DiscretePath, new: DiscretePath) -
     """Change of the intervals' columns between two paths, 0 for inner modes, shape (N, m, n)."""
     problem = objective.problem
     h = problem.grid.steps[:, None]
-    dq, dv = problem.robot.difference(old.q, new.q), new.v - old.v
+    dq, dv = problem.coordinates.difference(old.q, new.q), new.v - old.v
     change = np.zeros((len(h), 4 + problem.grid.inner_modes, dv.shape[1]))
     change[:, 0], change[:, 1] = dq[:-1], h * dv[:-1]
     if objective.coordinates == "nodal":

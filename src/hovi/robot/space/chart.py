@@ -50,6 +50,11 @@ class Chart:
         columns = self.rates(-np.repeat(x, n, axis=0), each)[0]  # of J(-x)^-1
         return -columns.reshape(P, n, n).swapaxes(1, 2)
 
+    def end_slope(self, x: Array) -> Array:
+        """d(q1 (-) q0) / dq1 in the tangent space at q1, where x = q1 (-) q0, (nv, nv)."""
+        n = len(x)
+        return np.asarray(self.rates(np.tile(x, (n, 1)), np.eye(n))[0].T)
+
     def composed(self, jet: Jet, x: Array, dx: Array, ddx: Array) -> Jet:
         """(q, v, a) of q(t) (+) x(t) for a curve q(t) with the jet (q, v, a)."""
         q, v, a = jet

@@ -168,7 +168,7 @@ class BoundedSearch:
                 approach = approach_along(trajectory, distances, least)
                 margin = least - self.limits.tolerance * DISTANCE_SCALE
                 return approach_sentence(trajectory, distances, approach, margin)
-        sentence = worst_sentence(trajectory, self.limits, self.problem.robot)
+        sentence = worst_sentence(trajectory, self.limits, self.problem.coordinates)
         return sentence + static_sentence(self.problem, self.limits)
 
 

@@ -117,7 +117,7 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
     T = problem.grid.duration
     base = stretched(search.problem.trajectory(search.guess), T)
     for seed in range(BUMPED_GUESSES):
-        yield problem.path(with_bump(base, problem.robot, T, seed))
+        yield problem.path(with_bump(base, problem.coordinates, T, seed))
 
 
 def _penalized(

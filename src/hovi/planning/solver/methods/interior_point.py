@@ -38,7 +38,7 @@ class InteriorPoint(Method):
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; the guess may violate the limits, and intervals may be split."""
-        limits = problem.limits or no_limits(problem.robot)
+        limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:
             value = problem.ld.action(path)
