@@ -20,7 +20,7 @@ INNER_FLOOR = {
     for inner in folders
 }
 EFFORT = {("scene", name) for name in ("cost_terms", "effort_lagrangian", "squared_effort")}
-PUBLIC = {("accuracy",), ("effects",), ("schemes",)}
+PUBLIC = {("accuracy",), ("effects",), ("schemes",), ("symbolic",)}
 MAX_LINES = 400
 MAX_FILES = 15
 FAMILIES = {("effects",)}

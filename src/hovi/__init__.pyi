@@ -3,6 +3,7 @@
 from . import accuracy as accuracy
 from . import effects as effects
 from . import schemes as schemes
+from . import symbolic as symbolic
 from .discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
 from .discrete.grid import DiscretePath as DiscretePath
 from .discrete.grid import Grid as Grid

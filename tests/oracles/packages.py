@@ -22,7 +22,7 @@ FLOORS = [
     {"scene"},
     {"discrete"},
     {"flows"},
-    {"planning"},
+    {"planning", "symbolic"},
     {"viewing"},
     {"accuracy", "exchange"},
     {"cli"},

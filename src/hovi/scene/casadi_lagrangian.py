@@ -49,7 +49,7 @@ class CasadiLagrangian(Lagrangian):
         self.jet = list(jet)
         self.expression = expression
         self._space = space
-        self._timed, self.scene = time is not None, scene
+        self.time, self.scene = time, scene
         nothing = ca.SX(0, 1)
         symbols = jet[0], ca.vertcat(*jet[1:]), nothing, nothing
         hessian, gradient = tangent.hessian(expression, symbols, space)
@@ -80,7 +80,7 @@ class CasadiLagrangian(Lagrangian):
     @property
     def timed(self) -> bool:
         """Whether L depends on time."""
-        return self._timed
+        return self.time is not None
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
         """L at P points, shape (P,)."""

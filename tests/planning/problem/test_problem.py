@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -17,7 +16,6 @@ from hovi.errors import InputError, ModelError, SchemeError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
-from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import CLASSIC, by_name, galerkin
 from samples.manifold_robots import half_turning
@@ -125,12 +123,3 @@ def test_a_massless_link_is_refused(two_link: Robot) -> None:
     model.inertias[2] = pin.Inertia.Zero()
     with pytest.raises(ModelError, match=r"(?i)mass"):
         problem(load_robot(model))
-
-
-def test_a_lagrangian_without_a_scene_makes_no_trajectory_problem() -> None:
-    q, v, a = (ca.SX.sym(name, 2) for name in "qva")
-    ld = DiscreteLagrangian(
-        CasadiLagrangian([q, v, a], ca.sumsqr(a)), Grid.uniform(1.0, 4, galerkin(1))
-    )
-    with pytest.raises(InputError, match="needs the effort Lagrangian of a Scene"):
-        TrajectoryProblem(ld, REST, REST)

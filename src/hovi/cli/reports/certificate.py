@@ -109,5 +109,5 @@ def _peak(peak: Peak | None) -> str:
     return f"{peak.value:.4g} at {peak.joint}, {peak.t:.3g} s"
 
 
-def _peak_json(peak: Peak) -> dict[str, Any]:
-    return {"value": peak.value, "joint": peak.joint, "t": peak.t}
+def _peak_json(peak: Peak | None) -> dict[str, Any] | None:
+    return None if peak is None else {"value": peak.value, "joint": peak.joint, "t": peak.t}
