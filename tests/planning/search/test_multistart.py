@@ -165,6 +165,14 @@ def test_minima_stay_as_they_are_if_every_process_dies_that_refines_them(
     assert "the requested grid was not reached, since a worker process was ended" in best.message
 
 
+def test_one_process_refines_minima_without_workers(job: Job, guesses: list) -> None:
+    found = [solve_on_grid(job.problem(), guess) for guess in guesses[:2]]
+    alone = job.options.with_changes(processes=1)
+    deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, alone)
+    refined = FinalStages(deadly, Deadline(), silent).to_requested_grid(found)
+    assert [each.cost for each in refined] == pytest.approx(sorted(each.cost for each in found))
+
+
 def test_there_is_at_least_one_processor(job: Job) -> None:
     assert default_processes() >= 1
 
