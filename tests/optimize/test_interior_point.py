@@ -153,6 +153,7 @@ PROGRAMS = {
         [1, 2],
     ),
 }
+CURVED_VALLEYS = {"hock-schittkowski 1"}
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
@@ -164,6 +165,25 @@ def test_the_known_minimum_is_found(name: str) -> None:
     assert outcome.stop is Stop.STATIONARY
     assert outcome.feasible
     np.testing.assert_allclose(outcome.x, minimum, atol=2e-4)
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_gradient_and_multipliers_balance_to_rounding(name: str) -> None:
+    n, f, y, lower, upper, start, _ = PROGRAMS[name]
+    program = Program(n, f, y, lower, upper)
+    outcome = minimize_bounded(program, np.array(start, dtype=float), Options())
+    gradient, jacobian = (part.full() for part in program._first(outcome.x))
+    forces = jacobian.T * outcome.barrier.multipliers.ravel()
+    residual = np.abs(gradient.ravel() + forces.sum(axis=1)).max()
+    assert residual <= 1e-12 * max(1.0, np.abs(forces).max())
+
+
+@pytest.mark.parametrize("name", sorted(PROGRAMS.keys() - CURVED_VALLEYS))
+def test_convex_programs_take_few_steps(name: str) -> None:
+    n, f, y, lower, upper, start, _ = PROGRAMS[name]
+    program = Program(n, f, y, lower, upper)
+    outcome = minimize_bounded(program, np.array(start, dtype=float), Options())
+    assert outcome.iterations <= 25
 
 
 def test_multipliers_satisfy_the_optimality_conditions() -> None:

@@ -52,6 +52,21 @@ def test_the_coordinates_of_the_tree_span_exactly_the_discrete_paths(
     assert slots == problem.gradient.size + n * int((~problem.present).sum())
 
 
+@pytest.mark.parametrize("share", [0.5, 0.2, 0.9])
+def test_parts_of_an_interval_without_own_coordinates_are_one_cubic(share: float) -> None:
+    cubic = np.polynomial.Polynomial(np.random.default_rng(2).normal(size=4))
+
+    def parts(ends: list[float]) -> Array:
+        q, h = cubic(np.array(ends)), np.diff(ends)
+        hv = [h * cubic.deriv()(np.array(ends[i : i + len(h)])) for i in (0, 1)]
+        return np.stack([q[:-1], hv[0], np.diff(q) - hv[0], hv[1] - hv[0]], axis=1)
+
+    (level,) = merge_levels(np.array([share, 1.0 - share]))
+    whole = np.concatenate([parts([0.0, 1.0]), np.zeros((1, 2))], axis=1)
+    found = level.split(whole[..., None])[..., 0]
+    np.testing.assert_allclose(found, parts([0.0, share, 1.0]), rtol=0, atol=1e-14)
+
+
 @pytest.mark.parametrize(("n", "modes"), SIZES)
 def test_scatter_and_gather_are_transposes(n: int, modes: tuple[int, ...]) -> None:
     problem, model = build(n, modes, INDEFINITE)

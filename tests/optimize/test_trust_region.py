@@ -11,7 +11,15 @@ import numpy.typing as npt
 import pytest
 
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
-from hovi.optimize.trust_region import Objective, Options, Outcome, Stop, minimize, solve_subproblem
+from hovi.optimize.trust_region import (
+    Objective,
+    Options,
+    Outcome,
+    Stop,
+    minimize,
+    next_radius,
+    solve_subproblem,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -428,6 +436,22 @@ def test_a_step_is_nearly_optimal_within_three_quarters_of_the_radius(
             assert model.norm(trial.step) == pytest.approx(trial.norm, rel=1e-6, abs=1e-12 * radius)
             best = least_in_ball(model, 0.75 * radius)
             assert model.change(trial.step) <= best + 0.1 * abs(best) + 1e-15
+
+
+@pytest.mark.parametrize(
+    ("norm", "ratio", "sign"),
+    [(2.0, 0.95, 1), (2.0, 0.8, 1), (2.0, 0.5, 0), (2.0, 0.3, 0), (1.0, 0.95, 0), (2.0, 0.2, -1)],
+)
+def test_the_radius_grows_only_where_it_limits_a_good_model(
+    norm: float, ratio: float, sign: int
+) -> None:
+    """It stays for ratios between 1/4 and 3/4 [NocedalWright2006, algorithm 4.1]."""
+    assert np.sign(next_radius(2.0, norm, ratio) - 2.0) == sign
+
+
+@pytest.mark.parametrize("ratio", [-9.0, -0.5, 0.2])
+def test_after_a_failed_step_the_radius_is_a_quarter_to_a_half_of_it(ratio: float) -> None:
+    assert 0.25 <= next_radius(2.0, 1.0, ratio) <= 0.5
 
 
 @pytest.mark.parametrize("n", [2, 7])

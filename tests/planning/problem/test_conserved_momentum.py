@@ -116,6 +116,13 @@ def test_a_goal_that_needs_another_momentum_is_infeasible() -> None:
     q, _ = task.start.on(task.scene.robot, "start")
     sentence = free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), free, 8.0)
     assert "angular momentum is off by" in sentence
+    arm = free.copy()
+    arm[1, 1, 8] = True  # one joint cannot take up what the base has
+    sentence = free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), arm, 8.0)
+    assert "momentum is off by" in sentence
+    turned = free.copy()
+    turned[1, 0, 3:6] = True  # then the momentum of the goal is unknown
+    assert free_fall_contradiction(task.scene, (q, np.zeros(9), q, v), turned, 8.0) == ""
     moving = hovi.plan(task.scene, state, task.start, 8.0, limits="none")
     assert moving.status is hovi.Status.INFEASIBLE
 
@@ -138,6 +145,14 @@ def test_friction_on_the_base_is_no_free_fall() -> None:
     assert not falls_freely(everywhere)
     joints = dict.fromkeys(robot.joint_names[1:], 0.1)
     assert falls_freely(hovi.Scene(robot, [hovi.effects.ViscousFriction(joints)], passive=passive))
+
+
+def test_a_rotor_on_one_axis_of_the_base_is_no_free_fall() -> None:
+    task = spacecraft()
+    robot, passive = task.scene.robot, task.scene.passive
+    for axis in range(9):
+        rotor = hovi.effects.Armature(np.eye(9)[axis].tolist())
+        assert falls_freely(hovi.Scene(robot, [rotor], passive=passive)) == (axis >= 6)
 
 
 def test_parts_of_an_orientation_cannot_be_free_alone() -> None:

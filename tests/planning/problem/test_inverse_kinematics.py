@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import hovi
@@ -46,3 +47,15 @@ def test_a_goal_is_met_within_limits_on_every_side(ur5: Robot, signs: tuple[int,
     assert (found.q >= lower).all()
     assert (found.q <= upper).all()
     np.testing.assert_allclose(ur5.frame_position("tool0", found.q[None])[0], pose, atol=1e-7)
+
+
+def test_every_pose_that_is_reached_within_limits_is_found(ur5: Robot) -> None:
+    random, bound, data = np.random.default_rng(1), np.full(6, 3.0), ur5.model.createData()
+    for _ in range(8):
+        near, q = 0.8 * bound * random.uniform(-1, 1, (2, 6))
+        pin.framesForwardKinematics(ur5.model, data, q)
+        pose = data.oMf[ur5.model.getFrameId("tool0")]
+        goal = hovi.FrameGoal("tool0", position=pose.translation, rotation=pose.rotation)
+        found = inverse_kinematics(ur5, goal, near, -bound, bound)
+        assert found.reason == ""
+        assert (np.abs(found.q) <= bound).all()

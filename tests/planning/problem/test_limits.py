@@ -15,6 +15,7 @@ from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from samples.manifold_robots import with_arm
 from samples.slider import SLIDER
 
 
@@ -29,6 +30,16 @@ def test_a_number_bounds_both_sides_and_a_name_one_joint(two_link: Robot) -> Non
     limits = as_limits(two_link, {"base": "none", "v": 2.0, "q": {"elbow": [0.0, 3.0]}})
     np.testing.assert_array_equal(limits.lower[1], [-2, -2])
     np.testing.assert_array_equal(limits.upper[0], [np.inf, 3])
+
+
+@pytest.mark.parametrize("q", [0.5, [0.5] * 9])
+def test_position_limits_of_all_joints_bound_those_whose_position_is_a_number(q: Any) -> None:
+    robot = load_robot(with_arm("free-flyer"))  # then revolute, continuous and prismatic joints
+    limits = as_limits(robot, {"q": q})
+    assert limits is not None
+    expected = np.where(np.isin(np.arange(9), [6, 8]), 0.5, np.inf)
+    np.testing.assert_array_equal(limits.upper[0], expected)
+    np.testing.assert_array_equal(limits.lower[0], -expected)
 
 
 def test_a_margin_narrows_by_a_share_of_the_range(two_link: Robot) -> None:

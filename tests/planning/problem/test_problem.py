@@ -10,6 +10,7 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
+from hovi.discrete.guess import cubic
 from hovi.discrete.state import State
 from hovi.effects import Gravity
 from hovi.errors import InputError, ModelError, SchemeError
@@ -63,6 +64,15 @@ def test_the_ends_are_copies_of_the_callers_arrays(two_link: Robot) -> None:
     found = problem(two_link, State(q))
     q[:] = 9.0
     np.testing.assert_array_equal(found.boundary[0], [1.0, 2.0])
+
+
+def test_a_sampled_curve_keeps_its_own_ends_where_they_are_free(two_link: Robot) -> None:
+    start = State([0.1, 0.2], [0.3, 0.4], free=["elbow"], free_velocity=["shoulder"])
+    goal = State([1.1, 1.2], [1.3, 1.4], free=["shoulder"], free_velocity=["elbow"])
+    ends = np.array([[5.0, 6.0], [7.0, 8.0], [9.0, 10.0], [11.0, 12.0]])
+    path = problem(two_link, start, goal).path(cubic(two_link, tuple(ends), 1.0))
+    np.testing.assert_allclose(path.q[[0, -1]], [[0.1, 6.0], [9.0, 1.2]], rtol=1e-14)
+    np.testing.assert_allclose(path.v[[0, -1]], [[7.0, 0.4], [1.3, 12.0]], rtol=1e-14)
 
 
 @pytest.mark.parametrize("end", ["start", "goal"])

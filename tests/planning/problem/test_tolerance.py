@@ -92,6 +92,12 @@ def test_an_accuracy_says_what_was_reached_and_what_was_not() -> None:
     assert "no error was estimated" in str(Accuracy(wanted, np.nan, False, "no minimum was found"))
 
 
+def test_the_repr_of_an_accuracy_has_its_numbers_and_not_what_computes_others() -> None:
+    found = Accuracy(Tolerance(1e-4, Quantity.COST), 2e-5, True, "", compare=lambda: None)
+    assert "error=2e-05" in repr(found)
+    assert "lambda" not in repr(found)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [

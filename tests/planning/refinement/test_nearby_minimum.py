@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,11 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.certificate import momentum_jump
 from hovi.planning.refinement.error_estimate import prolonged
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
-from hovi.planning.refinement.nearby_minimum import NearbyMinimum, nearby_minimum
+from hovi.planning.refinement.nearby_minimum import (
+    MAX_REUSE_DISTANCE,
+    NearbyMinimum,
+    nearby_minimum,
+)
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -92,10 +98,12 @@ def test_a_minimum_some_way_off_takes_several_hessians(arm_scene: Scene) -> None
     found = nearby_minimum(objective, start, first)
     assert found is not None
     assert found.model is not first
-    solution = found.solution()
-    assert solution is not None
-    assert solution.n_neg == 0
-    np.testing.assert_allclose(solution.trajectory.q, there.trajectory.q, atol=1e-10)
+    farther = dataclasses.replace(found, distance=2 * MAX_REUSE_DISTANCE)
+    for end in (found, farther):  # with the last Hessian, and with a new one
+        solution = end.solution()
+        assert solution is not None
+        assert solution.n_neg == 0
+        np.testing.assert_allclose(solution.trajectory.q, there.trajectory.q, atol=1e-10)
 
 
 def test_far_from_a_minimum_nothing_is_found(arm_scene: Scene) -> None:

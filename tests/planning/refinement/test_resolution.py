@@ -126,6 +126,18 @@ def test_a_cost_more_than_1_percent_off_is_no_success(arm_scene: Scene, scheme: 
     assert set(outcomes) == {Status.UNRESOLVED, Status.MINIMUM}
 
 
+@pytest.mark.parametrize("N", [7, 8, 9, 10, 11])
+def test_the_change_of_the_cost_on_a_finer_grid_is_told_in_per_cent(
+    arm_scene: Scene, N: int
+) -> None:
+    ends = [-np.pi / 2, 0.0], [np.pi / 2, 0.0], 2.0
+    found = hovi.plan(arm_scene, *ends, scheme="taylor-midpoint", intervals=N, **FAST)
+    assert found.problem is not None
+    finer = solve_on_grid(found.problem.finer, found.trajectory)
+    change = abs(finer.cost / found.cost - 1)
+    assert f"a finer grid changes its cost by {100 * change:.2g} %" in found.message
+
+
 def test_a_resolved_minimum_is_preferred_to_a_cheaper_unresolved_motion(arm_scene: Scene) -> None:
     found = hovi.plan(
         arm_scene, [-np.pi / 2, 0.0], [np.pi / 2, 0.0], 5.0, intervals=20, starts=16, **FAST

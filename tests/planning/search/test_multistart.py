@@ -6,6 +6,7 @@ import dataclasses
 import sys
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from hovi.discrete.grid import DiscretePath, Grid
@@ -23,12 +24,14 @@ from hovi.planning.search.multistart import (
 )
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
+from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.deadline import Deadline
 from hovi.workers.pool import end_idle_workers
+from samples.manifold_robots import chain
 from samples.paper_arm import HANG
 
 
@@ -162,6 +165,14 @@ def test_minima_stay_as_they_are_if_every_process_dies_that_refines_them(
     assert "the requested grid was not reached, since a worker process was ended" in best.message
 
 
+def test_one_process_refines_minima_without_workers(job: Job, guesses: list) -> None:
+    found = [solve_on_grid(job.problem(), guess) for guess in guesses[:2]]
+    alone = job.options.with_changes(processes=1)
+    deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, alone)
+    refined = FinalStages(deadly, Deadline(), silent).to_requested_grid(found)
+    assert [each.cost for each in refined] == pytest.approx(sorted(each.cost for each in found))
+
+
 def test_there_is_at_least_one_processor(job: Job) -> None:
     assert default_processes() >= 1
 
@@ -221,6 +232,19 @@ def test_minima_of_a_search_are_minima_by_ascending_cost(job: Job, guesses: list
     assert any(
         cost == pytest.approx(solve_on_grid(job.problem(), guesses[0]).cost) for cost in costs
     )
+
+
+def test_starts_include_full_turns_either_way_of_continuous_joints() -> None:
+    """A wheel of inertia I turned by x rad, at rest at both ends, costs 6 I^2 x^2 / T^3."""
+    model = chain([pin.JointModelRUBZ()])
+    inertia, T = float(pin.crba(model, model.createData(), pin.neutral(model))[0, 0]), 2.0
+    grid = Grid.uniform(T, 8, by_name("galerkin-2"))
+    scene, turned = Scene(load_robot(model)), np.array([np.cos(1.0), np.sin(1.0)])
+    wheel = Job(scene, grid, State([1.0, 0.0]), State(turned), PlanOptions(limits="none"))
+    first = guess_path(wheel.problem(), "cubic")
+    costs = [solution.cost for solution in search(wheel, [first], 48)]
+    turns = 1.0 + 2 * np.pi * np.array([0, -1, 1])
+    np.testing.assert_allclose(costs[:3], 6 * inertia**2 * turns**2 / T**3, rtol=1e-9)
 
 
 def test_more_starts_are_never_worse(job: Job, guesses: list) -> None:

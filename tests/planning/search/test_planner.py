@@ -310,6 +310,28 @@ def test_an_interrupt_before_the_requested_grid_is_no_success(arm_scene: Scene) 
     assert "interrupted before the requested grid or the best duration was reached" in found.message
 
 
+def test_after_an_interrupt_no_other_minimum_is_compared_with_a_finer_grid(
+    arm_scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    value, comparing, calls = ActionObjective.value, False, 0
+
+    def progress(text: str, share: float) -> None:
+        nonlocal comparing
+        comparing = comparing or "comparing" in text
+
+    def interrupted_once(self: ActionObjective, x: object) -> float:
+        nonlocal calls
+        calls += comparing
+        if calls == 1:
+            raise KeyboardInterrupt
+        return value(self, x)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(ActionObjective, "value", interrupted_once)
+    found = swing_up(arm_scene, starts=8, intervals=8, scheme="hermite-simpson", progress=progress)
+    assert not found.success
+    assert calls == 1
+
+
 # Refusals
 
 

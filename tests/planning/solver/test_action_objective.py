@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +13,15 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import regularized
 from hovi.discrete.state import State
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.solver import guess_path
 from hovi.planning.task_file.reading import load_task
+from hovi.planning.task_file.task import Task
 from hovi.robot.bundled_models import example
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
@@ -183,10 +187,12 @@ def test_multipliers_of_the_last_step_keep_value_and_gradient(
     assert 0 < difference < 1e-2 * np.abs(fresh.intervals.hessian).max()
 
 
-# With equality constraints: passive joints, at points and as moments
+# With equality constraints: passive joints, at points and as moments, and conditions at nodes
 
 
-PASSIVE = {
+CONDITIONS = "conditions at nodes"
+CONSTRAINED = {
+    CONDITIONS: ("ur5_reach", ("galerkin-1",) * 4),
     "arm": ("pendubot_swing_up", ("galerkin-1x5",) * 4),
     "arm, at points": ("pendubot_swing_up", ("galerkin-1",) * 4),
     "floating base": ("spacecraft_reorients", ("galerkin-1x5",) * 4),
@@ -197,21 +203,32 @@ PASSIVE = {
 }
 
 
-@pytest.fixture(params=PASSIVE)
+def conditions(task: Task) -> dict[str, Any]:
+    """A position to be reached in space, and a configuration to be passed on the way."""
+    q = np.stack([np.asarray(each.q, dtype=float) for each in (task.start, task.goal)])
+    there = task.scene.robot.frame_position("tool0", q[1:])[0]
+    via = (Via(0.5, State(q.mean(axis=0))),)
+    return {"goal": FrameGoal("tool0", position=there), "via": via}
+
+
+@pytest.fixture(params=CONSTRAINED)
 def penalized(request: pytest.FixtureRequest) -> tuple[ActionObjective, DiscretePath]:
     """An augmented Lagrangian with random multipliers, and a random path."""
-    name, schemes = PASSIVE[request.param]
+    name, schemes = CONSTRAINED[request.param]
     task, random = load_task(example(name)), np.random.default_rng(9)
     grid = Grid(np.array([0.2, 0.3, 0.25, 0.15]), tuple(by_name(each) for each in schemes))
     ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
-    problem = TrajectoryProblem(ld, task.start, task.goal)
-    known = Multipliers.zero(problem, 7.0, 1.0)
+    more = conditions(task) if request.param == CONDITIONS else {"goal": task.goal}
+    problem = TrajectoryProblem(ld, task.start, **more)
+    known = Multipliers.zero(problem, 7.0, 1e3)
+    nodes = [1e3 * random.normal(size=len(zero)) for zero in known.nodes]
     forces = []
     for zero in known.torque:
         force = zero.copy()
         force[:, problem.passive] = random.normal(size=(len(zero), len(problem.passive)))
         forces.append(force)
-    action = ActionObjective(problem, multipliers=dataclasses.replace(known, torque=forces))
+    known = dataclasses.replace(known, torque=forces, nodes=nodes)
+    action = ActionObjective(problem, multipliers=known)
     path = guess_path(problem, "cubic")
     model = action.model(path, None, None)
     return action, action.retract(path, 0.05 * model.random_vector(0), model)

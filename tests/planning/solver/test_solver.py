@@ -639,10 +639,13 @@ def test_a_solution_without_its_problem_cannot_replan(reach: Solution) -> None:
         dataclasses.replace(reach, problem=None).replan()
 
 
-def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, reach: Solution) -> None:
-    errors, sizes = [], np.array([0.08, 0.04, 0.02, 0.01])
+@pytest.mark.parametrize("intervals", [32, 1200])  # in nodal and in regularized coordinates
+def test_a_warm_start_follows_the_ends_to_first_order(arm_scene: Scene, intervals: int) -> None:
+    reach = solve_on_grid(problem_on(arm_scene, intervals=intervals))
+    errors, sizes = [], np.array([0.06, 0.02])
     for size in sizes:
-        problem = problem_on(arm_scene, START, State(REACH_Q + size, REACH_V - size))
+        goal = State(REACH_Q + size, REACH_V - size)
+        problem = problem_on(arm_scene, START, goal, intervals=intervals)
         ahead = follow(reach.trajectory.path, problem)
         check_path(ahead, problem.grid, problem.robot)
         truth = solve_on_grid(problem, ahead).trajectory

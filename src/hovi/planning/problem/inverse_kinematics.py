@@ -13,7 +13,7 @@ from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 
-MAX_SEEDS = 40
+MAX_SEEDS = 160
 """Maximum number of random seeds after the first."""
 SOLUTIONS_WANTED = 4
 """Number of solutions among which the nearest is returned."""
