@@ -19,7 +19,7 @@ from hovi.discrete.contraction import contract
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.discrete.interval_charts import IntervalCharts
-from hovi.errors import InputError
+from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.lagrangian import Lagrangian, PointTerms
@@ -34,8 +34,9 @@ Index = npt.NDArray[np.intp]
 class Expansion:
     """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
 
-    The m columns are (q0, h v0, q1, h v1, c) if nodal, (q0, h v0, Z0, Z1, c) if regularized; inner
-    modes that an interval does not have are zero.
+    The m = 2 k + r columns are (q0, h v0, q1, h v1, c) if nodal, (q0, h v0, Z0, Z1, c) if
+    regularized, and for any order k (q0, h q0', ..., q1, h q1', ..., c); inner modes that an
+    interval does not have are zero.
 
     values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
     outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
@@ -62,12 +63,36 @@ class DiscreteLagrangian:
 
     [ColomboFerraroMartin2016, sections 3 and 5]
 
-    lagrangian: L on T^(2)Q.
-    grid: the intervals and their schemes.
+    lagrangian: L on T^(k)Q.
+    grid: the intervals and their schemes, which are tables for the same k.
+    Raises SchemeError if the orders differ, InputError for groups if k is not 2.
     """
 
     lagrangian: Lagrangian
     grid: Grid
+
+    def __post_init__(self) -> None:
+        if self.grid.order != self.lagrangian.order:
+            raise SchemeError(
+                f"scheme {self.grid.groups[0][0].name!r} is for Lagrangians of order "
+                f"{self.grid.order}, this one is of order {self.lagrangian.order}; use "
+                f"galerkin(inner_modes, derivatives={self.lagrangian.order})."
+            )
+        if self.k != 2 and self.lagrangian.space is not None:
+            raise InputError(
+                f"boundary value problems of order {self.k} need joints with nq = nv: lock the "
+                "others with load_robot(..., locked=[...])."
+            )
+
+    @property
+    def k(self) -> int:
+        """The order of the Lagrangian."""
+        return self.lagrangian.order
+
+    @property
+    def columns(self) -> int:
+        """m, the number of columns of an interval: 2 k for its ends, and the inner modes."""
+        return 2 * self.k + self.grid.inner_modes
 
     @cached_property
     def chart(self) -> Chart | None:
@@ -147,8 +172,7 @@ class DiscreteLagrangian:
         jets: as for `values`.
         """
         self._check(path, jets)
-        m = 4 + self.grid.inner_modes
-        gradient = np.zeros((self.grid.intervals, m, self.lagrangian.nv))
+        gradient = np.zeros((self.grid.intervals, self.columns, self.lagrangian.nv))
         for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
             point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
             if self.chart is None:
@@ -160,15 +184,15 @@ class DiscreteLagrangian:
 
     def _joined(self, parts: list[Expansion]) -> Expansion:
         """The expansion of all intervals from those of the batches."""
-        N, m, n = self.grid.intervals, 4 + self.grid.inner_modes, self.lagrangian.nv
+        N, m, n = self.grid.intervals, self.columns, self.lagrangian.nv
         values = np.empty(N)
         gradient = np.zeros((N, m, n))
         hessian = np.zeros((N, m, m, n, n))
         for batch, part in zip(self.batches, parts, strict=True):
-            k = part.gradient.shape[1]
+            own = part.gradient.shape[1]
             values[batch.index] = part.values
-            gradient[batch.index, :k] = part.gradient
-            hessian[batch.index, :k, :k] = part.hessian
+            gradient[batch.index, :own] = part.gradient
+            hessian[batch.index, :own, :own] = part.hessian
         outputs = [pair for part in parts for pair in part.outputs]
         charts = [each for part in parts for each in part.charts or ()] or None
         return Expansion(values, gradient, hessian, outputs, charts)
@@ -193,7 +217,7 @@ class DiscreteLagrangian:
     def point_steps(
         self, step: Array, coordinates: Coordinates, expansion: Expansion
     ) -> list[Array]:
-        """Change of (q, v, a) at the quadrature points in a step, (P, 3 n) per batch.
+        """Change of the jet at the quadrature points in a step, (P, (k + 1) n) per batch.
 
         expansion: at the path from which the step is taken.
         """
@@ -203,8 +227,8 @@ class DiscreteLagrangian:
         self, step: Array, coordinates: Coordinates, expansion: Expansion
     ) -> list[Array]:
         """As `point_steps`. Raises InputError for a step or an expansion of another grid."""
-        N, m = self.grid.intervals, 4 + self.grid.inner_modes
-        require_shape("step", step, N, m, self.lagrangian.nv)
+        N = self.grid.intervals
+        require_shape("step", step, N, self.columns, self.lagrangian.nv)
         if len(expansion.values) != N:
             raise InputError(
                 f"the expansion must be one on this grid of {N} intervals, got one of "
@@ -212,16 +236,16 @@ class DiscreteLagrangian:
             )
         steps = []
         for i, batch in enumerate(self.batches):
-            columns = step[batch.index, : 4 + batch.scheme.inner_modes]
+            columns = step[batch.index, : 2 * self.k + batch.scheme.inner_modes]
             if expansion.charts is not None:
                 moved = expansion.charts[i].point_steps(columns)
             else:
-                moved = np.matmul(batch.step_tables[coordinates], columns)  # (B, 3 Q, n)
+                moved = np.matmul(batch.step_tables[coordinates], columns)  # (B, (k + 1) Q, n)
             steps.append(moved.reshape(len(batch.t), -1))
         return steps
 
     def jets(self, path: DiscretePath) -> list[Jet]:
-        """(q, v, a) at the quadrature points, each of shape (P, n), per batch."""
+        """(q, q', ..., q^(k)) at the quadrature points, each of shape (P, n), per batch."""
         self._check(path)
         return [self._jet(batch, path) for batch in self.batches]
 
@@ -253,7 +277,7 @@ class DiscreteLagrangian:
         return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self.batches]
 
     def momenta(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
-        """Momenta (p, p~) at the nodes, shape (N + 1, 2, nv).
+        """Momenta (p, p~) at the nodes, shape (N + 1, k, nv).
 
         p_k = -D1 L_d and p~_k = -D2 L_d of the interval that starts at node k (F-), and
         p_N = D3 L_d, p~_N = D4 L_d of the last (F+). [ColomboFerraroMartin2016, section 3, with F+
@@ -261,7 +285,7 @@ class DiscreteLagrangian:
         forces: as for `derivatives`.
         """
         g = self.derivatives(path, forces)
-        return np.concatenate([-g[:, :2], g[-1:, 2:]])
+        return np.concatenate([-g[:, : self.k], g[-1:, self.k :]])
 
     def derivatives(
         self,
@@ -271,26 +295,28 @@ class DiscreteLagrangian:
     ) -> Array:
         """D1 .. D4 of every L_d with respect to (q0, v0, q1, v1), shape (N, 4, nv).
 
+        For any order, D_1 .. D_2k with respect to (q0, q0', ..., q1, q1', ...), (N, 2 k, nv).
+
         At a path whose inner modes are extremal these are the derivatives of the condensed L_d.
         forces: multipliers of limits and of passive joints, whose work is part of L_d.
         jets: as for `values`.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
-        g = np.empty((N, 4, n))
+        g = np.empty((N, 2 * self.k, n))
         gradients = self.point_gradients(path, forces, jets)
         for batch, gradient in zip(self.batches, gradients, strict=True):
             if self.chart is not None:
                 g[batch.index] = _charts_on(self.chart, batch, path).end_gradient(gradient)
                 continue
             regular = batch.contracted(gradient, "regular")
-            g[batch.index] = regular[:, :4]
+            g[batch.index] = regular[:, : 2 * self.k]
         return np.asarray(np.matmul(self._end_columns, g))
 
     @cached_property
     def _end_columns(self) -> Array:
-        """Matrices from the gradient in an interval's first four columns to D1 .. D4, (N, 4, 4)."""
-        scales = self.grid.steps[:, None] ** [0, 1, 0, 1]
-        nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0).T
+        """Matrices from the gradient in an interval's end columns to D1 .. D2k, (N, 2 k, 2 k)."""
+        scales = self.grid.steps[:, None] ** np.tile(np.arange(self.k), 2)
+        nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0, self.k).T
         return np.asarray(scales[:, :, None] * nodal)
 
     def point_gradients(
@@ -299,7 +325,7 @@ class DiscreteLagrangian:
         forces: list[PointTerms] | None = None,
         jets: list[Jet] | None = None,
     ) -> list[Array]:
-        """dL / d(q, v, a) at the quadrature points, (P, 3, nv) per batch; arguments as above."""
+        """dL / d(q, q', ...) at the quadrature points, (P, k + 1, nv) per batch; as above."""
         self._check(path, jets)
         self._check_terms(forces)
         known = jets or self.jets(path)
@@ -312,15 +338,17 @@ class DiscreteLagrangian:
     ) -> float:
         """d S / d T of a stationary action S, at fixed nodal q and v and proportions of the steps.
 
-        T dS/dT = S - sum h w (dL/dv . v + 2 dL/da . a) + sum (D2 L_d . v0 + D4 L_d . v1), for L
-        independent of time; it is minus Pontryagin's Hamiltonian.
+        T dS/dT = S - sum h w sum_j j dL/dq^(j) . q^(j) + sum_j j (D_{1+j} L_d . q0^(j) +
+        D_{k+1+j} L_d . q1^(j)), for L independent of time; it is minus Pontryagin's Hamiltonian.
         """
-        total = self.action(path)
+        total, k, rates = self.action(path), self.k, path.rates
         gradients = self.point_gradients(path, forces)
         for jet, g, w in zip(self.jets(path), gradients, self.point_weights, strict=True):
-            total -= float(w @ (np.vecdot(g[:, 1], jet[1]) + 2 * np.vecdot(g[:, 2], jet[2])))
+            total -= sum(j * float(w @ np.vecdot(g[:, j], jet[j])) for j in range(1, k + 1))
         d = self.derivatives(path, forces)
-        total += float(np.sum(d[:, 1] * path.v[:-1]) + np.sum(d[:, 3] * path.v[1:]))
+        for j in range(1, k):
+            ends = d[:, j] * rates[:-1, j - 1] + d[:, k + j] * rates[1:, j - 1]
+            total += j * float(np.sum(ends))
         return total / self.grid.duration
 
     def _check(self, path: DiscretePath, jets: list[Jet] | None = None) -> None:
@@ -340,9 +368,9 @@ class DiscreteLagrangian:
 
     @cached_property
     def _jet_shapes(self) -> list[list[tuple[int, ...]]]:
-        """Shapes of q, v and a at the points of each batch."""
+        """Shapes of q and its derivatives at the points of each batch."""
         nq, nv = self.lagrangian.nq, self.lagrangian.nv
-        return [[(len(b.t), nq), (len(b.t), nv), (len(b.t), nv)] for b in self.batches]
+        return [[(len(b.t), nq), *[(len(b.t), nv)] * self.k] for b in self.batches]
 
     def _check_terms(self, terms: list[PointTerms] | None) -> None:
         """Raise InputError for terms that are not one per batch, at its points."""
@@ -354,7 +382,7 @@ class DiscreteLagrangian:
             raise InputError(f"terms must be one per batch, at {points} points, got {given}.")
 
     def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
-        """(q, v, a) at the quadrature points of a batch, each of shape (B * Q, n)."""
+        """The jet at the quadrature points of a batch, each of shape (B * Q, n)."""
         space = self.lagrangian.space
         return batch.jet(path) if space is None else _jet_on(space, batch, path)
 

@@ -55,6 +55,11 @@ class Grid:
         steps.setflags(write=False)
         object.__setattr__(self, "steps", steps)
         object.__setattr__(self, "groups", _groups(self.schemes))
+        orders = sorted({scheme.derivatives for scheme, _ in self.groups})
+        if len(orders) > 1:
+            raise InputError(
+                f"the schemes of a grid must be for Lagrangians of one order, got {orders}."
+            )
 
     @classmethod
     def uniform(cls, duration: float, intervals: int, scheme: Scheme) -> Grid:
@@ -123,15 +128,16 @@ class Grid:
 
     @unchecked
     def require_path(self, path: DiscretePath, nq: int, nv: int) -> None:
-        """Raise InputError unless a path has the intervals and inner modes of this grid.
+        """Raise InputError unless a path has the order, intervals and inner modes of this grid.
 
         More inner modes are accepted, too. nq, nv: lengths of its configurations and velocities.
         """
-        N, r = len(self.steps), self.inner_modes
+        N, r, k = len(self.steps), self.inner_modes, self.order
         inner = path.inner.shape
         modes = max(r, inner[1]) if len(inner) == 3 else r
-        shapes = (N + 1, nq), (N + 1, nv), (N, 2, nv), (N, modes, nv)
-        if (path.q.shape, path.v.shape, path.z.shape, inner) == shapes:
+        shapes = (N + 1, nq), (N + 1, nv), (N, k, nv), (N, modes, nv)
+        known = path.q.shape, path.v.shape, path.z.shape, inner
+        if known == shapes and (k <= 2 or path.higher.shape == (N + 1, k - 2, nv)):
             return
         for name, shape, array in zip(("q", "v", "z", "inner"), shapes, path.arrays, strict=True):
             if array.shape != shape:
@@ -139,6 +145,10 @@ class Grid:
                     f"the path's {name} must have shape {shape} on this grid of {N} intervals with "
                     f"{r} inner modes, got {array.shape}."
                 )
+        raise InputError(
+            f"the path's higher derivatives must have shape {(N + 1, k - 2, nv)} for schemes of "
+            f"order {k}, got {path.higher.shape}."
+        )
 
     def node_at(self, time: float) -> int:
         """The index of the inner node at a time, in [s]. Raises InputError if there is none."""
@@ -176,6 +186,11 @@ class Grid:
         return Grid(np.diff(t), self.schemes)
 
     @cached_property
+    def order(self) -> int:
+        """k, the order of the Lagrangians that the schemes discretise."""
+        return self.groups[0][0].derivatives
+
+    @cached_property
     def inner_modes(self) -> int:
         """The largest number of inner modes of an interval."""
         return max(scheme.inner_modes for scheme, _ in self.groups)
@@ -189,8 +204,8 @@ class Grid:
 
 def _enriched(scheme: Scheme, modes: int) -> Scheme:
     """The Galerkin table with more modes, and as many points besides as the scheme has."""
-    r = scheme.inner_modes + modes
-    return galerkin(r, points=max(r + 2, len(scheme.points) + modes))
+    r, k = scheme.inner_modes + modes, scheme.derivatives
+    return galerkin(r, k, points=max(r + k, len(scheme.points) + modes))
 
 
 def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.intp]], ...]:
@@ -211,16 +226,19 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class DiscretePath:
-    """The coordinates of a discrete motion on a grid.
+    """The coordinates of a discrete motion on a grid, for a Lagrangian of order k.
 
-    The regularized coordinates z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h are stored, since
-    recomputing them from q and v loses 12 eps q/h^2 or more.
+    The regularized coordinates, for k = 2 z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h, are
+    stored, since recomputing them from q and v loses 12 eps q/h^2 or more. For any k
+    z_j = (q1^(j) - sum_{i >= j} h^(i-j) q0^(i) / (i-j)!) / h^(k-j), j < k.
     [ColomboFerraroMartin2016, section 2]
 
     q: nodes, shape (N + 1, nq), in [rad] or [m].
-    v: velocities at the nodes, shape (N + 1, nv), per [s].
-    z: regularized coordinates of the intervals, shape (N, 2, nv), per [s^2].
-    inner: inner modes c/h^2, shape (N, r, nv), per [s^2]; 0 where an interval has fewer.
+    v: velocities at the nodes, shape (N + 1, nv), per [s]. For k = 1, where they are no unknowns
+        and may jump, limits from the right, and at the end from the left.
+    z: regularized coordinates of the intervals, shape (N, k, nv), per [s^k].
+    inner: inner modes c/h^k, shape (N, r, nv), per [s^k]; 0 where an interval has fewer.
+    higher: derivatives q'', ..., q^(k-1) at the nodes, shape (N + 1, k - 2, nv); none for k <= 2.
     Compiled code reads them as contiguous arrays; `Grid.require_path` checks their shapes.
     """
 
@@ -228,12 +246,25 @@ class DiscretePath:
     v: Array
     z: Array
     inner: Array
+    higher: Array = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
     def __post_init__(self) -> None:
-        for name in ("q", "v", "z", "inner"):
+        for name in ("q", "v", "z", "inner", "higher"):
             array = getattr(self, name)
             if not array.flags.c_contiguous:
                 object.__setattr__(self, name, np.ascontiguousarray(array))
+
+    @property
+    def order(self) -> int:
+        """k."""
+        return int(self.z.shape[1])
+
+    @property
+    def rates(self) -> Array:
+        """q', ..., q^(k-1) at the nodes, shape (N + 1, k - 1, nv)."""
+        if self.order <= 2:
+            return self.v[:, None][:, : self.order - 1]
+        return np.concatenate([self.v[:, None], self.higher], axis=1)
 
     @property
     def intervals(self) -> int:

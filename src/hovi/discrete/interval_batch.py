@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import interpolate
+from hovi.discrete.interval_paths import interpolate, interpolate_any
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-Jet = tuple[Array, Array, Array]
-"""(q, v, a) at points, each of shape (P, n)."""
+Jet = tuple[Array, ...]
+"""(q, v, a) at points, each of shape (P, n); (q, q', ..., q^(k)) for order k."""
 Coordinates = Literal["nodal", "regular"]
 COORDINATES: tuple[Coordinates, ...] = ("nodal", "regular")
 
@@ -41,13 +41,13 @@ class IntervalBatch:
 
     @cached_property
     def tables(self) -> dict[Coordinates, Array]:
-        """The scheme's table for both kinds of coordinates, (Q, 3, m)."""
+        """The scheme's table for both kinds of coordinates, (Q, k + 1, m)."""
         return {"nodal": self.scheme.nodal_table, "regular": self.scheme.regular_table}
 
     @cached_property
     def row_weights(self) -> Array:
-        """h w_j / (1, h, h^2) per point and derivative, (B, Q, 3)."""
-        powers = self.h[:, None] ** -np.arange(3)  # (B, 3)
+        """h w_j / (1, h, ..., h^k) per point and derivative, (B, Q, k + 1)."""
+        powers = self.h[:, None] ** -np.arange(self._rows)  # (B, k + 1)
         return self.h[:, None, None] * self.scheme.weights[:, None] * powers[:, None, :]
 
     @cached_property
@@ -63,8 +63,8 @@ class IntervalBatch:
     def step_tables(self) -> dict[Coordinates, Array]:
         """(q, v, a) at the points over the columns of both coordinates, (B or 1, 3 Q, m)."""
         h = self.h[:1] if np.ptp(self.h) == 0 else self.h
-        powers = h[:, None, None, None] ** -np.arange(3.0)[:, None]
-        rows = 3 * len(self.scheme.weights)
+        powers = h[:, None, None, None] ** -np.arange(float(self._rows))[:, None]
+        rows = self._rows * len(self.scheme.weights)
         return {
             name: (table * powers).reshape(len(powers), rows, -1)
             for name, table in self.tables.items()
@@ -75,8 +75,15 @@ class IntervalBatch:
 
         The chart of an interval is the identity: q = q0 + x.
         """
+        if self.scheme.derivatives != 2:
+            return interpolate_any(self.scheme.table, self.h, self.numbers, path)
         q, v, a = interpolate(self.scheme.table, self.h, self.numbers, path.arrays)
         return q, v, a
+
+    @property
+    def _rows(self) -> int:
+        """k + 1 derivatives."""
+        return self.scheme.derivatives + 1
 
     def local(self, path: DiscretePath) -> Array:
         """(x, x', x'') of q = q0 (+) x at the quadrature points, shape (3, B Q, n)."""
@@ -87,9 +94,10 @@ class IntervalBatch:
     def contracted(self, gradient: Array, coordinates: Coordinates) -> Array:
         """Gradient of L_d in the columns of the coordinates from that of L, shape (B, m, n)."""
         Q, _, m = self.tables[coordinates].shape
-        weighted = gradient.reshape(len(self.h), Q, 3, -1) * self.row_weights[..., None]
-        table = self.tables[coordinates].reshape(Q * 3, m)
-        return np.asarray(np.matmul(table.T, weighted.reshape(len(self.h), Q * 3, -1)))
+        rows = self._rows
+        weighted = gradient.reshape(len(self.h), Q, rows, -1) * self.row_weights[..., None]
+        table = self.tables[coordinates].reshape(Q * rows, m)
+        return np.asarray(np.matmul(table.T, weighted.reshape(len(self.h), Q * rows, -1)))
 
 
 def interval_batches(grid: Grid) -> Iterator[IntervalBatch]:

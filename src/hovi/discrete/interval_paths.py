@@ -9,6 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.discrete.grid import DiscretePath
+from hovi.schemes.interval_curve import jet_rows
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -29,6 +32,59 @@ def interpolate(table: Array, steps: Array, intervals: Index, path: PathArrays) 
     table, h = np.ascontiguousarray(table), np.ascontiguousarray(steps)
     native.interpolate(table, h, intervals, q, v, z, inner, out)
     return out
+
+
+def interpolate_any(
+    table: Array, steps: Array, intervals: Index, path: DiscretePath
+) -> tuple[Array, ...]:
+    """As `interpolate`, for any order k on vector spaces: k + 1 arrays of shape (B Q, n).
+
+    table: shape (Q, k + 1, 2 k - 1 + r), over (h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner).
+    """
+    k, r = path.order, table.shape[2] - 2 * path.order + 1
+    powers = steps[:, None] ** np.arange(k + 1.0)  # (B, k + 1)
+    ends, modes = path.z[intervals], path.inner[intervals, :r]
+    scaled = [path.rates[intervals] * powers[:, 1:k, None]]
+    scaled += [ends * powers[:, k:, None], modes * powers[:, k:, None]]
+    rows = np.matmul(table.reshape(-1, table.shape[2]), np.concatenate(scaled, axis=1))
+    jets = rows.reshape(len(steps), len(table), k + 1, -1) / powers[:, None, :, None]
+    jets[:, :, 0] += path.q[intervals][:, None]
+    return tuple(
+        np.ascontiguousarray(jets[:, :, j]).reshape(-1, jets.shape[3]) for j in range(k + 1)
+    )
+
+
+def move_any(path: DiscretePath, step: Array, steps: Array) -> DiscretePath:
+    """The path after a step, for any order k on vector spaces.
+
+    step: in the columns (q0, h q0', ..., q1, h q1', ..., c), shape (N, 2 k + r, n).
+    steps: h, shape (N,).
+    """
+    k, powers = path.order, steps[:, None] ** np.arange(path.order + 1.0)
+    first, last = step[:, :k] / powers[:, :k, None], step[-1, k : 2 * k] / powers[-1, :k, None]
+    nodes = np.concatenate([first, last[None]])  # (N + 1, k, n)
+    R = regular_from_nodal(0, k)[k:]
+    z = path.z + np.matmul(R, step[:, : 2 * k]) / powers[:, k:, None]
+    inner = path.inner.copy()
+    inner[:, : step.shape[1] - 2 * k] += step[:, 2 * k :] / powers[:, k:, None]
+    rates = path.rates + nodes[:, 1:]
+    return path_of_order(k, path.q + nodes[:, 0], rates, z, inner, steps)
+
+
+def path_of_order(
+    k: int, q: Array, rates: Array, z: Array, inner: Array, steps: Array
+) -> DiscretePath:
+    """A path from q (N + 1, n) and its derivatives (N + 1, k - 1, n) at the nodes.
+
+    z, inner: as in DiscretePath. steps: h, shape (N,). For k = 1 the velocities follow from the
+    curve of each interval.
+    """
+    if k > 1:
+        return DiscretePath(q, rates[:, 0], z, inner, rates[:, 1:])
+    r = inner.shape[1]
+    rows = jet_rows(np.array([0.0, 1.0]), 1, r)[:, 1]  # (2, 1 + r), of h v over (h z, h inner)
+    ends = np.einsum("sm,kmn->skn", rows, np.concatenate([z, inner], axis=1))
+    return DiscretePath(q, np.concatenate([ends[0], ends[1, -1:]]), z, inner)
 
 
 def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays:

@@ -22,11 +22,14 @@ def accumulated_momenta(derivatives: Array) -> Array:
     increments plus the mean of the evaluated p are accurate to eps.
     [ColomboFerraroMartin2016, corollary to theorem 2]
 
-    derivatives: D1 .. D4 of every L_d, shape (N, 4, nv). If p jumps at nodes, or the motion is not
+    derivatives: D1 .. D4 of every L_d, shape (N, 4, nv); for another order k than 2, of shape
+        (N, 2 k, nv), the momenta are returned as evaluated, (N + 1, k, nv). If p jumps at nodes, or the motion is not
         stationary to rounding, the evaluated p is returned.
     """
-    N = len(derivatives)
-    momenta = np.ascontiguousarray(np.concatenate([-derivatives[:, :2], derivatives[-1:, 2:]]))
+    N, k = len(derivatives), derivatives.shape[1] // 2
+    momenta = np.ascontiguousarray(np.concatenate([-derivatives[:, :k], derivatives[-1:, k:]]))
+    if k != 2:
+        return momenta
     increments = np.ascontiguousarray(derivatives[:, 0] + derivatives[:, 2])
     native.replace_by_prefix_sums(increments, ROUNDING * N, momenta)
     return momenta

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import factorial
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,6 @@ from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows, legendre
 
 Array = npt.NDArray[np.float64]
-
-_REGULAR_COLUMNS = np.array(
-    # q0, h v0, q1, h v1
-    [[1.0, 0, 0, 0], [0, 1, 0, 0], [-1, -1, 1, 0], [0, -1, 0, 1]]
-)
 
 
 @check_arguments
@@ -77,8 +73,12 @@ class Scheme:
 
     @cached_property
     def nodal_table(self) -> Array:
-        """The table for (q0, h v0, q1, h v1, c), shape (Q, 3, 4 + r)."""
-        return self.regular_table @ regular_from_nodal(self.inner_modes)
+        """The table for (q0, h v0, q1, h v1, c), shape (Q, 3, 4 + r).
+
+        For any k the columns are (q0, h q0', ..., q1, h q1', ..., c), and the shape is
+        (Q, k + 1, 2 k + r).
+        """
+        return self.regular_table @ regular_from_nodal(self.inner_modes, self.derivatives)
 
     @cached_property
     def series(self) -> Array:
@@ -117,8 +117,13 @@ class Scheme:
         return Scheme, (self.name, self.order, self.points, self.weights, self.table)
 
 
-def regular_from_nodal(inner_modes: int) -> Array:
-    """R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r)."""
-    R = np.eye(4 + inner_modes)
-    R[:4, :4] = _REGULAR_COLUMNS
+def regular_from_nodal(inner_modes: int, k: int = 2) -> Array:
+    """R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r).
+
+    For any k: Z_j = h^j q1^(j) - sum_{i >= j} h^i q0^(i) / (i - j)!, shape (2 k + r, 2 k + r).
+    """
+    R = np.eye(2 * k + inner_modes)
+    for j in range(k):
+        for i in range(j, k):
+            R[k + j, i] = -1.0 / factorial(i - j)
     return R
