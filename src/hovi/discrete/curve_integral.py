@@ -41,13 +41,13 @@ def integral_along(lagrangian: Lagrangian, trajectory: Trajectory) -> CurveInteg
     """The integral of L(q, v, a, t) dt along the interpolant, by two Gauss rules per interval.
 
     They have Q + 5 and Q + 9 points, with Q the largest number of points of a scheme on the grid.
-    lagrangian: L on T^(2)Q.
+    lagrangian: L on T^(k)Q, that of the grid.
     """
     grid = trajectory.grid
     x, weights = _rules(max(len(scheme.points) for scheme, _ in grid.groups) + MORE_POINTS)
     k, s = np.repeat(np.arange(grid.intervals), len(x)), np.tile(x, grid.intervals)
-    q, v, a = trajectory.jet_intervals(k, s)
-    values = lagrangian.value(q, v, a, t=trajectory.t[k] + s * grid.steps[k])
+    jet = trajectory.jet_intervals(k, s, lagrangian.order)
+    values = lagrangian.value(*jet, t=trajectory.t[k] + s * grid.steps[k])
     fewer, value = grid.steps @ (values.reshape(grid.intervals, -1) @ weights.T)
     return CurveIntegral(float(value), float(abs(value - fewer) + 1e-14 * abs(value)))
 

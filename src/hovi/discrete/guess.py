@@ -10,11 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import misfit
+from hovi.discrete.interval_paths import misfit, path_of_order
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError, InputError, nearest
 from hovi.robot.space.coordinates import Coordinates
+from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
@@ -33,9 +35,9 @@ BUMP_AMPLITUDES = (0.2, 1.5)
 
 
 class Curve(Protocol):
-    """q, v and a at times t of shape (M,), as arrays of shape (M, n)."""
+    """q, v and a at times t of shape (M,), as arrays of shape (M, n); for order k up to q^(k)."""
 
-    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+    def __call__(self, t: Array) -> tuple[Array, ...]:
         """The curve at t."""
 
 
@@ -53,6 +55,23 @@ def cubic(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curv
     def curve(t: Array) -> tuple[Array, Array, Array]:
         jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
         return _in_chart(coordinates, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
+
+    return curve
+
+
+def hermite(ends: Array, duration: float) -> Curve:
+    """The polynomial of degree 2 k - 1 between two points: the minimizer of 1/2 |q^(k)|^2.
+
+    ends: (q, q', ..., q^(k-1)) at the start and at the goal, shape (2, k, n). duration: T, in [s].
+    """
+    k, T = ends.shape[1], duration
+    scaled = ends * T ** np.arange(k)[:, None]
+    local = np.concatenate([scaled[0, 1:], regular_from_nodal(0, k)[k:] @ np.concatenate(scaled)])
+
+    def curve(t: Array) -> tuple[Array, ...]:
+        jet = jet_rows(np.asarray(t) / T, k, 0, max(k, 2)) @ local
+        rates = (jet[:, j] / T**j for j in range(1, jet.shape[1]))
+        return ends[0, 0] + jet[:, 0], *rates
 
     return curve
 
@@ -128,8 +147,9 @@ def with_turns(base: Curve, coordinates: Coordinates, duration: float, turns: Ar
     def curve(t: Array) -> tuple[Array, Array, Array]:
         s = np.asarray(t)[:, None] / duration
         x, dx, ddx = s**2 * (3 - 2 * s), 6 * s * (1 - s) / duration, (6 - 12 * s) / duration**2
+        q, v, a = base(t)
         return coordinates.chart.composed(
-            base(t), _modulo_period(coordinates, x * angle), dx * angle, ddx * angle
+            (q, v, a), _modulo_period(coordinates, x * angle), dx * angle, ddx * angle
         )
 
     return curve
@@ -164,13 +184,13 @@ def named_curve(name: str, coordinates: Coordinates, boundary: Boundary, duratio
     return NAMED[name](coordinates, boundary, duration)
 
 
-def stretched(trajectory: Trajectory, duration: float) -> Curve:
-    """A motion as a curve, rescaled to another duration."""
+def stretched(trajectory: Trajectory, duration: float, order: int = 2) -> Curve:
+    """A motion as a curve, rescaled to another duration. order: its highest derivative, if > 2."""
     stretch = trajectory.duration / duration
 
-    def curve(t: Array) -> tuple[Array, Array, Array]:
-        q, v, a = trajectory.jet(np.clip(t * stretch, 0.0, trajectory.duration))
-        return q, v * stretch, a * stretch**2
+    def curve(t: Array) -> tuple[Array, ...]:
+        jet = trajectory.jet(np.clip(t * stretch, 0.0, trajectory.duration), max(order, 2))
+        return tuple(x * stretch**j for j, x in enumerate(jet))
 
     return curve
 
@@ -187,6 +207,38 @@ def path_on_grid(
     rotation = None if coordinates.vector_joints else _rotation(curve, grid, coordinates)
     inner = _inner_modes(curve, grid, coordinates, q)
     return DiscretePath(q, v, regularized(coordinates, grid, q, v, rotation), inner)
+
+
+def path_of_any_order(curve: Curve, grid: Grid, ends: Array) -> DiscretePath:
+    """As `path_on_grid`, for any order k on vector spaces.
+
+    ends: (q, q', ..., q^(k-1)) at the start and at the goal, shape (2, k, n).
+    """
+    k, h = grid.order, grid.steps[:, None]
+    nodes = np.stack(curve(grid.t)[:k], axis=1)
+    nodes[[0, -1]] = ends
+    scaled = np.concatenate([nodes[:-1], nodes[1:]], axis=1)
+    scaled *= (h ** np.tile(np.arange(k), 2))[:, :, None]
+    z = np.matmul(regular_from_nodal(0, k)[k:], scaled) / (h**k)[:, None]
+    inner = np.zeros((grid.intervals, grid.inner_modes, nodes.shape[2]))
+    for scheme, index in grid.groups:
+        r = scheme.inner_modes
+        if r > 0:
+            s, projection = _projection(r, k)
+            t = grid.t[:-1][index][:, None] + h[index] * s
+            top = curve(t.ravel())[k].reshape(len(index), len(s), -1)
+            inner[index, :r] = np.matmul(projection, top)
+    return path_of_order(k, nodes[:, 0], nodes[:, 1:], z, inner, grid.steps)
+
+
+def moved_any(path: DiscretePath, grid: Grid, ends: Array) -> DiscretePath:
+    """As `moved`, for any order k on vector spaces; ends: as in `path_of_any_order`."""
+    change = ends - np.concatenate([path.q[:, None], path.rates], axis=1)[[0, -1]]
+    if not change.any():
+        return path
+    more = path_of_any_order(hermite(change, grid.duration), grid, change)
+    z, inner = path.z + more.z, path.inner + more.inner
+    return path_of_order(grid.order, path.q + more.q, path.rates + more.rates, z, inner, grid.steps)
 
 
 def check_path(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> None:
@@ -312,8 +364,9 @@ def _inner_modes(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Arra
 
 
 @functools.cache
-def _projection(inner_modes: int) -> tuple[Array, Array]:
+def _projection(inner_modes: int, k: int = 2) -> tuple[Array, Array]:
     """Gauss points of [0, 1], (Q,), and the projection of values there on inner modes, (r, Q)."""
-    x, w = np.polynomial.legendre.leggauss(inner_modes + 2)
+    x, w = np.polynomial.legendre.leggauss(inner_modes + k)
     s = (x + 1) / 2
-    return s, np.ascontiguousarray((interval_rows(s, inner_modes)[:, 2, 3:] * (w / 2)[:, None]).T)
+    rows = interval_rows(s, inner_modes) if k == 2 else jet_rows(s, k, inner_modes)
+    return s, np.ascontiguousarray((rows[:, k, 2 * k - 1 :] * (w / 2)[:, None]).T)

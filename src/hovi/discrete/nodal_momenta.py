@@ -23,8 +23,8 @@ def accumulated_momenta(derivatives: Array) -> Array:
     [ColomboFerraroMartin2016, corollary to theorem 2]
 
     derivatives: D1 .. D4 of every L_d, shape (N, 4, nv); for another order k than 2, of shape
-        (N, 2 k, nv), the momenta are returned as evaluated, (N + 1, k, nv). If p jumps at nodes, or the motion is not
-        stationary to rounding, the evaluated p is returned.
+        (N, 2 k, nv), the momenta are returned as evaluated, (N + 1, k, nv). If p jumps at
+        nodes, or the motion is not stationary to rounding, the evaluated p is returned.
     """
     N, k = len(derivatives), derivatives.shape[1] // 2
     momenta = np.ascontiguousarray(np.concatenate([-derivatives[:, :k], derivatives[-1:, k:]]))

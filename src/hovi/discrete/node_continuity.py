@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import numpy.typing as npt
 
@@ -22,11 +24,15 @@ def require_continuous(
     """Raise InputError if the nodes of a path do not match its regularized coordinates.
 
     q1 = q0 (+) x1 and v1 = J(x1) x1' hold for every interval, with x1 = h v0 + h^2 z0 and
-    x1' = v0 + h z1; on vector spaces q1 = q0 + x1 and v1 = x1'.
+    x1' = v0 + h z1; on vector spaces q1 = q0 + x1 and v1 = x1'. For other orders k than 2
+    q1^(j) = sum_{i >= j} h^(i-j) q0^(i) / (i-j)! + h^(k-j) z_j, j < k.
 
     space: the configuration space; None if it is a vector space.
     The message names the interval.
     """
+    if path.order != 2:
+        _require_ends(path, grid)
+        return
     h = grid.steps[:, None]
     x, v = h * path.v[:-1] + h**2 * path.z[:, 0], path.v[:-1] + h * path.z[:, 1]
     if space is None:
@@ -35,9 +41,26 @@ def require_continuous(
         q, v, _ = Chart(space).jet(path.q[:-1], x, v, np.zeros_like(v))
         q = space.nearest(q, path.q[1:])
     for name, found, expected in (("q", path.q, q), ("v", path.v, v)):
-        miss = np.abs(found[1:] - expected).max(axis=1, initial=0.0)  # (N,)
-        if not miss.max() <= TOLERANCE * (1.0 + np.abs(found).max(initial=0.0)):
-            raise InputError(
-                f"{name} at the end of interval {int(miss.argmax())} does not match its start and "
-                f"z; the difference is {miss.max():.3g}."
-            )
+        _require_small(name, found[1:] - expected, found)
+
+
+def _require_ends(path: DiscretePath, grid: Grid) -> None:
+    """As `require_continuous`, for any order on vector spaces."""
+    k, h = path.order, grid.steps[:, None]
+    nodes = np.concatenate([path.q[:, None], path.rates], axis=1)  # (N + 1, k, n)
+    for j in range(k):
+        expected = h ** (k - j) * path.z[:, j]
+        for i in range(j, k):
+            expected = expected + h ** (i - j) * nodes[:-1, i] / factorial(i - j)
+        name = ("q", "v", "a")[j] if j < 3 else f"derivative {j}"
+        _require_small(name, nodes[1:, j] - expected, nodes[:, j])
+
+
+def _require_small(name: str, difference: Array, values: Array) -> None:
+    """Raise InputError for a difference (N, n) that is no rounding error of values (N + 1, n)."""
+    miss = np.abs(difference).max(axis=1, initial=0.0)  # (N,)
+    if not miss.max() <= TOLERANCE * (1.0 + np.abs(values).max(initial=0.0)):
+        raise InputError(
+            f"{name} at the end of interval {int(miss.argmax())} does not match its start and "
+            f"z; the difference is {miss.max():.3g}."
+        )

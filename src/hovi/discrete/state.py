@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -15,20 +15,26 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+_FREE = "free", "free_velocity", "free_acceleration", "free_jerk"
 ALL = "all"
 """Stands for all joints in a list of joint names."""
 
 
-@check_arguments_except("q", "v", "turns")
+@check_arguments_except("q", "v", "a", "jerk", "turns")
 @dataclass(frozen=True, eq=False)
 class State:
     """A point (q, v) of TQ: where a motion starts or ends.
 
+    For Lagrangians of order k it is a point (q, q', ..., q^(k-1)): with an acceleration for k = 3,
+    and with a jerk for k = 4; for k = 1 it has no velocity.
+
     q: configuration, shape (nq,), in [rad] or [m].
-    v: velocity, shape (nv,), per [s]; zero by default.
-    free, free_velocity: joints whose configuration or velocity is optimized, by name; q and v are
-        the initial guess. ALL stands for all joints, "joint[i]" for one coordinate: 0 to 2 of a
-        floating base translate it along its own axes, 3 to 5 rotate it.
+    v, a, jerk: velocity, acceleration and its rate, shape (nv,), per [s], [s^2], [s^3]; zero by
+        default.
+    free, free_velocity, free_acceleration, free_jerk: joints whose configuration, velocity, ... is
+        optimized, by name; what is given is the initial guess. ALL stands for all joints,
+        "joint[i]" for one coordinate: 0 to 2 of a floating base translate it along its own axes, 3
+        to 5 rotate it.
     turns: of a goal, full turns of the initial guess in addition to the shortest path, by joint: an
         integer for one angle, for orientations a rotation vector in the body frame whose length is
         an integer.
@@ -37,12 +43,17 @@ class State:
 
     q: npt.ArrayLike
     v: npt.ArrayLike | None = None
+    _: KW_ONLY
     free: Sequence[str] = ()
     free_velocity: Sequence[str] = ()
+    a: npt.ArrayLike | None = None
+    free_acceleration: Sequence[str] = ()
+    jerk: npt.ArrayLike | None = None
+    free_jerk: Sequence[str] = ()
     turns: Mapping[str, int | Sequence[int]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for key in ("free", "free_velocity"):
+        for key in _FREE:
             if isinstance(getattr(self, key), str):
                 object.__setattr__(self, key, (getattr(self, key),))
         if not isinstance(self.turns, Mapping):
@@ -61,15 +72,38 @@ class State:
         v = np.zeros(coordinates.nv) if self.v is None else self.v
         return q, coordinates.check_velocity(v, f"{name}.v")
 
-    def free_on(self, coordinates: Coordinates, name: str) -> Mask:
-        """Which components of q (in the tangent space) and of v are free, shape (2, nv).
+    def jet_on(self, coordinates: Coordinates, name: str, order: int) -> Array:
+        """(q, q', ..., q^(k-1)) on a vector space, shape (k, nv); empty on another. order: k.
+
+        Raises InputError as `on` does, and for derivatives that an end of this order does not have.
+        """
+        given = {"v": self.v, "a": self.a, "jerk": self.jerk}
+        for i, (key, value) in enumerate(given.items()):
+            if i >= order - 1 and (value is not None or len(getattr(self, _FREE[i + 1])) > 0):
+                raise InputError(
+                    f"{name} has {key} or {_FREE[i + 1]}, but motions of order {order} end at "
+                    f"values of {', '.join(['q', *given][:order])} only: leave them out."
+                )
+        if not coordinates.vector_joints:
+            return np.zeros((0, 0))
+        zero = np.zeros(coordinates.nv)
+        rates = [
+            coordinates.check_velocity(zero if x is None else x, f"{name}.{key}")
+            for key, x in given.items()
+        ]
+        return np.stack([self.on(coordinates, name)[0], *rates][:order])
+
+    def free_on(self, coordinates: Coordinates, name: str, order: int = 2) -> Mask:
+        """Which components of q (in the tangent space), v, ... are free, shape (k, nv).
+
+        order: k.
 
         Raises InputError for an unknown joint, and for parts of a joint's configuration that cannot
         be free by themselves.
         """
         rows = [
             _chosen_coordinates(coordinates, name, key, joints)
-            for key, joints in (("free", self.free), ("free_velocity", self.free_velocity))
+            for key, joints in ((key, getattr(self, key)) for key in _FREE[:order])
         ]
         for factor in coordinates.space.factors:
             _check_part(coordinates, name, factor.v.start, rows[0][factor.v], factor.group.angular)

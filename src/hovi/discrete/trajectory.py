@@ -28,12 +28,14 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
+from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
-_TORQUE = "tau"
+_PATH = ("q", "v", "z", "inner", "higher")
+_TORQUE, _HIGHER = "tau", "higher"
 
 
 class Sample(NamedTuple):
@@ -58,7 +60,7 @@ class Trajectory:
 
     grid: the intervals, each with its step and scheme.
     path: nodes, regularized coordinates and inner modes.
-    momenta: p and p~ at the nodes, shape (N + 1, 2, nv).
+    momenta: p and p~ at the nodes, shape (N + 1, k, nv) for a Lagrangian of order k.
     scene: None for a Lagrangian without one, and for a loaded motion of a robot that was given as
         a Pinocchio model.
     metadata: JSON-compatible data about the origin (cost, status, versions), without wall times.
@@ -130,15 +132,20 @@ class Trajectory:
 
     def configurations(self, t: npt.ArrayLike) -> Array:
         """q of `sample`, shape (M, nq), without computing torques."""
-        return self._interpolate(*self._locate(t))[0]
+        return self._interpolate(*self._locate(t), 0)[0]
 
-    def jet(self, t: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """q, v and a of `sample`, without computing torques."""
-        return self._interpolate(*self._locate(t))
+    def jet(self, t: npt.ArrayLike, order: int = 2) -> tuple[Array, ...]:
+        """(q, v, a) of `sample`, without computing torques.
 
-    def jet_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Array, Array, Array]:
-        """q, v and a of `sample_intervals`, without computing torques."""
-        return self._interpolate(*self._checked(k, s))
+        order: the highest derivative, up to that of the Lagrangian if it is above 2: 3 for jerk.
+        """
+        return self._interpolate(*self._locate(t), order)
+
+    def jet_intervals(
+        self, k: npt.ArrayLike, s: npt.ArrayLike, order: int = 2
+    ) -> tuple[Array, ...]:
+        """As `jet`, at the times of `sample_intervals`."""
+        return self._interpolate(*self._checked(k, s), order)
 
     def sample_intervals(self, k: npt.ArrayLike, s: npt.ArrayLike) -> Sample:
         """q, v, a and tau in given intervals, so that both limits at a node are available.
@@ -146,7 +153,7 @@ class Trajectory:
         k: interval numbers, shape (M,). s: positions in [0, 1] in the interval, shape (M,).
         """
         k, s = self._checked(k, s)
-        q, v, a = self._interpolate(k, s)
+        q, v, a = self._interpolate(k, s, 2)
         if self.torque is not None:
             return Sample(q, v, a, self.torque(k, s))
         assert self.scene is not None
@@ -183,22 +190,24 @@ class Trajectory:
         s[times >= nodes[-1]] = 1.0
         return k, s
 
-    def _interpolate(self, k: Index, s: Array) -> tuple[Array, Array, Array]:
-        """q, v, a (M, n): rows(s) @ (h v0, Z0, Z1, c), added to q0 in the interval's chart."""
-        h = self.grid.steps[k][:, None]
-        path = self.path
-        scaled = np.empty((len(k), 3, path.v.shape[1]))
+    def _interpolate(self, k: Index, s: Array, order: int) -> tuple[Array, ...]:
+        """(q, v, ..., q^(order)), each (M, n): rows(s) @ (h v0, Z, c) in the interval's chart."""
+        top = max(2, self.grid.order)
+        if not 0 <= order <= top:
+            raise InputError(f"this motion has derivatives up to {top}, not {order}.")
+        h, path, d = self.grid.steps[k][:, None], self.path, self.grid.order
+        scaled = np.empty((len(k), top + 1, path.v.shape[1]))
         for scheme, members in self.grid.groups:
             here = np.isin(k, members)
-            i, hi = k[here], h[here]
-            ends = np.stack([path.v[i] * hi, path.z[i, 0] * hi**2, path.z[i, 1] * hi**2], axis=1)
-            modes = path.inner[i, : scheme.inner_modes] * hi[:, None] ** 2
-            data = np.concatenate([ends, modes], axis=1)  # (m, 3 + r, nv)
-            scaled[here] = scheme.rows(s[here]) @ data
-        x, dx, ddx = scaled[:, 0], scaled[:, 1] / h, scaled[:, 2] / h**2
+            i, powers = k[here], h[here] ** np.arange(d + 1)
+            modes = np.concatenate([path.z[i], path.inner[i, : scheme.inner_modes]], axis=1)
+            ends = path.rates[i] * powers[:, 1:d, None]
+            data = np.concatenate([ends, modes * powers[:, d:, None]], axis=1)
+            scaled[here] = _rows(scheme, s[here], top) @ data
+        x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:
-            return path.q[k] + x, dx, ddx
-        return Chart(self.space).jet(path.q[k], x, dx, ddx)
+            return (path.q[k] + x, *rates)[: order + 1]
+        return Chart(self.space).jet(path.q[k], x, *rates)[: order + 1]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to one npz file, atomically and with reproducible bytes.
@@ -217,6 +226,8 @@ class Trajectory:
             "inner": self.path.inner,
             "momenta": self.momenta,
         }
+        if self.path.higher.size:
+            arrays[_HIGHER] = self.path.higher
         metadata = {"versions": _versions(), **self.metadata}
         scene = None
         if self.scene is not None and self.scene.robot.source.kind != "model":
@@ -240,7 +251,7 @@ class Trajectory:
 
         Raises TrajectoryFileError with one sentence about what is wrong with the file.
         """
-        header, arrays = read_arrays(path, _ARRAYS, optional=[_TORQUE])
+        header, arrays = read_arrays(path, _ARRAYS, optional=[_TORQUE, _HIGHER])
         try:
             schemes = _schemes(header["schemes"], arrays["inner"].shape)
             metadata = header["metadata"]
@@ -251,7 +262,7 @@ class Trajectory:
                 _check_coordinates(metadata["coordinates"], arrays["v"].shape)
             loaded = cls(
                 grid=Grid(arrays["steps"], schemes),
-                path=DiscretePath(arrays["q"], arrays["v"], arrays["z"], arrays["inner"]),
+                path=DiscretePath(*(arrays[name] for name in _PATH if name in arrays)),
                 momenta=arrays["momenta"],
                 scene=scene,
                 metadata=metadata,
@@ -287,9 +298,11 @@ def _check_shapes(trajectory: Trajectory) -> None:
     expected = {
         "q": (path.q, (N + 1, nq)),
         "v": (path.v, (N + 1, nv if trajectory.scene is None else trajectory.scene.robot.nv)),
-        "z": (path.z, (N, 2, nv)),
-        "momenta": (trajectory.momenta, (N + 1, 2, nv)),
+        "z": (path.z, (N, grid.order, nv)),
+        "momenta": (trajectory.momenta, (N + 1, grid.order, nv)),
     }
+    if grid.order > 2:
+        expected["higher"] = (path.higher, (N + 1, grid.order - 2, nv))
     if trajectory.torque is not None:
         points, given = trajectory.torque.values.shape[1:]
         expected["tau"] = (trajectory.torque.values, (N, points, nv if given else 0))
@@ -304,6 +317,13 @@ def _check_shapes(trajectory: Trajectory) -> None:
     sizes = (nv, nv) if trajectory.space is None else (trajectory.space.nq, trajectory.space.nv)
     if (nq, nv) != sizes:
         raise InputError(f"nq is {nq} and nv is {nv}; the configuration space has {sizes}.")
+
+
+def _rows(scheme: Scheme, s: Array, top: int) -> Array:
+    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r)."""
+    if scheme.derivatives >= top:
+        return scheme.rows(s)
+    return jet_rows(s, scheme.derivatives, scheme.inner_modes, top)
 
 
 def _span(values: Array) -> str:

@@ -91,39 +91,45 @@ def repeated_integral(coefficients: Array, times: int) -> Array:
     return coefficients
 
 
-def jet_rows(s: Array, k: int, inner_modes: int) -> Array:
+def jet_rows(s: Array, k: int, inner_modes: int, highest: int | None = None) -> Array:
     """(q - q0, h q', ..., h^k q^(k)) at s over (h q0', ..., h^(k-1) q0^(k-1), Z, c).
 
     Z_j = h^k z_j, j < k, are the regularized end data and c the inner modes.
-    s: shape (M,). Returns shape (M, k + 1, 2 k - 1 + r).
+    s: shape (M,). highest: the highest derivative, k or more; k when None.
+    Returns shape (M, highest + 1, 2 k - 1 + r).
     """
-    s = np.asarray(s, dtype=np.float64)
-    taylor = [_taylor_column(s, k, i) for i in range(1, k)]
+    s, top = np.asarray(s, dtype=np.float64), k if highest is None else highest
+    taylor = [_taylor_column(s, top, i) for i in range(1, k)]
     signs = [(-1.0) ** m for m in end_degrees(k)]
-    basis = [x * _mode_column(s, k, m) for x, m in zip(signs, end_degrees(k), strict=True)]
+    basis = [x * _mode_column(s, k, m, top) for x, m in zip(signs, end_degrees(k), strict=True)]
     ends = np.stack(basis, axis=2) @ inverse_gamma(k)
-    modes = [_mode_column(s, k, m) for m in range(k, k + inner_modes)]
-    return np.concatenate([_stacked(taylor, s, k), ends, _stacked(modes, s, k)], axis=2)
+    modes = [_mode_column(s, k, m, top) for m in range(k, k + inner_modes)]
+    return np.concatenate([_stacked(taylor, s, top), ends, _stacked(modes, s, top)], axis=2)
 
 
-def _stacked(columns: list[Array], s: Array, k: int) -> Array:
-    return np.stack(columns, axis=2) if columns else np.zeros((len(s), k + 1, 0))
+def _stacked(columns: list[Array], s: Array, top: int) -> Array:
+    return np.stack(columns, axis=2) if columns else np.zeros((len(s), top + 1, 0))
 
 
-def _taylor_column(s: Array, k: int, i: int) -> Array:
-    """Coefficients of h^i q0^(i) in each derivative: s^(i-j) / (i-j)!, shape (M, k + 1)."""
-    column = np.zeros((len(s), k + 1))
+def _taylor_column(s: Array, top: int, i: int) -> Array:
+    """Coefficients of h^i q0^(i) in each derivative: s^(i-j) / (i-j)!, shape (M, top + 1)."""
+    column = np.zeros((len(s), top + 1))
     for j in range(i + 1):
         column[:, j] = s ** (i - j) / factorial(i - j)
     return column
 
 
-def _mode_column(s: Array, k: int, degree: int) -> Array:
-    """The k integrals of sqrt(2 m + 1) P_m(2 s - 1), the k-fold one first, shape (M, k + 1)."""
+def _mode_column(s: Array, k: int, degree: int, top: int) -> Array:
+    """The k integrals of sqrt(2 m + 1) P_m(2 s - 1), the k-fold one first, (M, top + 1).
+
+    Derivatives of the polynomial itself follow where top > k.
+    """
     series = np.zeros(degree + 1)
     series[degree] = np.sqrt(2 * degree + 1)
-    column = np.zeros((len(s), k + 1))
-    for j in range(k + 1):
-        integral = repeated_integral(series, k - j)
-        column[:, j] = integral @ legendre(2 * s - 1, max(len(integral) - 1, 1))[: len(integral)]
+    column = np.zeros((len(s), top + 1))
+    for j in range(top + 1):
+        terms: Array = repeated_integral(series, max(k - j, 0))
+        if j > k:
+            terms = np.asarray(2.0 ** (j - k) * np.polynomial.legendre.legder(series, j - k))
+        column[:, j] = terms @ legendre(2 * s - 1, max(len(terms) - 1, 1))[: len(terms)]
     return column

@@ -23,8 +23,8 @@ class ActionStructure:
     """Unknowns, metric and elimination order of a grid, each computed on first use.
 
     grid: the intervals. dof: n, the degrees of freedom.
-    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, n); None for
-        fixed ends.
+    free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
+        (2, k, n); None for fixed ends.
     """
 
     grid: Grid
@@ -38,13 +38,13 @@ class ActionStructure:
 
     @cached_property
     def sizes(self) -> dict[Coordinates, Array]:
-        """Factors from columns to changes of q, T v and h^2 c, or 0, shape (N or 1, m, 1)."""
-        h = self.grid.steps
-        speed = self.grid.duration / (h[:1] if np.ptp(h) == 0 else h)
-        sizes = np.ones((len(speed), 4 + self.grid.inner_modes, 1))
-        sizes[:, 1, 0] = sizes[:, 3, 0] = speed
+        """Factors from columns to changes of q, T^j q^(j) and h^k c, or 0, (N or 1, m, 1)."""
+        h, k = self.grid.steps, self.grid.order
+        ratio = self.grid.duration / (h[:1] if np.ptp(h) == 0 else h)
+        sizes = np.ones((len(ratio), 2 * k + self.grid.inner_modes, 1))
+        sizes[:, : 2 * k, 0] = ratio[:, None] ** np.tile(np.arange(k), 2)
         regular = sizes.copy()
-        regular[:, 2:4] = 0.0
+        regular[:, k : 2 * k] = 0.0
         return {"nodal": sizes, "regular": regular}
 
     @cached_property
@@ -58,12 +58,12 @@ class ActionStructure:
         return self.layout.assemble(self.metric["nodal"][..., None, None] * np.eye(self.dof))
 
     def _scales(self) -> Array | None:
-        """Ratios of columns and unknowns, h / mean h for velocities; None if steps are equal."""
-        steps = self.grid.steps
+        """Ratios of columns and unknowns, (h / mean h)^j of q^(j); None if steps are equal."""
+        steps, k = self.grid.steps, self.grid.order
         if np.ptp(steps) == 0:
             return None
-        scales = np.ones((self.grid.intervals, 4 + self.grid.inner_modes))
-        scales[:, 1] = scales[:, 3] = steps / steps.mean()
+        scales = np.ones((self.grid.intervals, 2 * k + self.grid.inner_modes))
+        scales[:, : 2 * k] = (steps / steps.mean())[:, None] ** np.tile(np.arange(k), 2)
         return scales
 
     @cached_property
@@ -78,13 +78,15 @@ class ActionStructure:
 
 
 def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
-    """The trust region's metric: T^3 integral |da|^2 over each interval, shape (N, m, m)."""
-    metric = np.zeros((grid.intervals, 4 + grid.inner_modes, 4 + grid.inner_modes))
+    """The trust region's metric: T^(2k-1) integral |dq^(k)|^2 over each interval, (N, m, m)."""
+    k = grid.order
+    m = 2 * k + grid.inner_modes
+    metric = np.zeros((grid.intervals, m, m))
     for scheme, index in grid.groups:
-        rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 2]
-        k = rows.shape[1]
-        scale = (grid.duration / grid.steps[index]) ** 3
-        metric[index, :k, :k] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
+        rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, k]
+        own = rows.shape[1]
+        scale = (grid.duration / grid.steps[index]) ** (2 * k - 1)
+        metric[index, :own, :own] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
     return metric
 
 
@@ -94,14 +96,14 @@ def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
     Nodes and inner modes alternate along the motion. Shape (N, m, n).
     free_ends: as in ActionStructure.
     """
-    N, r = grid.intervals, grid.inner_modes
+    N, r, k = grid.intervals, grid.inner_modes, grid.order
     modes = np.zeros(N, dtype=np.intp)
     for scheme, index in grid.groups:
         modes[index] = scheme.inner_modes
-    free = np.ones((2 * N + 1, max(2, r), n), dtype=bool)  # nodes and inner modes alternate
-    free[0::2, 2:] = False
-    free[[0, -1], :2] = False if free_ends is None else free_ends
-    free[1::2] = np.arange(max(2, r))[:, None] < modes[:, None, None]
+    free = np.ones((2 * N + 1, max(k, r), n), dtype=bool)  # nodes and inner modes alternate
+    free[0::2, k:] = False
+    free[[0, -1], :k] = False if free_ends is None else free_ends
+    free[1::2] = np.arange(max(k, r))[:, None] < modes[:, None, None]
     numbers = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
-    nodes, inner = numbers[0::2, :2], numbers[1::2, :r]
+    nodes, inner = numbers[0::2, :k], numbers[1::2, :r]
     return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1)

@@ -14,7 +14,17 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import Boundary, Curve, path_on_grid
+from hovi.discrete.guess import (
+    Boundary,
+    Curve,
+    hermite,
+    moved,
+    moved_any,
+    named_curve,
+    path_of_any_order,
+    path_on_grid,
+    with_turns,
+)
 from hovi.discrete.state import State
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
@@ -51,13 +61,15 @@ class TrajectoryProblem:
     D2 L_d(k) + D4 L_d(k-1) = 0 at the inner nodes are its first-order conditions.
     [ColomboFerraroMartin2016, section 3]
 
-    ld: the discrete Lagrangian on a grid, of order 2: the effort of a scene, or any other.
+    ld: the discrete Lagrangian on a grid: of the effort of a scene, or any other.
     start: state at t = 0. goal: state at t = T, or a task-space goal.
     limits: bounds along the motion; none if None.
     via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None.
     boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
-    free_ends: which of (q, v) are free at the start and at the goal, shape (2, 2, nv).
+    end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, shape (2, k, nv).
+    free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
+        (2, k, nv).
     conditions: equations at nodes. unreachable: why the goal cannot be met, or "".
     turns: full turns of the initial guess beyond the shortest path, as rotation vectors over 2 pi,
         shape (nv,).
@@ -71,6 +83,7 @@ class TrajectoryProblem:
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
     boundary: Boundary = field(init=False, repr=False)
+    end_jets: Array = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
@@ -79,7 +92,7 @@ class TrajectoryProblem:
     def __post_init__(self) -> None:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
-        _require_order_of(self.ld)
+        _require_supported(self)
         if self.about_robot:
             require_plannable(self.scene)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
@@ -99,10 +112,11 @@ class TrajectoryProblem:
                 NodeCondition(node, each) for each in via_conditions(via, reached, coordinates)
             ]
             unreachable = unreachable or reached.reason
-        free = (
-            self.start.free_on(coordinates, "start"),
-            end.state.free_on(coordinates, "goal"),
-        )
+        k = self.ld.k
+        named = (self.start, "start"), (end.state, "goal")
+        free = [state.free_on(coordinates, name, k) for state, name in named]
+        jets = np.stack([state.jet_on(coordinates, name, k) for state, name in named])
+        object.__setattr__(self, "end_jets", jets)
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
@@ -150,12 +164,36 @@ class TrajectoryProblem:
 
     def path(self, curve: Curve) -> DiscretePath:
         """A curve sampled on the grid, with the problem's ends in fixed components."""
+        if self.ld.k != 2:
+            ends = np.stack(curve(np.array([0.0, self.grid.duration]))[: self.ld.k], axis=1)
+            return path_of_any_order(curve, self.grid, self._with_fixed(ends))
         q, v, _ = curve(np.array([0.0, self.grid.duration]))
         return path_on_grid(curve, self.grid, self.ends(q, v), self.coordinates)
 
+    def moved(self, path: DiscretePath) -> DiscretePath:
+        """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
+        if self.ld.k == 2:
+            return moved(path, self.grid, self.ends(path.q, path.v), self.coordinates)
+        nodes = np.concatenate([path.q[:, None], path.rates], axis=1)[[0, -1]]
+        return moved_any(path, self.grid, self._with_fixed(nodes))
+
+    def guess(self, name: str) -> DiscretePath:
+        """The guess with a name; for orders other than 2 always the Hermite polynomial."""
+        T = self.grid.duration
+        if self.ld.k != 2:
+            return self.path(hermite(self.end_jets, T))
+        curve = named_curve(name, self.coordinates, self.boundary, T)
+        if self.turns.any():
+            curve = with_turns(curve, self.coordinates, T, self.turns)
+        return self.path(curve)
+
+    def _with_fixed(self, ends: Array) -> Array:
+        """Ends (2, k, nv) with the problem's own in fixed components."""
+        return np.where(self.free_ends, ends, self.end_jets)
+
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
-        momenta = np.zeros((path.intervals + 1, 2, path.v.shape[1]))
+        momenta = np.zeros((path.intervals + 1, self.ld.k, path.v.shape[1]))
         return self.motion(path, momenta, {})
 
     def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
@@ -263,13 +301,21 @@ class TrajectoryProblem:
         return self.scene.robot if self.about_robot else self.ld.lagrangian.coordinates
 
 
-def _require_order_of(ld: DiscreteLagrangian) -> None:
-    """Raise InputError for a Lagrangian that is not of order 2."""
-    order = ld.lagrangian.order
-    if order != 2:
+def _require_supported(problem: TrajectoryProblem) -> None:
+    """Raise InputError for what is only there for Lagrangians of order 2."""
+    k = problem.ld.k
+    limited = problem.limits is not None and bool(problem.limits.bounded.any())
+    wanted = {
+        "limits": limited,
+        "obstacles": problem.clearance is not None and problem.clearance.wanted,
+        "via points": bool(problem.via),
+        "goals of frames": isinstance(problem.goal, FrameGoal),
+    }
+    named = [what for what, is_wanted in wanted.items() if is_wanted]
+    if k != 2 and named:
         raise InputError(
-            f"a trajectory problem takes Lagrangians of order 2, this one is of order {order}: use "
-            "hovi.flow for its initial value problem."
+            f"{' and '.join(named)} are there for Lagrangians of order 2, and this one is of order "
+            f"{k}: leave them out."
         )
 
 

@@ -166,8 +166,9 @@ def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
     if problem.limited or problem.constrained:
         raise InputError("multipliers of limits or constraints contribute to it")
     D = problem.ld.derivatives(trajectory.path)
-    jump = np.abs(D[:-1, 2:] + D[1:, :2]).max(axis=(0, 2), initial=0.0)
-    sizes = np.abs(D).reshape(len(D), 2, 2, -1).max(axis=(0, 1, 3))
+    k = problem.ld.k
+    jump = np.abs(D[:-1, k:] + D[1:, :k]).max(axis=(0, 2), initial=0.0)
+    sizes = np.abs(D).reshape(len(D), 2, k, -1).max(axis=(0, 1, 3))
     return float(np.max(jump / np.maximum(sizes, np.finfo(float).tiny)))
 
 

@@ -136,7 +136,7 @@ def finer_solution(
     objective, known = ActionObjective(fine), float(np.sum(values))
     efforts = interpolated_slopes(problem.ld, path, fine.ld)
     model = objective.model_with(start, efforts, None)
-    gains = _gains(objective.expansion, values)
+    gains = _gains(objective.expansion, values, 2 * fine.ld.k)
     found = nearby_minimum(objective, start, model, known)
     if found is not None:
         return FinerSolution(fine, found.path, found.value, known, gains, found.solution)
@@ -175,15 +175,18 @@ def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:
     N, r, n = path.inner.shape
     inner = np.zeros((N, fine.inner_modes, n))
     inner[:, :r] = path.inner
-    return DiscretePath(path.q, path.v, path.z, inner)
+    return DiscretePath(path.q, path.v, path.z, inner, path.higher)
 
 
-def _gains(expansion: Expansion, values: Array) -> Array:
-    """L_d of the coarse path, minus the extremum of the finer L_d over the inner modes alone."""
+def _gains(expansion: Expansion, values: Array, ends: int) -> Array:
+    """L_d of the coarse path, minus the extremum of the finer L_d over the inner modes alone.
+
+    ends: 2 k, the number of columns of an interval's ends.
+    """
     N, m, n = expansion.gradient.shape
-    size = (m - 4) * n
-    g = expansion.gradient[:, 4:].reshape(N, size, 1)
-    H = expansion.hessian[:, 4:, 4:].transpose(0, 1, 3, 2, 4).reshape(N, size, size)
+    size = (m - ends) * n
+    g = expansion.gradient[:, ends:].reshape(N, size, 1)
+    H = expansion.hessian[:, ends:, ends:].transpose(0, 1, 3, 2, 4).reshape(N, size, size)
     # inner modes that an interval does not have are rows of zeros
     absent = np.asarray(~H.any(axis=2))
     H = H + absent[:, :, None] * np.eye(size)

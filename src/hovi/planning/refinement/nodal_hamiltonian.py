@@ -53,22 +53,23 @@ def nodal_hamiltonian(problem: TrajectoryProblem, trajectory: Trajectory) -> Nod
         raise InputError("with equality constraints a does not follow from p~ alone")
     if problem.ld.lagrangian.timed:
         raise InputError("the cost or the torques depend on time, and so does H")
-    lagrangian, p = problem.ld.lagrangian, trajectory.momenta
-    a = _accelerations(lagrangian, trajectory)
-    L = lagrangian.value(trajectory.q, trajectory.v, a)
-    pv, pa = np.vecdot(p[:, 0], trajectory.v), np.vecdot(p[:, 1], a)
-    return NodalHamiltonian(pv + pa - L, float(np.max(np.abs(pv) + np.abs(pa) + np.abs(L))))
+    lagrangian, p, path = problem.ld.lagrangian, trajectory.momenta, trajectory.path
+    jet = path.q, *np.moveaxis(path.rates, 1, 0)
+    top = _highest(lagrangian, jet, p[:, -1])
+    L = lagrangian.value(*jet, top)
+    terms = [np.vecdot(p[:, j], x) for j, x in enumerate((*jet[1:], top))]
+    sizes = np.sum(np.abs(terms), axis=0) + np.abs(L)
+    return NodalHamiltonian(np.sum(terms, axis=0) - L, float(np.max(sizes)))
 
 
-def _accelerations(lagrangian: Lagrangian, trajectory: Trajectory) -> Array:
-    """a of p~ = dL~/da at the nodes, shape (N + 1, nv)."""
-    q, v, pt = trajectory.q, trajectory.v, trajectory.momenta[:, 1]
+def _highest(lagrangian: Lagrangian, jet: tuple[Array, ...], momentum: Array) -> Array:
+    """q^(k) of p_(k-1) = dL/dq^(k) at the nodes, shape (N + 1, nv)."""
 
-    def system(a: Array) -> tuple[Array, Array]:
-        _, gradient, hessian = lagrangian.evaluate(q, v, a)
-        return gradient[:, -1] - pt, hessian[:, -1, :, -1]
+    def system(x: Array) -> tuple[Array, Array]:
+        _, gradient, hessian = lagrangian.evaluate(*jet, x)
+        return gradient[:, -1] - momentum, hessian[:, -1, :, -1]
 
-    a, found = newton(system, np.zeros_like(v))
+    x, found = newton(system, np.zeros_like(momentum))
     if not found.all():
         raise InputError("the cost does not determine a from p~ at every node")
-    return a
+    return x

@@ -17,7 +17,7 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import with_ends_of_nodes
 from hovi.discrete.interval_batch import Coordinates, Jet
-from hovi.discrete.interval_paths import move
+from hovi.discrete.interval_paths import move, move_any
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.merge_tree import MergeTreeModel
@@ -74,9 +74,12 @@ class ActionObjective(Objective[DiscretePath]):
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= MAX_BAND_INTERVALS
-        tree = problem.plain and problem.ld.chart is None and not small
-        if algebra == "tree" and not problem.plain:
-            raise InputError("algebra 'tree' needs fixed ends without conditions; use 'band'.")
+        mergeable = problem.plain and problem.ld.k == 2
+        tree = mergeable and problem.ld.chart is None and not small
+        if algebra == "tree" and not mergeable:
+            raise InputError(
+                "algebra 'tree' needs order 2 and fixed ends without conditions; use 'band'."
+            )
         self.algebra: LinearAlgebra = algebra or ("tree" if tree else "band")
         self._expansion: Expansion | None = None
         self._last: tuple[DiscretePath, list[Jet]] | None = None
@@ -225,7 +228,7 @@ class ActionObjective(Objective[DiscretePath]):
 
     def negative_eigenvalues(self, x: DiscretePath) -> int:
         """n_neg of the exact Hessian at x."""
-        if not self.problem.plain or self.ld.chart is not None:
+        if not self.problem.plain or self.ld.chart is not None or self.ld.k != 2:
             model = self.model(x, None, None)
             assert isinstance(model, BandModel)
             return model.negative_eigenvalues()
@@ -250,7 +253,8 @@ class ActionObjective(Objective[DiscretePath]):
         N, rho = self.problem.grid.intervals, known.node_penalty
         for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
             k = min(each.node, N - 1)
-            columns = slice(0, 2) if each.node < N else slice(2, 4)
+            first = 0 if each.node < N else self.ld.k
+            columns = slice(first, first + 2)
             q, v = x.q[each.node], x.v[each.node]
             c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
             force = mu + rho * c
@@ -263,6 +267,8 @@ class ActionObjective(Objective[DiscretePath]):
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
+        if self.ld.k != 2:
+            return move_any(x, model.gather(step), self.problem.grid.steps)
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
         path = _new_path(self._integrate(x.q, dq), *moved)

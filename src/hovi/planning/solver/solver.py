@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import check_path, moved, named_curve, stretched, with_turns
+from hovi.discrete.guess import check_path, moved, stretched
 from hovi.discrete.nodal_momenta import accumulated_momenta
+from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
@@ -229,18 +230,19 @@ def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> Me
 
 def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
     """A guess as a path on the problem's grid, with the problem's boundary data."""
-    coordinates, grid, boundary = problem.coordinates, problem.grid, problem.boundary
+    coordinates, grid = problem.coordinates, problem.grid
     if isinstance(guess, DiscretePath):
-        check_path(guess, grid, coordinates)
-        return moved(guess, grid, problem.ends(guess.q, guess.v), coordinates)
+        if problem.ld.k == 2:
+            check_path(guess, grid, coordinates)
+        else:
+            grid.require_path(guess, coordinates.nq, coordinates.nv)
+            require_continuous(guess, grid)
+        return problem.moved(guess)
     if isinstance(guess, str):
-        curve = named_curve(guess, coordinates, boundary, grid.duration)
-        if problem.turns.any():
-            curve = with_turns(curve, coordinates, grid.duration, problem.turns)
-        return problem.path(curve)
+        return problem.guess(guess)
     if guess.v.shape[1] != coordinates.nv:
         raise InputError(
             f"the guess has {guess.v.shape[1]} velocities, but {coordinates.owner} has "
             f"{coordinates.nv}; use a motion of the same one."
         )
-    return problem.path(stretched(guess, grid.duration))
+    return problem.path(stretched(guess, grid.duration, problem.ld.k))

@@ -6,7 +6,6 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import moved
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.quasi_newton import Smooth, descend
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -29,8 +28,7 @@ def follow(solved: DiscretePath, problem: TrajectoryProblem, corrections: int = 
     corrections: maximum number of quasi-Newton steps that follow; they reuse the factorisation of
         H and need one gradient each.
     """
-    ends = problem.ends(solved.q, solved.v)
-    path = moved(solved, problem.grid, ends, problem.coordinates)
+    path = problem.moved(solved)
     if not problem.plain:
         return path
     objective = ActionObjective(problem)
@@ -67,12 +65,14 @@ class _Action(Smooth[DiscretePath]):
 def _columns(objective: ActionObjective, old: DiscretePath, new: DiscretePath) -> Array:
     """Change of the intervals' columns between two paths, 0 for inner modes, shape (N, m, n)."""
     problem = objective.problem
-    h = problem.grid.steps[:, None]
-    dq, dv = problem.coordinates.difference(old.q, new.q), new.v - old.v
-    change = np.zeros((len(h), 4 + problem.grid.inner_modes, dv.shape[1]))
-    change[:, 0], change[:, 1] = dq[:-1], h * dv[:-1]
+    h, k = problem.grid.steps[:, None], problem.ld.k
+    dq = problem.coordinates.difference(old.q, new.q)
+    nodes = np.concatenate([dq[:, None], new.rates - old.rates], axis=1)  # (N + 1, k, n)
+    change = np.zeros((len(h), problem.ld.columns, dq.shape[1]))
+    powers = (h ** np.arange(k))[:, :, None]
+    change[:, :k] = powers * nodes[:-1]
     if objective.coordinates == "nodal":
-        change[:, 2], change[:, 3] = dq[1:], h * dv[1:]
+        change[:, k : 2 * k] = powers * nodes[1:]
     else:
-        change[:, 2:4] = h[:, None] ** 2 * (new.z - old.z)
+        change[:, k : 2 * k] = h[:, None] ** k * (new.z - old.z)
     return change

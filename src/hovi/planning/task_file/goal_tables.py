@@ -52,7 +52,7 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
     v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, keys, robot, toml)
     free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
     turns: dict[str, Any] = dict(getattr(end, "turns", {}))
-    state = State(q, v, tuple(free), tuple(free_velocity), turns)
+    state = State(q, v, free=tuple(free), free_velocity=tuple(free_velocity), turns=turns)
     for key, check in (
         ("q", lambda: robot.check_configuration(q, f"{name}.q")),
         ("v", lambda: robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")),
