@@ -18,10 +18,9 @@ from hovi.checks.shapes import require_shape
 from hovi.discrete.contraction import contract
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
-from hovi.discrete.interval_charts import IntervalCharts
+from hovi.discrete.interval_charts import IntervalCharts, charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
-from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.lagrangian import Lagrangian, PointTerms
 from hovi.schemes.scheme import regular_from_nodal
 from hovi.system.deadline import raise_if_late
@@ -178,7 +177,7 @@ class DiscreteLagrangian:
             if self.chart is None:
                 part = batch.contracted(point_gradient, coordinates)
             else:
-                part = _charts_on(self.chart, batch, path).nodal_gradient(point_gradient)
+                part = charts_on(self.chart, batch, path).nodal_gradient(point_gradient)
             gradient[batch.index, : part.shape[1]] = part
         return gradient
 
@@ -306,7 +305,7 @@ class DiscreteLagrangian:
         gradients = self.point_gradients(path, forces, jets)
         for batch, gradient in zip(self.batches, gradients, strict=True):
             if self.chart is not None:
-                g[batch.index] = _charts_on(self.chart, batch, path).end_gradient(gradient)
+                g[batch.index] = charts_on(self.chart, batch, path).end_gradient(gradient)
                 continue
             regular = batch.contracted(gradient, "regular")
             g[batch.index] = regular[:, : 2 * self.k]
@@ -384,27 +383,14 @@ class DiscreteLagrangian:
     def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
         """The jet at the quadrature points of a batch, each of shape (B * Q, n)."""
         space = self.lagrangian.space
-        return batch.jet(path) if space is None else _jet_on(space, batch, path)
+        return batch.jet(path) if space is None else jet_on(space, batch, path)
 
     def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
         if self.chart is None:
             return None
-        return [_charts_on(self.chart, batch, path) for batch in self.batches]
+        return [charts_on(self.chart, batch, path) for batch in self.batches]
 
     @cached_property
     def batches(self) -> list[IntervalBatch]:
         """The intervals in batches of one scheme, which are evaluated together."""
         return list(interval_batches(self.grid))
-
-
-def _jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
-    """As `IntervalBatch.jet`, in the charts q = q0 (+) x."""
-    return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
-
-
-def _charts_on(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
-    """The charts of a batch's intervals."""
-    h = batch.h[:, None, None]
-    v0, z = path.v[:-1][batch.index], path.z[batch.index]
-    ends = h * v0[:, None] + h**2 * z
-    return IntervalCharts(chart, batch.scheme, batch.h, batch.local(path), ends)

@@ -12,8 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.interval_batch import IntervalBatch, Jet
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.compiled_charts import CompiledCharts
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes import Scheme
 
 Array = npt.NDArray[np.float64]
@@ -76,3 +79,16 @@ class IntervalCharts:
         """The same charts over the columns of a table, (Q, 3, m)."""
         layout, weights = self.chart.space.layout, self.scheme.weights
         return CompiledCharts(layout, table, weights, self.h, self.x, self.ends, portable)
+
+
+def jet_on(space: ConfigurationSpace, batch: IntervalBatch, path: DiscretePath) -> Jet:
+    """As `IntervalBatch.jet`, in the charts q = q0 (+) x."""
+    return Chart(space).jets_from(path.q[:-1][batch.index], batch.local(path))
+
+
+def charts_on(chart: Chart, batch: IntervalBatch, path: DiscretePath) -> IntervalCharts:
+    """The charts of a batch's intervals."""
+    h = batch.h[:, None, None]
+    v0, z = path.v[:-1][batch.index], path.z[batch.index]
+    ends = h * v0[:, None] + h**2 * z
+    return IntervalCharts(chart, batch.scheme, batch.h, batch.local(path), ends)

@@ -146,7 +146,9 @@ class _ForwardDynamics:
         t = trajectory.t[:-1] + 0.5 * trajectory.grid.steps
         moving = self._added(motion.q, motion.v, motion.a, t)
         still = self._added(motion.q, motion.v, np.zeros_like(motion.a), t)
-        size = max(float(np.max(np.abs(motion.tau))), 1e-12)
+        # along a motion of mechanics tau is rounding, of which the inertial torque is the scale
+        holding = scene.inverse_dynamics(motion.q, motion.v, np.zeros_like(motion.a), t)
+        size = max(float(np.max(np.abs([motion.tau, holding]))), 1e-12)
         if np.max(np.abs(moving - still)) > TORQUE_TOLERANCE * size:
             raise InputError(
                 "an effect adds torques that depend on the acceleration, which ABA does not support"

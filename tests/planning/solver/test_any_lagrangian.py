@@ -210,12 +210,6 @@ def test_limits_of_a_urdf_need_a_robot() -> None:
         as_limits(hovi.spline(1).coordinates, "urdf")
 
 
-def test_other_orders_are_refused_by_number() -> None:
-    ld = hovi.DiscreteLagrangian(hovi.spline(1, 3), hovi.Grid.uniform(1.0, 4, galerkin(2)))
-    with pytest.raises(InputError, match="order 2, this one is of order 3"):
-        hovi.TrajectoryProblem(ld, State([0.0]), State([1.0]))
-
-
 def test_an_expression_of_other_symbols_is_refused_by_name() -> None:
     with pytest.raises(InputError, match="symbols that are not in its jet: t"):
         CasadiLagrangian([Q, V, A], A**2 + TIME)
