@@ -230,9 +230,13 @@ def test_jets_of_any_order_meet_the_end_data_and_are_exact_on_polynomials(k: int
     np.testing.assert_array_equal(scheme.table, scheme.rows(scheme.points))
 
 
-def test_torques_need_a_scheme_of_order_two() -> None:
-    with pytest.raises(SchemeError, match="for Lagrangians of order 3; torques need"):
-        require_regular(galerkin(1, derivatives=3))
+@pytest.mark.parametrize("k", [1, 3, 4])
+def test_galerkin_tables_of_any_order_are_regular(k: int) -> None:
+    """W_d of the spline is the matrix of the exact one: -1 for k = 1."""
+    require_regular(galerkin(2, k))
+    W = regularity_matrix(galerkin(0, k))
+    np.testing.assert_allclose(W, regularity_matrix(galerkin(5, k)), rtol=1e-9)
+    assert k > 1 or W[0, 0] == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize("k", [0, 5, -1, 2.0])

@@ -343,11 +343,11 @@ class DiscreteLagrangian:
         total, k, rates = self.action(path), self.k, path.rates
         gradients = self.point_gradients(path, forces)
         for jet, g, w in zip(self.jets(path), gradients, self.point_weights, strict=True):
-            total -= sum(j * float(w @ np.vecdot(g[:, j], jet[j])) for j in range(1, k + 1))
+            total -= float(w @ np.sum([j * np.vecdot(g[:, j], jet[j]) for j in range(1, k + 1)], 0))
         d = self.derivatives(path, forces)
         for j in range(1, k):
-            ends = d[:, j] * rates[:-1, j - 1] + d[:, k + j] * rates[1:, j - 1]
-            total += j * float(np.sum(ends))
+            first, last = d[:, j] * rates[:-1, j - 1], d[:, k + j] * rates[1:, j - 1]
+            total += j * float(np.sum(first) + np.sum(last))
         return total / self.grid.duration
 
     def _check(self, path: DiscretePath, jets: list[Jet] | None = None) -> None:

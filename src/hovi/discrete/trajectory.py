@@ -199,10 +199,10 @@ class Trajectory:
         scaled = np.empty((len(k), top + 1, path.v.shape[1]))
         for scheme, members in self.grid.groups:
             here = np.isin(k, members)
-            i, powers = k[here], h[here] ** np.arange(d + 1)
+            i, hi = k[here], h[here]
             modes = np.concatenate([path.z[i], path.inner[i, : scheme.inner_modes]], axis=1)
-            ends = path.rates[i] * powers[:, 1:d, None]
-            data = np.concatenate([ends, modes * powers[:, d:, None]], axis=1)
+            ends = path.rates[i] * (hi ** np.arange(1, d))[:, :, None]
+            data = np.concatenate([ends, modes * hi[:, None] ** d], axis=1)
             scaled[here] = _rows(scheme, s[here], top) @ data
         x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:
