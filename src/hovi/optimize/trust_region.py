@@ -82,6 +82,7 @@ class Options:
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only after a Newton step of an exact model, one not updated from an earlier model,
         after which only rounding errors remain.
+    near: whether the first iterate is near a solution, so that a barrier begins small.
     """
 
     decrease: float = 1e-11
@@ -91,6 +92,7 @@ class Options:
     radius: float = 10.0
     escape_saddles: bool = True
     exact: bool = False
+    near: bool = False
 
 
 @dataclass(frozen=True)

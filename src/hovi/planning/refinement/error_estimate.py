@@ -158,7 +158,7 @@ def _solved(
 
     Its gains are half the integral of the squared difference of the torques.
     """
-    solution = solve_on_grid(fine, start, time_limit=time_limit)
+    solution = solve_on_grid(fine, start, time_limit=time_limit, near=True)
     if not solution.success or solution.problem is None:
         return None
     coarse, finer = problem.trajectory(path), solution.trajectory

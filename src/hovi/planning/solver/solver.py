@@ -117,7 +117,7 @@ class Solution:
         if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
             path = moved(path, problem.grid, problem.boundary, problem.coordinates)
         if problem.limited or not problem.plain:
-            found = solve_on_grid(problem, path, **options)
+            found = solve_on_grid(problem, path, near=True, **options)
         else:
             found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
             found = dataclasses.replace(found, nit=found.nit + 1)
@@ -142,10 +142,13 @@ def solve_on_grid(
     escape_saddles: bool = True,
     report: Report | None = None,
     method: Method | None = None,
+    near: bool | None = None,
 ) -> Solution:
     """A motion that makes the discrete action stationary, without a check between the points.
 
-    Arguments, cost and errors as of `hovi.solve`, which checks the motion.
+    near: whether the guess is the motion of a similar problem, near which a minimum within limits
+        is looked for; that is so for a Trajectory when None.
+    Other arguments, cost and errors as of `hovi.solve`, which checks the motion.
     """
     began = time.perf_counter()
     method = method or method_for(problem)
@@ -159,6 +162,7 @@ def solve_on_grid(
         max_iterations=max_iterations,
         time_limit=time_limit,
         escape_saddles=escape_saddles,
+        near=isinstance(guess, Trajectory) if near is None else near,
     )
     started = time.perf_counter()
     try:

@@ -9,6 +9,7 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
+from hovi.optimize.barrier import Barrier
 from hovi.optimize.trust_region import Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.solver.action_objective import ActionObjective
@@ -35,6 +36,9 @@ MAX_STAGES = 8
 """Maximum number of stages."""
 STAGE_STEPS = 80
 """Maximum number of steps per stage, whose result is only a guess."""
+NEARBY_MU = 1e-2
+"""First barrier parameter from a motion that nearly is a solution, relative to the mean density of
+the objective: a larger one moves it away from its bounds, and perhaps to another minimum."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
@@ -44,10 +48,27 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     path = search.guess
     if search.clearance is not None:
         path = _moved_out_of_obstacles(search, path, search.clearance)
-    outcome = search.solve(path)
+    outcome = _solved_nearby(search, path) or search.solve(path)
     if outcome.feasible or outcome.stop is not Stop.DIVERGED:
         return outcome, ""
     return _restored(search, outcome)
+
+
+def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
+    """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
+    if not search.options.near or search.clearance is not None or search.problem.constrained:
+        return None
+    outcome = solved_from(search, path)
+    found = outcome.feasible and outcome.stop is Stop.STATIONARY
+    return outcome if found or outcome.stop in STOPPED else None
+
+
+def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
+    """Solve from a motion that nearly is a solution, with a small barrier from the beginning."""
+    objective = search.objective(search.multipliers)
+    outputs = objective.outputs(path)
+    mu = NEARBY_MU * mean_density(outputs, objective)
+    return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
 
 
 def _moved_out_of_obstacles(

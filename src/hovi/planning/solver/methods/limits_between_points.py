@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched
-from hovi.optimize.barrier import Barrier
 from hovi.optimize.trust_region import Stop
 from hovi.planning.solver.methods.bounded_search import (
     STOPPED,
@@ -16,7 +14,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
-from hovi.planning.solver.methods.feasibility import feasible_motion
+from hovi.planning.solver.methods.feasibility import feasible_motion, solved_from
 
 Array = npt.NDArray[np.float64]
 
@@ -33,8 +31,6 @@ NEIGHBOR_EXCESS = 0.01
 WARM_EXCESS = 0.2
 """Excess, as a share of the range, up to which the motion is the guess on halved intervals; one
 that exceeds limits further between the points is an artifact of the coarse grid."""
-HALVED_MU = 1e-2
-"""First barrier parameter from such a guess, relative to the mean density of the objective."""
 TIGHTENING_FACTOR = 1.5
 """Ratio of tightening and excess; above 1, since the next motion uses the range that is left."""
 MAX_TIGHTENING_FACTOR = 8.0
@@ -136,15 +132,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     search.multipliers = None
     search.margins, search.tightened = search.no_margins(), None
     if usable(outcome) and by_interval.max() <= WARM_EXCESS:
-        again = _solved_from(search, search.problem.path(motion))
+        again = solved_from(search, search.problem.path(motion))
         if usable(again) or again.stop in STOPPED:
             return again, ""
     return feasible_motion(search)
-
-
-def _solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
-    """Solve from a motion that nearly is a solution."""
-    objective = search.objective(search.multipliers)
-    outputs = objective.outputs(path)
-    mu = HALVED_MU * mean_density(outputs, objective)
-    return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
