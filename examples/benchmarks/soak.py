@@ -43,6 +43,8 @@ SIGNALS = {
 FAULTS = ("none", *SIGNALS, "killed worker", "full disk")
 DISK, FILE_SIZE = 64 * 1024, 3_000
 LONGEST, GRACE = 120.0, 10.0
+UNSTARTED = "init_import_site"
+"""In what Python prints if Ctrl-C meets it while it starts, before hovi can answer."""
 SCENE = """
 robot = "ur5"
 duration = {duration}
@@ -197,7 +199,7 @@ def _ending(process: subprocess.Popen[str]) -> str:
         process.kill()
         return f"its outputs had not ended after {LONGEST:g} s"
     errors = [line for line in err.splitlines() if line.startswith("error: ")]
-    if "Traceback" in err or len(errors) > 1:
+    if ("Traceback" in err and UNSTARTED not in err) or len(errors) > 1:
         return err.strip()
     ends = time.monotonic() + GRACE
     while _session(process.pid) and time.monotonic() < ends:
