@@ -384,7 +384,7 @@ def test_what_is_not_compiled_at_the_deadline_is_interpreted(
     monkeypatch.setenv("HOME", str(tmp_path))
     with Deadline(1.0).in_force():
         found = PointFunction(function(), compile=True)
-    x = np.ones((3, 1))
+    x = np.ones((3, 2))
     np.testing.assert_array_equal(found(x)[0], PointFunction(function())(x)[0])
     assert libraries(cache) == []
 

@@ -140,6 +140,10 @@ def test_invalid_simulations_are_refused(arm_scene: Scene, two_link: Robot) -> N
             simulate(arm_scene, START, 1.0, intervals=intervals)
     with pytest.raises(SceneError, match="'lagging' depends on the acceleration, but not as"):
         simulate(Scene(two_link, [Lagging()]), START, 1.0)
+    with pytest.raises(InputError, match=r"torque\(t\) must have shape \(\d+, 2\) .* got \(2,\)"):
+        simulate(arm_scene, START, 1.0, lambda t: np.zeros(2))
+    with pytest.raises(InputError, match=r"torque\(t\) must be numbers"):
+        simulate(arm_scene, START, 1.0, lambda t: None)  # type: ignore[arg-type,return-value]
     with pytest.raises(InputError, match=r"the flow ends at t = .* shorter step"):
         simulate(arm_scene, State([0, 0], [200.0, -300.0]), 10.0, intervals=3)
 

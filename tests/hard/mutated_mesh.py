@@ -55,7 +55,8 @@ def mutate(random: Random) -> Mutant:
         return Mutant(NAMED + name, "it lies outside, or nowhere")
     if kind < 0.15:
         name = random.choice((*MESHES_INSIDE, *MESHES_OUTSIDE)).encode()
-        return Mutant(NAMED + mutated_bytes(name, random, (b"../", b"package://", b"/", b"..")))
+        changed = mutated_bytes(name, random, (b"../", b"package://", b"/", b".."))
+        return Mutant(NAMED + random.choice((name, changed)))
     if kind < 0.45:
         return Mutant(_mesh(random.choice(OUTSIDE), is_collada, random), "it names a file outside")
     content = _mesh(random.choice((*INSIDE, *INSIDE, *INSIDE, *OUTSIDE)), is_collada, random)
