@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -139,6 +140,10 @@ def test_numbers_too_large_for_a_machine_word_become_doubles() -> None:
     assert isinstance(function(number=10**30)["number"], float)
     with pytest.raises(InputError, match=r"whole must be a whole number of at most 1e\+18, got"):
         function(whole=10**30)
+
+
+def test_fractions_become_doubles_since_numpy_refuses_them() -> None:
+    assert repr(function(number=Fraction(1, 4))["number"]) == "0.25"
 
 
 @check_arguments

@@ -29,6 +29,7 @@ from hovi.effects import Gravity, JointLimitPotential, SceneSymbols
 from hovi.planning.search.planner import plan
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.workers.pool import end_idle_workers
 from oracles.opened_files import opened_files
 from samples.compiled_functions import compile_and_evaluate, function, value_at_one
@@ -357,6 +358,34 @@ def test_a_failing_compiler_is_reported_with_its_first_error(
     monkeypatch.setenv("PATH", str(folder))
     with pytest.raises(CompilationError, match=r"fails on 'f' \(no such header\).*compile=False"):
         compiled(function())
+    assert libraries(cache) == []
+
+
+ENDLESS = """case "$1" in -O*) /bin/sleep 600 & echo $! > "$HOME/child"; wait;; esac"""
+
+
+def test_a_compiler_ends_at_the_deadline_with_its_children(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(a_compiler(tmp_path / "bin", ENDLESS)))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with Deadline(2.0).in_force(), pytest.raises(OutOfTimeError):
+        compiled(function())
+    child = int((tmp_path / "child").read_text())
+    stat = Path(f"/proc/{child}/stat")
+    assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
+    assert [path.name for path in (cache / "hovi" / "compiled").iterdir()] == []
+
+
+def test_what_is_not_compiled_at_the_deadline_is_interpreted(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(a_compiler(tmp_path / "bin", ENDLESS)))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    with Deadline(1.0).in_force():
+        found = PointFunction(function(), compile=True)
+    x = np.ones((3, 2))
+    np.testing.assert_array_equal(found(x)[0], PointFunction(function())(x)[0])
     assert libraries(cache) == []
 
 

@@ -16,6 +16,7 @@ from hovi.effects import (
     Effect,
     EffortWeight,
     Gravity,
+    JointLimitPotential,
     JointSprings,
     MovingBase,
     Payload,
@@ -38,6 +39,10 @@ CASES: dict[str, tuple[Effect, str]] = {
     "gravity upwards": (
         Gravity(-9.81),
         r"0 or more, got -9.81 .* upwards; .* `dir",
+    ),
+    "range of three": (
+        JointLimitPotential({"panda_joint2": (0.0, 1.0, 2.0)}),  # type: ignore[dict-item]
+        "range of 'panda_joint2' must be two numbers, got 3",
     ),
     "negative friction": (
         ViscousFriction({"panda_joint2": -0.1}),

@@ -135,10 +135,15 @@ def test_a_simulation_can_be_saved_and_replayed(arm_scene: Scene, tmp_path: Path
 def test_invalid_simulations_are_refused(arm_scene: Scene, two_link: Robot) -> None:
     with pytest.raises(InputError, match="duration must be positive"):
         simulate(arm_scene, START, 0.0)
-    with pytest.raises(InputError, match="intervals must be 1 or more"):
-        simulate(arm_scene, START, 1.0, intervals=0)
+    for intervals in (0, 10**7 + 1):
+        with pytest.raises(InputError, match="intervals must be from 1 to 10,000,000"):
+            simulate(arm_scene, START, 1.0, intervals=intervals)
     with pytest.raises(SceneError, match="'lagging' depends on the acceleration, but not as"):
         simulate(Scene(two_link, [Lagging()]), START, 1.0)
+    with pytest.raises(InputError, match=r"torque\(t\) must have shape \(\d+, 2\) .* got \(2,\)"):
+        simulate(arm_scene, START, 1.0, lambda t: np.zeros(2))
+    with pytest.raises(InputError, match=r"torque\(t\) must be numbers"):
+        simulate(arm_scene, START, 1.0, lambda t: None)  # type: ignore[arg-type,return-value]
     with pytest.raises(InputError, match=r"the flow ends at t = .* shorter step"):
         simulate(arm_scene, State([0, 0], [200.0, -300.0]), 10.0, intervals=3)
 

@@ -141,8 +141,9 @@ def test_a_plan_of_another_robot_is_refused(planned: Trajectory, ur5: Robot, sim
         play(Scene(ur5), planned)
     with pytest.raises(InputError, match="no feedback 'pid': did you mean 'pd'"):
         play(simple, planned, "pid")
-    with pytest.raises(InputError, match="bandwidth must be positive"):
-        play(simple, planned, "pd", bandwidth=0.0)
+    for bandwidth in (0.0, 1e300, float("nan")):
+        with pytest.raises(InputError, match="bandwidth must be positive and at most"):
+            play(simple, planned, "pd", bandwidth=bandwidth)
 
 
 def test_a_plan_without_a_scene_is_executed_open_loop(simple: Scene, planned: Trajectory) -> None:

@@ -13,6 +13,8 @@ import json
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -39,11 +41,15 @@ class Nothing:
         return "Nothing()"
 
 
+ITSELF: list[Any] = []
+ITSELF.append(ITSELF)
 NEVER: tuple[Any, ...] = (Nothing(), b"bytes", 1j, [Nothing()])
 WRONG: tuple[Any, ...] = (
     *NEVER,
     *({1: Nothing()}, {"elbow": Nothing()}),
     *(None, "x", "", "nan", 3, -1, 0, 2.5, True, 10**400, 10**30, float("nan"), float("inf")),
+    *(1e300, -1e300, 5e-324, Fraction(1, 3), Decimal(1), [1e300, 1e300], {"elbow": 1e300}),
+    *({"elbow": [1, 2, 3]}, {"elbow": "x"}, "a" * 300, "\ud800", memoryview(b"abc"), ITSELF),
     *(
         [],
         [[]],

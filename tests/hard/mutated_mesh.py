@@ -30,6 +30,15 @@ OUTSIDE = (
     *("../outside/secret.png", "sub/../../outside/secret.png", "{outside}/secret.png"),
     *("link.png", "links/secret.png", "./links/../links/secret.png", "sub/../link.png"),
 )
+NAMED = b"mesh named "
+"""Start of an input that is the name of a mesh in the URDF, and not its content."""
+MESHES_INSIDE = ("rod.obj", "sub/../rod.obj", "package://package/rod.obj", "file://rod.obj")
+MESHES_OUTSIDE = (
+    *("../outside/secret.obj", "file://{outside}/secret.obj", "link.obj", "links/secret.obj"),
+    *("package://{above}/outside/secret.obj", "package://outside/secret.obj", "loop.obj"),
+    *("package://{above}/package/rod.obj", "file://package://../outside/secret.obj"),
+    *("a" * 300 + ".obj", "a/" * 3_000 + "rod.obj", "package://" + "p" * 300 + "/rod.obj"),
+)
 TOKENS = (
     *(b"<init_from>", b"</init_from>", b"<image>", b"library_images", b"<!--", b"-->", b"../"),
     *(b"../outside/secret.png", b"link.png", b"mtllib ", b"\\\n", b"\\", b"\r", b"\0", b"\f"),
@@ -41,6 +50,13 @@ def mutate(random: Random) -> Mutant:
     """A mesh with names of files; those outside must be refused. {outside} is that folder."""
     is_collada = random.random() < 0.6
     kind = random.random()
+    if kind < 0.1:
+        name = random.choice(MESHES_OUTSIDE).encode()
+        return Mutant(NAMED + name, "it lies outside, or nowhere")
+    if kind < 0.15:
+        name = random.choice((*MESHES_INSIDE, *MESHES_OUTSIDE)).encode()
+        changed = mutated_bytes(name, random, (b"../", b"package://", b"/", b".."))
+        return Mutant(NAMED + random.choice((name, changed)))
     if kind < 0.45:
         return Mutant(_mesh(random.choice(OUTSIDE), is_collada, random), "it names a file outside")
     content = _mesh(random.choice((*INSIDE, *INSIDE, *INSIDE, *OUTSIDE)), is_collada, random)
@@ -59,10 +75,9 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
     """Show it on a page; `folder` gets a package and a folder outside of it."""
     package, outside = folder / "package", folder / "outside"
     _prepare(package, outside)
-    is_collada = mutant.content.lstrip()[:1] == b"<"
-    mesh = package / ("rod.dae" if is_collada else "rod.obj")
-    mesh.write_bytes(mutant.content.replace(b"{outside}", str(outside).encode()))
-    urdf = mesh_arm(package, mesh.name)
+    urdf = _named(mutant.content, package, outside) or _with_content(
+        mutant.content, package, outside
+    )
     page = folder / "page.html"
     page.unlink(missing_ok=True)
     opened: set[str] = set()
@@ -86,6 +101,24 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
     return judge(load, error_in, mutant.reason)
 
 
+def _named(content: bytes, package: Path, outside: Path) -> Path | None:
+    """The URDF of a mesh with this name; None if the content is that of a mesh."""
+    if not content.startswith(NAMED):
+        return None
+    name = content.removeprefix(NAMED).decode(errors="replace")
+    name = name.replace("{outside}", str(outside)).replace("{above}", package.parent.name)
+    (package / "rod.obj").write_text(obj(""))
+    return mesh_arm(package, xml.sax.saxutils.escape(name, {'"': "&quot;"}))
+
+
+def _with_content(content: bytes, package: Path, outside: Path) -> Path:
+    """The URDF of a mesh with this content."""
+    is_collada = content.lstrip()[:1] == b"<"
+    mesh = package / ("rod.dae" if is_collada else "rod.obj")
+    mesh.write_bytes(content.replace(b"{outside}", str(outside).encode()))
+    return mesh_arm(package, mesh.name)
+
+
 def _prepare(package: Path, outside: Path) -> None:
     if package.exists():
         return
@@ -93,6 +126,9 @@ def _prepare(package: Path, outside: Path) -> None:
     outside.mkdir()
     for name in ("secret.png", "secret.mtl"):
         (outside / name).write_bytes(SECRET)
+    (outside / "secret.obj").write_text(obj(""))
+    (package / "link.obj").symlink_to(outside / "secret.obj")
+    (package / "loop.obj").symlink_to("loop.obj")
     for name in ("in.png", "sub/in.png", "in.mtl"):
         (package / name).write_bytes(b"newmtl a\nKd 1 0 0\n")
     (package / "inner.png").symlink_to("sub/in.png")

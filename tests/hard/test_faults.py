@@ -342,3 +342,22 @@ def test_an_interrupt_swallowed_by_an_imported_module_is_raised_again(tmp_path: 
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "begun\n", "")
+
+
+@pytest.mark.parametrize("unnamed", [True, False])
+def test_the_longest_names_are_written(
+    unnamed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not unnamed:
+        monkeypatch.setattr("hovi.system.files._DESCRIPTORS", tmp_path / "no proc")
+    for letter in ("a", "\u4e2d", "\U0001f600"):
+        name = letter * (255 // len(letter.encode()))
+        with whole_file(tmp_path / name) as stream:
+            stream.write(b"whole")
+        assert (tmp_path / name).read_bytes() == b"whole"
+
+
+@pytest.mark.parametrize("name", ["a\0b", "\ud800"])
+def test_a_name_that_no_file_can_have_is_an_error_of_the_system(name: str, tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="no file can have that name"), whole_file(tmp_path / name):
+        pass

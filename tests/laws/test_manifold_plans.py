@@ -129,6 +129,7 @@ def test_invalid_turns_are_refused() -> None:
     for bad, who, words in (
         ({"j2s6s200_joint_2": 1}, robot, "no joint 'j2s6s200_joint_2' that can make full turns"),
         ({"j2s6s200_joint_1": 0.5}, robot, "takes an integer"),
+        ({"j2s6s200_joint_1": 1e300}, robot, "takes an integer, at most 1,000,000 turns"),
         ({"j0": 1}, free, "three numbers of integer length"),
         ({"j0": [0.5, 0.0, 0.0]}, free, "three numbers of integer length"),
     ):

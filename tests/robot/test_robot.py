@@ -240,6 +240,56 @@ def test_a_mesh_outside_the_package_is_never_read(tmp_path: Path, mesh: str) -> 
     assert load_robot(urdf, package_dirs=[tmp_path / "outside"]).nv == 1
 
 
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_a_folder_above_the_urdf_is_no_package_by_its_name_alone(
+    depth: int, tmp_path: Path
+) -> None:
+    """package://home/... would be every user's files."""
+    folder = tmp_path / "home" / "user" / "downloads"
+    folder.mkdir(parents=True)
+    above = folder.parents[depth - 1]
+    (above / "rod.stl").write_text(TRIANGLE)
+    urdf = mesh_arm(folder, f"package://{above.name}/rod.stl")
+    robot = load_robot(urdf)
+    assert robot.visual is None
+    assert "was not found" in robot.visual_problem
+    (above / "package.xml").write_text("<package/>")
+    assert load_robot(urdf).visual is not None
+
+
+def test_the_folder_of_the_urdf_is_a_package_by_its_name(tmp_path: Path) -> None:
+    (tmp_path / "rod.stl").write_text(TRIANGLE)
+    assert load_robot(mesh_arm(tmp_path, f"package://{tmp_path.name}/rod.stl")).visual is not None
+
+
+@pytest.mark.parametrize(
+    ("mesh", "package"),
+    [
+        *(("a" * 300 + ".stl", "."), ("a/" * 5_000 + "x.stl", "."), ("loop.stl", ".")),
+        *(("package://" + "p" * 300 + "/x.stl", "."), ("package://p/x.stl", "a\0")),
+        ("package://p/x.stl", "a" * 5_000),
+    ],
+)
+def test_a_path_that_no_mesh_can_have_is_reported(mesh: str, package: str, tmp_path: Path) -> None:
+    (tmp_path / "loop.stl").symlink_to("loop.stl")
+    robot = load_robot(mesh_arm(tmp_path, mesh), package_dirs=[package])
+    assert robot.visual is None
+    assert "cannot be looked for" in robot.visual_problem
+    assert len(robot.visual_problem) < 500
+
+
+def test_the_sum_of_all_meshes_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "rod.stl").write_text(TRIANGLE)
+    urdf = mesh_arm(tmp_path, "rod.stl")
+    shape = '<visual><geometry><mesh filename="rod.stl"/></geometry></visual>'
+    urdf.write_text(urdf.read_text().replace(shape, 3 * shape))
+    monkeypatch.setattr("hovi.robot.geometry.MAX_ALL_MESHES", 2 * len(TRIANGLE))
+    robot = load_robot(urdf)
+    assert robot.visual is not None
+    assert robot.visual.ngeoms == 2
+    assert "the meshes of all shapes exceed" in robot.visual_problem
+
+
 def test_a_symbolic_link_out_of_the_package_is_not_followed(tmp_path: Path) -> None:
     for folder in ("outside", "inside"):
         (tmp_path / folder).mkdir()

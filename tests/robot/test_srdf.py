@@ -93,8 +93,11 @@ def test_a_motion_is_planned_between_poses(models: Path, tmp_path: Path) -> None
         ("<robot><group_state", "not well-formed"),
         ("<model/>", "<robot>, not <model>"),
         ("<robot><group_state/></robot>", "lacks its attribute 'name'"),
-        (ARM.replace('value="2"', 'value="nan"'), "must be finite numbers, got 'nan'"),
-        (ARM.replace('value="2"', 'value="1,5"'), "must be finite numbers, got '1,5'"),
+        (ARM.replace('value="2"', 'value="nan"'), "must be plain finite numbers .* got 'nan'"),
+        (ARM.replace('value="2"', 'value="1,5"'), "must be plain finite numbers .* got '1,5'"),
+        (ARM.replace('value="2"', 'value="1_0"'), "must be plain finite numbers .* got '1_0'"),
+        (ARM.replace('value="2"', 'value="\u0663"'), "must be plain finite numbers .* got"),
+        (ARM.replace('value="2"', 'value="1e300"'), r"at most 1e\+12, got '1e300'"),
         ('<!DOCTYPE robot [<!ENTITY a "b">]><robot/>', "no DOCTYPE"),
     ],
 )
@@ -108,6 +111,21 @@ def test_a_joint_with_too_many_numbers_is_named(models: Path, tmp_path: Path) ->
     robot = load_robot(models / "two_link.urdf", srdf=tmp_path / "arm.srdf")
     with pytest.raises(ModelError, match="pose 'bent' gives joint 'elbow' 2 numbers; it takes 1"):
         robot.pose("bent")
+
+
+@pytest.mark.parametrize(("joint", "value"), [("elbow", "0 0"), ("root_joint", "1 2 3 0 0 0 0")])
+def test_a_rotation_of_length_zero_is_refused(
+    joint: str, value: str, models: Path, tmp_path: Path
+) -> None:
+    text = (models / "two_link.urdf").read_text().replace("revolute", "continuous")
+    (tmp_path / "arm.urdf").write_text(text)
+    (tmp_path / "arm.srdf").write_text(
+        f'<robot name="arm"><group_state name="zero"><joint name="{joint}" value="{value}"/>'
+        "</group_state></robot>"
+    )
+    robot = load_robot(tmp_path / "arm.urdf", srdf=tmp_path / "arm.srdf", free_flyer=True)
+    with pytest.raises(ModelError, match="pose 'zero' gives a joint zeros"):
+        robot.pose("zero")
 
 
 def test_a_missing_srdf_is_refused(models: Path) -> None:

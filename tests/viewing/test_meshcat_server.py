@@ -117,6 +117,16 @@ def test_requests_that_name_another_host_are_refused(shown: Replay, path: str, h
         assert text == "This page is served to 127.0.0.1 and localhost only.\n"
 
 
+@pytest.mark.parametrize("origin", ["http://[::1", "http://other.test", "null", "://", "x"])
+def test_an_origin_that_is_not_the_page_is_refused_in_silence(
+    shown: Replay, origin: str, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """An origin that is no address was a traceback."""
+    assert answer(shown, "/", upgrade(f"127.0.0.1:{port_of(shown)}", origin))[0] == 403
+    assert capsys.readouterr().err == ""
+    assert [record for record in caplog.records if record.levelno >= logging.WARNING] == []
+
+
 @pytest.mark.parametrize("host", ["127.0.0.1:{}", "localhost:{}", "localhost:8000", "LOCALHOST"])
 def test_requests_that_name_this_machine_are_answered(shown: Replay, host: str) -> None:
     named = host.format(port_of(shown))

@@ -119,7 +119,9 @@ def _number(value: Any) -> Any:
         double = float(value)
     except OverflowError as error:
         raise MismatchError from error
-    return value if abs(double) < 2**53 else double  # what no machine word holds, NumPy refuses
+    # NumPy refuses what no machine word holds, and fractions
+    known = isinstance(value, int | float | np.number) and abs(double) < 2**53
+    return value if known else double
 
 
 def _whole(value: Any) -> int:

@@ -15,6 +15,8 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+MAX_TURNS = 1_000_000
+"""Largest number of full turns of an initial guess."""
 _FREE = "free", "free_velocity", "free_acceleration", "free_jerk"
 ALL = "all"
 """Stands for all joints in a list of joint names."""
@@ -118,10 +120,13 @@ class State:
         for joint, turns in self.turns.items():
             indices = _rotation_indices(coordinates, name, joint)
             given = np.atleast_1d(np.asarray(turns, dtype=np.float64))
-            size = float(np.linalg.norm(given)) if np.isfinite(given).all() else 0.5
+            size = float(np.linalg.norm(given)) if (abs(given) <= MAX_TURNS).all() else 0.5
             if given.shape != (len(indices),) or abs(size - round(size)) > 1e-9:
                 expected = "an integer" if len(indices) == 1 else "three numbers of integer length"
-                raise InputError(f"{name}.turns: {joint!r} takes {expected}, got {turns!r}.")
+                raise InputError(
+                    f"{name}.turns: {joint!r} takes {expected}, at most {MAX_TURNS:,} turns, "
+                    f"got {turns!r}."
+                )
             full[indices] = given
         return full
 

@@ -13,13 +13,16 @@ import hashlib
 import os
 import platform
 import shutil
+import signal
 import subprocess
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import casadi as ca
 
 from hovi.errors import HoviError
+from hovi.system.deadline import OutOfTimeError, time_left
 from hovi.system.files import reason, whole_file
 from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
 from hovi.version import __version__
@@ -40,7 +43,8 @@ def compiled(function: ca.Function) -> ca.Function:
     """The same function as compiled C code.
 
     function: made of expressions only, without solvers or callbacks.
-    Raises CompilationError without a C compiler or a folder that is safe to load from.
+    Raises CompilationError without a C compiler or a folder that is safe to load from, and
+    OutOfTimeError if it is not built at the deadline in force.
     """
     code = c_code(function)
     folder = library_folder()
@@ -144,22 +148,41 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def _run(what: str, command: list[str], **environment: str) -> str:
-    """Output of the compiler. Raises CompilationError with its first error message."""
-    run = subprocess.run(
+    """Output of the compiler.
+
+    Raises CompilationError with its first error message, and OutOfTimeError at the deadline in
+    force.
+    """
+    compiler = subprocess.Popen(
         command,
-        capture_output=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        stdin=subprocess.DEVNULL,
         env={**os.environ, "LC_ALL": "C", **environment},
-        check=False,
+        process_group=0,
     )
-    if run.returncode != 0:
-        complaint = next(iter(run.stderr.splitlines()), f"exit code {run.returncode}")
+    with compiler:
+        output, complaints = _finished(compiler)
+    if compiler.returncode != 0:
+        complaint = next(iter(complaints.splitlines()), f"exit code {compiler.returncode}")
         raise CompilationError(
             f"the C compiler {command[0]} fails on {what!r} ({complaint}): repair it, {_OTHERWISE}"
         )
-    return run.stdout
+    return output
+
+
+def _finished(compiler: subprocess.Popen[str]) -> tuple[str, str]:
+    """Output and messages of a compiler, which is ended with its children if it takes too long."""
+    try:
+        return compiler.communicate(timeout=time_left())
+    except BaseException as error:
+        with suppress(ProcessLookupError):
+            os.killpg(compiler.pid, signal.SIGKILL)
+        if isinstance(error, subprocess.TimeoutExpired):
+            raise OutOfTimeError from None
+        raise
 
 
 def _is_intact(library: Path) -> bool:

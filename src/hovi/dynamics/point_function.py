@@ -6,6 +6,7 @@ import functools
 import os
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Any
 
 import casadi as ca
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.function_cache import compiled
 from hovi.errors import InputError
+from hovi.system.deadline import OutOfTimeError
 
 Array = npt.NDArray[np.float64]
 
@@ -35,7 +37,8 @@ class PointFunction:
     bitwise independent of their number. Calls from several Python threads are safe.
 
     function: of SX expressions.
-    compile: use compiled code, built or from the user's cache: see `compiled`.
+    compile: use compiled code, built or from the user's cache: see `compiled`. What is not built
+        at the deadline in force is interpreted.
     """
 
     def __init__(self, function: ca.Function, compile: bool = False) -> None:
@@ -43,8 +46,10 @@ class PointFunction:
         function = _dense(function)
         self._cost = function.n_instructions()
         if compile:
-            function = compiled(function)
-            self._cost //= COMPILED_SPEEDUP
+            # at the deadline, the interpreter has the same results
+            with suppress(OutOfTimeError):
+                function = compiled(function)
+                self._cost //= COMPILED_SPEEDUP
         self.function = function
         self._widths = [int(function.numel_in(i)) for i in range(function.n_in())]
         self._shapes = [function.size_out(i) for i in range(function.n_out())]

@@ -49,9 +49,9 @@ class Effect(ABC):
 
         Raises SceneError for a field of another type than its annotation.
         """
+        check_fields(self, f"effect {self.key!r}", SceneError)
         for field in fields(self):
             object.__setattr__(self, field.name, _frozen(getattr(self, field.name)))
-        check_fields(self, f"effect {self.key!r}", SceneError)
 
     def check(self, robot: Robot) -> None:
         """Raise SceneError if the effect is not valid for the robot."""

@@ -48,7 +48,13 @@ class JointLimitPotential(Effect):
                     f"effect 'joint_limit_potential': {name} must be positive and finite, "
                     f"got {value}."
                 )
-        for joint, (lower, upper) in self.ranges.items():
+        for joint, bounds in self.ranges.items():
+            if len(bounds) != 2:
+                raise SceneError(
+                    f"effect 'joint_limit_potential': the range of {joint!r} must be two numbers, "
+                    f"got {len(bounds)}."
+                )
+            lower, upper = bounds
             if joint not in _simple_joints(robot):
                 raise SceneError(
                     f"effect 'joint_limit_potential': robot {robot.name!r} has no joint "

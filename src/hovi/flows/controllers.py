@@ -17,6 +17,9 @@ from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
+MAX_BANDWIDTH = 1e6
+"""Largest bandwidth of the feedback, in [rad/s]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Controller(ABC):
@@ -147,8 +150,10 @@ def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> 
         raise InputError(f"there is no feedback {feedback!r}: {nearest(feedback, FEEDBACKS)}")
     if feedback == "none":
         return OpenLoop(plan)
-    if not 0 < bandwidth < np.inf:
-        raise InputError(f"the bandwidth must be positive and finite, got {bandwidth} rad/s.")
+    if not 0 < bandwidth <= MAX_BANDWIDTH:
+        raise InputError(
+            f"the bandwidth must be positive and at most {MAX_BANDWIDTH:g} rad/s, got {bandwidth}."
+        )
     if feedback == "pd":
         return ProportionalDerivative.of_bandwidth(plan, scene.robot, bandwidth)
     if scene.passive:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
 from hovi.discrete.guess import regularized
 from hovi.discrete.state import State, as_state
 from hovi.discrete.trajectory import Trajectory
@@ -134,8 +134,10 @@ def simulate(
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError(f"the duration must be positive and finite, got {duration} s.")
-    if intervals < 1:
-        raise InputError(f"the number of intervals must be 1 or more, got {intervals}.")
+    if not 1 <= intervals <= MAX_INTERVALS:
+        raise InputError(
+            f"the number of intervals must be from 1 to {MAX_INTERVALS:,}, got {intervals}."
+        )
     free = mechanics(scene)
     forced = ForcedLagrangian(free, scene_force(scene, _drive(torque)))
     table, h = galerkin(inner_modes, 1), duration / intervals

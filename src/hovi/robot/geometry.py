@@ -28,6 +28,10 @@ from hovi.robot.urdf.mesh_contents import (
 )
 from hovi.robot.urdf.mesh_files import check_mesh, is_inside
 from hovi.robot.urdf.normalize import make_plain
+from hovi.system.files import reason
+
+MAX_ALL_MESHES = 256_000_000
+"""Largest sum of the bytes of all meshes, each counted as often as it is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,17 +72,21 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> Path:
     Raises ModelError if it does not exist, cannot be used, or if it or a file that it names is
     outside its folder.
     """
-    candidates = list(_candidates(filename, source))
-    for root, path in candidates:
-        if not is_inside(path, root):
-            raise ModelError(
-                f"mesh {filename!r} lies outside {str(root)!r}: mesh names must stay inside "
-                "their package; to allow another folder, name it in package_dirs."
-            )
-        if path.is_file():
-            check_mesh(path, root, drawn)
-            return path
-    raise ModelError(f"mesh {filename!r} was not found in {_places(candidates)}.")
+    try:
+        candidates = list(_candidates(filename, source))
+        for root, path in candidates:
+            if not is_inside(path, root):
+                raise ModelError(
+                    f"mesh {_short(filename)} lies outside {str(root)!r}: mesh names must stay "
+                    "inside their package; to allow another folder, name it in package_dirs."
+                )
+            if path.is_file():
+                check_mesh(path, root, drawn)
+                return path
+    except (OSError, RuntimeError, ValueError) as error:  # too long, a loop of links, a NUL
+        why = reason(error) if isinstance(error, OSError) else "no file can have that path"
+        raise ModelError(f"mesh {_short(filename)} cannot be looked for: {why}.") from error
+    raise ModelError(f"mesh {_short(filename)} was not found in {_places(candidates)}.")
 
 
 def _candidates(filename: str, source: RobotSource) -> Iterator[tuple[Path, Path]]:
@@ -113,8 +121,10 @@ def _package_folders(package: str, source: RobotSource) -> Iterator[Path]:
         if parent.name == package:
             yield parent.absolute()
     if source.folder:
+        # Any other folder above may be a home folder, and its files nobody's to show.
         folder = Path(source.folder).absolute()
-        yield from (p for p in (folder, *folder.parents) if p.name == package)
+        around = (p for p in folder.parents if (p / "package.xml").is_file())
+        yield from (p for p in (folder, *around) if p.name == package)
 
 
 def _package_dirs(source: RobotSource) -> list[Path]:
@@ -131,10 +141,12 @@ def _with_found_meshes(source: RobotSource, kind: str) -> tuple[str, list[str]]:
     """The URDF with absolute mesh paths, without shapes whose mesh is unusable; and the reasons."""
     robot = checked_urdf(source.urdf or "", source.reference)
     _drop_textures(robot)
-    problems = []
+    problems, room = [], MAX_ALL_MESHES
     for link in robot.iterfind("link"):
         for shape in link.findall(kind):
-            if problem := _find_meshes(shape, source, drawn=kind == "visual"):
+            problem, size = _find_meshes(shape, source, kind == "visual", room)
+            room -= size
+            if problem:
                 problems.append(f"link {link.get('name')!r}: {problem}")
                 link.remove(shape)
     make_plain(robot)
@@ -151,14 +163,25 @@ def _drop_textures(robot: ElementTree.Element) -> None:
             robot.remove(material)
 
 
-def _find_meshes(shape: ElementTree.Element, source: RobotSource, drawn: bool) -> str:
-    """Replace the names of meshes by absolute paths; returns what is wrong, or ""."""
+def _find_meshes(
+    shape: ElementTree.Element, source: RobotSource, drawn: bool, room: int
+) -> tuple[str, int]:
+    """Replace the names of meshes by absolute paths; what is wrong, or "", and their bytes.
+
+    room: the largest number of bytes.
+    """
+    size = 0
     for mesh in shape.iter("mesh"):
         try:
-            mesh.set("filename", f"file://{find_mesh(mesh.get('filename', ''), source, drawn)}")
+            path = find_mesh(mesh.get("filename", ""), source, drawn)
         except ModelError as error:
-            return str(error)
-    return ""
+            return str(error), 0
+        size += path.stat().st_size
+        mesh.set("filename", f"file://{path}")
+        if size > room:
+            largest = f"{MAX_ALL_MESHES / 1e6:.0f} MB"
+            return f"mesh {path.name!r} makes the meshes of all shapes exceed {largest}.", 0
+    return "", size
 
 
 def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
@@ -166,6 +189,10 @@ def _sentence(source: RobotSource, kind: str, problems: list[str]) -> str:
         return ""
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return f"robot {source.reference!r} lacks {kind} shapes: {problems[0]}{more}"
+
+
+def _short(filename: str) -> str:
+    return repr(filename if len(filename) <= 200 else f"{filename[:100]}...{filename[-97:]}")
 
 
 def _places(candidates: list[tuple[Path, Path]]) -> str:

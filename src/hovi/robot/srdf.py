@@ -8,7 +8,6 @@ merged, and joints that they do not list are neutral.
 from __future__ import annotations
 
 import itertools
-import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError
+from hovi.robot.urdf.rules import MAX_MAGNITUDE, is_decimal
 from hovi.system.files import reason, require_file
 
 Array = npt.NDArray[np.float64]
@@ -111,16 +111,14 @@ def _attribute(element: ElementTree.Element, key: str, name: str) -> str:
 
 def _numbers(joint: ElementTree.Element, name: str) -> tuple[float, ...]:
     text = _attribute(joint, "value", name)
-    try:
-        numbers = tuple(float(each) for each in text.split())
-    except ValueError:
-        numbers = (math.nan,)
-    if not all(math.isfinite(each) for each in numbers):
+    words = text.split()
+    finite = bool(words) and all(map(is_decimal, words))
+    if not finite or max(abs(float(word)) for word in words) > MAX_MAGNITUDE:
         raise ModelError(
-            f"SRDF {name!r}: the value of joint {joint.get('name')!r} must be finite numbers, "
-            f"got {text[:40]!r}."
+            f"SRDF {name!r}: the value of joint {joint.get('name')!r} must be plain finite numbers "
+            f"of at most {MAX_MAGNITUDE:g}, got {text[:40]!r}."
         )
-    return numbers
+    return tuple(map(float, words))
 
 
 def _configuration(model: pin.Model, name: str, values: Mapping[str, tuple[float, ...]]) -> Array:
@@ -137,7 +135,10 @@ def _configuration(model: pin.Model, name: str, values: Mapping[str, tuple[float
                 f"pose {name!r} gives joint {joint_name!r} {len(numbers)} numbers; "
                 f"it takes {joint.nq}."
             )
-    return np.array(pin.integrate(model, pin.normalize(model, q), angles), dtype=float)
+    q = pin.normalize(model, q)
+    if not pin.isNormalized(model, q, 1e-6):
+        raise ModelError(f"pose {name!r} gives a joint zeros where a rotation has length 1.")
+    return np.array(pin.integrate(model, q, angles), dtype=float)
 
 
 def checked_pairs(

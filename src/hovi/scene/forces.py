@@ -10,9 +10,11 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.shapes import numbers_of
 from hovi.dynamics.moving_base_torque import inverse_dynamics
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.torque_model import times
+from hovi.errors import InputError
 from hovi.robot.space import tangent
 from hovi.robot.space.configuration_rate import configuration_rate
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -40,9 +42,11 @@ class Prescribed:
     torque: Torque
 
     def evaluate(self, q: Array, v: Array, t: Array) -> tuple[Array, Array]:
-        """u(t), with zero derivatives."""
-        u = np.asarray(self.torque(t), dtype=np.float64).reshape(v.shape)
-        return u, np.zeros((*v.shape, 2, v.shape[1]))
+        """u(t), with zero derivatives. Raises InputError for a result of another shape."""
+        u = numbers_of("torque(t)", self.torque(t))
+        if u.size != v.size:
+            raise InputError(f"torque(t) must have shape {v.shape} for these times, got {u.shape}.")
+        return u.reshape(v.shape), np.zeros((*v.shape, 2, v.shape[1]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,6 +67,12 @@ class Deadline:
             _end.reset(token)
 
 
+def time_left() -> float | None:
+    """Time until the deadline in force in [s], 0 once it has passed; None without one."""
+    end = _end.get()
+    return None if end is None else max(end - time.monotonic(), 0.0)
+
+
 def is_late() -> bool:
     """Whether the deadline in force has passed."""
     end = _end.get()

@@ -28,13 +28,15 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     file at `path` is unchanged until then.
 
     path: the file to write; an existing regular file is replaced.
-    Raises OSError as the operating system does, and when `path` is a folder or a device.
+    Raises OSError as the operating system does, and when `path` is a folder or a device, or no
+    path at all.
     """
     target = Path(path)
+    _require_name(target)
     if target.exists() and not target.is_file():
         # As root, a rename onto /dev/null would replace the device itself.
         raise OSError("it exists and is not a regular file")
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.tmp")
+    temporary = target.with_name(f".{target.name[:50]}.{secrets.token_hex(6)}.tmp")  # 255 bytes
     try:
         with _open(temporary) as stream:
             yield stream
@@ -45,6 +47,16 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         temporary.replace(target)  # a hard link cannot replace an existing file
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _require_name(path: Path) -> None:
+    """Raise OSError for a text that Python cannot hand to the operating system as a path."""
+    try:
+        is_name = b"\0" not in os.fsencode(path)
+    except UnicodeEncodeError:  # half of a pair of surrogates
+        is_name = False
+    if not is_name:
+        raise OSError("no file can have that name")
 
 
 def _open(temporary: Path) -> BinaryIO:

@@ -179,12 +179,19 @@ class _Script(tornado.web.StaticFileHandler):
 
 
 class _Browser(tornado.websocket.WebSocketHandler):
-    """The connection to one open page. Tornado refuses connections from pages of other sites."""
+    """The connection to one open page, and not to pages of other sites."""
 
     def initialize(self, page: ServedPage) -> None:
         self.page = page
         self.waiting = Messages(deletions=True)
         self.sender: asyncio.Task[None] | None = None
+
+    def prepare(self) -> None:
+        """Refuse pages of other sites, as Tornado does except for an origin that is no address."""
+        origin = self.request.headers.get("Origin")
+        if origin is not None and origin.partition("://")[2].lower() != self.request.host.lower():
+            self.set_status(403)
+            self.finish("This page is served to itself only.\n")
 
     def open(self, *args: str, **kwargs: str) -> None:
         self.page._connect(self)

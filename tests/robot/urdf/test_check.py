@@ -118,6 +118,11 @@ BROKEN = {
         "<robot " + " ".join(f'a{i}="1"' for i in range(65)),
         ["more than 64 attributes"],
     ),
+    "too many shapes": (
+        "</link>\n  <joint",
+        "<visual><geometry><box size='1 1 1'/></geometry></visual>" * 1_000 + "</link>\n  <joint",
+        ["1,002 elements <visual>"],
+    ),
     "nested too deep": ("</robot>", "<a>" * 99 + "</a>" * 99 + "</robot>", ["deep"]),
 }
 

@@ -43,7 +43,7 @@ def test_an_invalid_number_of_links_is_refused(n: object) -> None:
         chain(n)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+@pytest.mark.parametrize("value", [0.0, -1.0, 1e300, float("nan"), float("inf")])
 def test_a_link_without_positive_length_and_mass_is_refused(value: float) -> None:
     with pytest.raises(InputError, match="positive length and mass"):
         chain(2, length=value)

@@ -106,6 +106,8 @@ def plan(
     free, T = _time(scene, as_duration(duration), chosen)
     grid = _grid(T, chosen, scene.robot, free is not None)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
+    with deadline.in_force():
+        scene.effort_lagrangian(chosen.weight)  # its functions may have to be compiled
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
     for bound in () if free is None else (free.lower, free.upper):
         grid.stretched(bound)  # raises for steps that are too short or too long

@@ -10,6 +10,9 @@ from hovi.errors import InputError
 from hovi.robot.urdf.check import MAX_DOF
 from hovi.system.files import whole_file
 
+MAX_SIZE = 1e6
+"""Largest length in [m] and mass in [kg] of a link."""
+
 _COLORS = ("0.16 0.44 0.74 1", "0.95 0.55 0.15 1")
 
 _LINK = """
@@ -52,8 +55,11 @@ def chain(n: int, *, length: float = 1.0, mass: float = 1.0) -> str:
     """
     if isinstance(n, bool) or not isinstance(n, int) or not 1 <= n <= MAX_DOF:
         raise InputError(f"a chain has 1 to {MAX_DOF} links, not {n!r}.")
-    if not (0.0 < length < float("inf") and 0.0 < mass < float("inf")):
-        raise InputError(f"a chain needs a positive length and mass, not {length!r}, {mass!r}.")
+    if not (0.0 < length <= MAX_SIZE and 0.0 < mass <= MAX_SIZE):
+        raise InputError(
+            f"a chain needs a positive length and mass of at most {MAX_SIZE:g} m and kg, not "
+            f"{length!r}, {mass!r}."
+        )
     links = "".join(_link(i, float(length), float(mass)) for i in range(1, n + 1))
     return (
         f'<?xml version="1.0"?>\n<robot name="chain_{n}">\n  <link name="base"/>{links}\n'

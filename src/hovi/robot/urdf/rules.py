@@ -27,6 +27,9 @@ MAX_LIMIT = 1e30
 
 MAX_NAME = 256
 
+MAX_SHAPES = 1_000
+"""Largest number of visual shapes, and of collision shapes."""
+
 INERTIA_TOLERANCE = 1e-7
 """Largest negative principal inertia, in [kg m^2], accepted as a rounding error of CAD exports."""
 
@@ -73,6 +76,14 @@ def links_are_named(robot: Element) -> Iterator[str]:
     if robot.find("link") is None:
         yield "it has no <link>: a robot needs at least one."
     yield from _named(robot, "link")
+
+
+def shapes_are_few(robot: Element) -> Iterator[str]:
+    """There are not too many shapes: the time to read them grows with their cube."""
+    for tag in ("visual", "collision"):
+        count = sum(len(link.findall(tag)) for link in robot.iterfind("link"))
+        if count > MAX_SHAPES:
+            yield f"it has {count:,} elements <{tag}>, at most {MAX_SHAPES:,} are accepted."
 
 
 def joints_are_named(robot: Element) -> Iterator[str]:
@@ -282,11 +293,17 @@ def meshes_stay_in_their_package(robot: Element) -> Iterator[str]:
             )
 
 
+def is_decimal(word: str) -> bool:
+    """Whether a word is a decimal number in ASCII; `float` reads 1_0 and other digits, too."""
+    return _NUMBER.fullmatch(word) is not None
+
+
 RULES: tuple[Rule, ...] = (
     names_are_of_urdf,
     values_are_attributes,
     the_robot_is_named,
     links_are_named,
+    shapes_are_few,
     joints_are_named,
     joints_have_a_type,
     elements_are_not_repeated,
@@ -327,7 +344,7 @@ def _number_problem(text: str, count: int, tag: str) -> str:
     largest = MAX_LIMIT if tag in ("limit", "safety_controller") else MAX_MAGNITUDE
     if len(words) != count:
         return "one number" if count == 1 else f"{count} numbers separated by spaces"
-    if not all(_NUMBER.fullmatch(word) for word in words):
+    if not all(map(is_decimal, words)):
         return "a plain finite number such as 1.5 (decimal point, no units)"
     if max(abs(float(word)) for word in words) > largest:
         return f"at most {largest:g} in magnitude"
