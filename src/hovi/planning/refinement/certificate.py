@@ -144,7 +144,7 @@ def certify(
 
 def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: CurveIntegral) -> float:
     """integral + error. Raises InputError where the curve does not meet what was asked."""
-    if not solution.success:
+    if solution.status is not Status.MINIMUM:
         raise InputError(f"the motion is no minimum but ended in {solution.status}")
     if problem.constrained:
         raise InputError("equations hold at points, or in moments, only")

@@ -8,17 +8,24 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.motion_error import relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.refinement.candidate import error_of_cost
-from hovi.planning.refinement.error_estimate import finer_than, with_estimate, with_metadata
+from hovi.planning.refinement.candidate import ROUNDING_FLOOR, error_of_cost
+from hovi.planning.refinement.error_estimate import (
+    finer_than,
+    prolonged,
+    with_estimate,
+    with_metadata,
+)
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
 from hovi.planning.refinement.whirling import (
     DOUBTFUL_RATIO,
@@ -28,6 +35,7 @@ from hovi.planning.refinement.whirling import (
     whirl_without_minimum,
 )
 from hovi.planning.solver.methods.method import Method, Report
+from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
@@ -59,6 +67,7 @@ def solve(
     escape_saddles: bool = True,
     report: Report | None = None,
     method: Method | None = None,
+    seek: Literal["minimum", "stationary"] = "minimum",
 ) -> Solution:
     """A motion that makes the discrete action stationary, checked between the quadrature points.
 
@@ -73,10 +82,14 @@ def solve(
     report: called with the number of each step and the least cost so far.
     method: minimisation method; None for the first suitable one of
         hovi.planning.solver.methods.choice.
+    seek: "stationary" for a stationary point of any index near the guess, whose n_neg is its Morse
+        index and whose status is STATIONARY; for problems without limits, obstacles and equations.
     With limits, `cost` belongs to the motion that satisfies them everywhere, and intervals may
     have been split.
     Raises InputError for a guess or a method that does not fit the problem.
     """
+    if seek == "stationary":
+        method = method or Stationary()
     found = solve_on_grid(
         problem,
         guess,
@@ -118,6 +131,8 @@ def resolved(solution: Solution) -> Solution:
     if reason:
         return _unresolved(solution, reason)
     assert solution.error_estimate is not None
+    if solution.status is Status.STATIONARY:
+        return dataclasses.replace(solution, check=resolved)
     passed = Resolution(solution.trajectory.path, solution.cost, solution.error_estimate)
     return dataclasses.replace(solution, check=passed)
 
@@ -125,6 +140,8 @@ def resolved(solution: Solution) -> Solution:
 def _checked(solution: Solution) -> tuple[Solution, str]:
     """The solution with an estimate, and why it is no minimum along its way, or ""."""
     reason = _fault_on_curve(solution)
+    if solution.status is Status.STATIONARY:
+        return (solution, reason) if reason else _compared_with_stationary(solution)
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason = _compared_with_finer(solution)
     elif not reason and not _costs_nothing(solution):
@@ -241,6 +258,21 @@ def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
     return compared, _cost_change(difference / abs(solution.cost))
 
 
+def _compared_with_stationary(solution: Solution) -> tuple[Solution, str]:
+    """As `_compared_with_finer`, for a stationary point: the finer one has to have its index."""
+    problem = solution.problem
+    assert problem is not None
+    start = prolonged(solution.trajectory.path, problem.finer.grid)
+    finer = solve_on_grid(problem.finer, start, method=Stationary())
+    if not finer.success:
+        return solution, "no stationary point was found near it on a finer grid"
+    if finer.n_neg != solution.n_neg:
+        return solution, f"on a finer grid its index is {finer.n_neg} instead of {solution.n_neg}"
+    change = relative_difference(solution.cost, finer.cost)
+    compared = with_estimate(solution, max(change, ROUNDING_FLOOR))
+    return compared, "" if change <= RESOLVED else _cost_change(change)
+
+
 def _fault_of_whirling(solution: Solution) -> str:
     """Why (d) does not hold; "" if it does."""
     assert solution.problem is not None
@@ -269,8 +301,9 @@ def _cost_change(change: float) -> str:
 def _unresolved(solution: Solution, reason: str) -> Solution:
     """The solution with the status UNRESOLVED; its message has the reason and what to do."""
     assert solution.problem is not None
+    what = "a minimum" if solution.status is Status.MINIMUM else "stationary"
     message = (
-        f"the motion is a minimum on {solution.problem.grid.intervals} intervals, which do not "
+        f"the motion is {what} on {solution.problem.grid.intervals} intervals, which do not "
         f"resolve it: {reason}; {_remedy(solution)}."
     )
     return _failed(solution, Status.UNRESOLVED, message)

@@ -25,6 +25,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.robot.space.coordinates import Coordinates
@@ -43,7 +44,8 @@ STATIONARY_DECREASE = 1e-9
 class Solution:
     """The solution of a trajectory problem, or the best motion found.
 
-    success: whether a minimum was found; after `plan`, `solve` and `replan`, a resolved one.
+    success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
+        `solve` and `replan`, a resolved one.
     status, message: the outcome, as a word and in a sentence.
     trajectory: the motion; the best one found if there is no minimum.
     cost: the discrete action of L~, by default 1/2 integral |tau|^2.
@@ -112,6 +114,8 @@ class Solution:
             old.start if start is None else as_state(start, old.coordinates),
             old.goal if goal is None else _as_goal(goal, old.coordinates),
         )
+        if self.status is Status.STATIONARY:
+            options = {"method": Stationary()} | options
         origin = self if guess is None else guess
         path = origin.trajectory.path
         if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
@@ -196,7 +200,7 @@ def _trajectory(result: MethodResult) -> Trajectory:
 def _solution(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
     """The result as a Solution."""
     return Solution(
-        success=result.status is Status.MINIMUM,
+        success=result.status in (Status.MINIMUM, Status.STATIONARY),
         status=result.status,
         message=result.message,
         trajectory=_trajectory(result),

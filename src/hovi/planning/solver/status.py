@@ -18,11 +18,13 @@ Array = npt.NDArray[np.float64]
 class Status(StrEnum):
     """Outcome of a solve.
 
+    STATIONARY: a stationary point of any index, where one was sought.
     UNRESOLVED: a minimum at the quadrature points, on a grid that cannot carry the motion between
     them: see hovi.planning.refinement.resolution.
     """
 
     MINIMUM = "minimum"
+    STATIONARY = "stationary"
     SADDLE = "saddle"
     INFEASIBLE = "infeasible"
     UNRESOLVED = "unresolved"

@@ -1,0 +1,152 @@
+"""Stationary points of any index: Newton's method on the discrete Euler-Lagrange equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csc_matrix, identity
+from scipy.sparse.linalg import SuperLU, splu
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.banded_model import BandModel
+from hovi.optimize.trust_region import Options, Stop
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.status import Status, chart_sentence, unfinished
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
+from hovi.system.interruption import record_interrupt
+
+Array = npt.NDArray[np.float64]
+
+CONVERGED_LENGTH = 1e-9
+"""Relative length of a step below which one that no longer makes progress is one of rounding."""
+ROUNDING_LENGTH = 1e-14
+"""The same below which no further step is taken."""
+DECREASE = 1e-4
+"""Decrease of the gradient's norm, relative to that of a full Newton step, that a step needs."""
+LEAST_SHARE = 1e-6
+"""Smallest share of a Newton step that is tried."""
+METRIC_FLOOR = 1e-12
+"""Added to the metric, relative to its largest entry: where both ends are free it is singular."""
+
+
+class Stationary(Method):
+    """Newton's method with a line search on the norm of the gradient.
+
+    It ends in a stationary point of the action of any index, such as a motion of mechanics beyond
+    its first conjugate point, mostly in one near the guess: the action may grow on the way.
+    """
+
+    def supports(self, problem: TrajectoryProblem) -> bool:
+        """Problems without limits or equality constraints; ends may be free."""
+        return not (problem.limited or problem.constrained)
+
+    def minimize(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None = None,
+    ) -> MethodResult:
+        """See Method.minimize; what is made small is the gradient."""
+        search = _Search(ActionObjective(problem, "band"), path)
+        with Deadline(options.time_limit).in_force():
+            stop = search.run(options.max_iterations, report)
+        x, value = search.x, problem.ld.action(search.x)
+        n_neg = search.objective.negative_eigenvalues(x) if stop is Stop.STATIONARY else -1
+        if stop is Stop.STATIONARY:
+            status, steps = Status.STATIONARY, search.steps
+            message = f"a stationary point of cost {value:.10g} and index {n_neg} after {steps} "
+            message += f"steps.{chart_sentence(problem, x)}"
+        else:
+            status, reason = unfinished(stop)
+            if stop is Stop.DIVERGED:
+                reason = "no step makes the gradient smaller"
+            message = (
+                f"{reason} after {search.steps} steps, before a stationary point was found; try a "
+                "guess nearer to one."
+            )
+        return MethodResult(problem, x, value, status, message, search.steps, n_neg)
+
+
+class _Search:
+    """The iterates. x: the last one. steps: number of steps that were taken."""
+
+    def __init__(self, objective: ActionObjective, x: DiscretePath) -> None:
+        self.objective, self.x, self.steps = objective, x, 0
+        layout, metric = objective.structure.layout, objective.structure.metric["nodal"]
+        n = objective.problem.ld.lagrangian.nv
+        D = _matrix(layout.unknowns, metric[..., None, None] * np.eye(n), layout.scales)
+        floor = METRIC_FLOOR * max(abs(D).max(), 1e-300)
+        self.metric: SuperLU = splu(csc_matrix(D + floor * identity(layout.size)))
+
+    def run(self, most: int, report: Report | None) -> Stop:
+        """Take steps until the gradient is one of rounding errors; why it stopped."""
+        try:
+            for _ in range(most):
+                raise_if_late()
+                stop = self._step()
+                if stop is not None:
+                    return stop
+                if report is not None:
+                    report(self.steps, self.objective.problem.ld.action(self.x))
+        except KeyboardInterrupt:
+            record_interrupt()
+            return Stop.INTERRUPTED
+        except OutOfTimeError:
+            return Stop.TIME_LIMIT
+        return Stop.ITERATION_LIMIT
+
+    def _step(self) -> Stop | None:
+        """One Newton step, shortened until the gradient decreases; why no further one is taken."""
+        model = self.objective.model(self.x, None, None)
+        assert isinstance(model, BandModel)
+        layout, gradient = model.layout, model.gradient
+        H = _matrix(layout.unknowns, model.intervals.hessian, layout.scales)
+        try:
+            step = splu(H).solve(-gradient)
+        except RuntimeError:  # exactly singular
+            return Stop.DIVERGED
+        length = self.objective.relative_size(self.x, step, model)
+        if not np.isfinite(length):
+            return Stop.DIVERGED
+        size, share = self._norm(gradient), 1.0
+        while share >= LEAST_SHARE:
+            trial = self.objective.retract(self.x, share * step, model)
+            if self._norm(self._gradient(trial, model)) <= (1.0 - DECREASE * share) * size:
+                self.x, self.steps = trial, self.steps + 1
+                return Stop.STATIONARY if share * length <= ROUNDING_LENGTH else None
+            if length <= CONVERGED_LENGTH:
+                return Stop.STATIONARY
+            share /= 2
+        return Stop.DIVERGED
+
+    def _gradient(self, x: DiscretePath, model: BandModel) -> Array:
+        objective = self.objective
+        if not np.isfinite(objective.value(x)):
+            return np.full_like(model.gradient, np.inf)
+        columns = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
+        return model.scatter(columns)
+
+    def _norm(self, gradient: Array) -> float:
+        """|g| in the dual of the metric, sqrt(g^T D^-1 g)."""
+        if not np.isfinite(gradient).all():
+            return float("inf")
+        return float(np.sqrt(abs(gradient @ self.metric.solve(gradient))))
+
+
+def _matrix(unknowns: npt.NDArray[np.intp], hessian: Array, scales: Array | None) -> csc_matrix:
+    """A sum over intervals as a sparse matrix of the unknowns.
+
+    unknowns: of the columns, (N, m, n), -1 where fixed. hessian: (N, m, m, n, n). scales: (N, m).
+    """
+    N, m, n = unknowns.shape
+    blocks = hessian.transpose(0, 1, 3, 2, 4).reshape(N, m * n, m * n)
+    if scales is not None:
+        columns = np.repeat(scales, n, axis=1)
+        blocks = blocks * columns[:, :, None] * columns[:, None, :]
+    flat = unknowns.reshape(N, m * n)
+    i, j = np.broadcast_arrays(flat[:, :, None], flat[:, None, :])
+    free, size = (i >= 0) & (j >= 0), int(flat.max()) + 1
+    return csc_matrix((blocks[free], (i[free], j[free])), shape=(size, size))
