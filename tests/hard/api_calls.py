@@ -132,7 +132,19 @@ def build(make: type, **fields: Any) -> Call:
 def calls() -> dict[str, Call]:
     """The valid calls, by name."""
     found: dict[str, Call] = {}
-    for group in (_models, _scenes, _grids, _motions, _problems, _plans, _flows, _files):
+    groups = (
+        _models,
+        _scenes,
+        _grids,
+        _motions,
+        _problems,
+        _plans,
+        _orders,
+        _symbolic,
+        _flows,
+        _files,
+    )
+    for group in groups:
         for each in group():
             name = _name(each)
             numbers = (f"{name} {i}" for i in range(2, 99))
@@ -403,6 +415,53 @@ def _plans() -> list[Call]:
         own(solution(), "replan", [0.0, 0.0], [0.3, 0.6], None),
         call(hovi.certify, solution(), "tip", estimate=False),
         call(hovi.estimate_error, solution(), "tip"),
+    ]
+
+
+def _orders() -> list[Call]:
+    """Boundary value problems of order 3, and stationary points of order 1."""
+    rest, moved = hovi.State([0.0, 0.0], a=[0.0, 0.0]), hovi.State([0.3, 0.7])
+    scheme, free = galerkin(1, derivatives=3), ("q[0]",)
+    ld = hovi.DiscreteLagrangian(hovi.spline(2, 3), hovi.Grid.uniform(1.0, N, scheme))
+    third = hovi.TrajectoryProblem(ld, rest, moved)
+    found = hovi.solve(third)
+    path = found.trajectory.path
+    first = hovi.DiscreteLagrangian(hovi.spline(2, 1), hovi.Grid.uniform(1.0, N, galerkin(1, 1)))
+    ends = hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7])
+    return [
+        build(hovi.TrajectoryProblem, ld=ld, start=rest, goal=moved, limits=None, clearance=None),
+        own(rest, "jet_on", third.coordinates, "start", 3),
+        call(_ends_of_order_3, a=[0.0, 0.0], free_acceleration=free, v=[0.0, 0.0], jerk=None),
+        call(hovi.solve, third, found.trajectory, seek="minimum"),
+        call(hovi.solve, hovi.TrajectoryProblem(first, *ends), "cubic", seek="stationary"),
+        own(found, "replan", None, [0.3, 0.6]),
+        own(found.trajectory, "jet", [0.0, 0.5], 3),
+        own(found.trajectory, "jet_intervals", [0, 1], [0.0, 1.0], 3),
+        build(
+            hovi.DiscretePath,
+            **{"q": path.q, "v": path.v, "z": path.z, "inner": path.inner, "higher": path.higher},
+        ),
+        *(own(ld, name, path) for name in ("values", "action", "gradient", "derivatives")),
+    ]
+
+
+def _ends_of_order_3(**fields: Any) -> object:
+    """A state as an end of a motion of order 3."""
+    ld = hovi.DiscreteLagrangian(hovi.spline(2, 3), hovi.Grid.uniform(1.0, N, galerkin(1, 3)))
+    return hovi.TrajectoryProblem(ld, hovi.State([0.0, 0.0], **fields), hovi.State([0.3, 0.7]))
+
+
+def _symbolic() -> list[Call]:
+    body, scheme = hovi.symbolic.rigid_body(scene()), galerkin(1)
+    return [
+        *(
+            call(getattr(hovi.symbolic, f), scene())
+            for f in ("rigid_body", "torques", "lagrangian")
+        ),
+        call(hovi.symbolic.discrete_lagrangian, scene(), scheme, H),
+        call(hovi.symbolic.euler_lagrange, hovi.spline(2), scheme, H),
+        own(body, "frame_placement", "tip"),
+        own(body, "frame_jacobian", "tip"),
     ]
 
 

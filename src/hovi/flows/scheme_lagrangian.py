@@ -15,6 +15,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments, unchecked
 from hovi.checks.shapes import require_shape
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import MAX_STEP, MIN_STEP
 from hovi.errors import InputError, SchemeError
 from hovi.flows.legendre_transforms import jet_at_momenta
 from hovi.flows.segment import Segment, SegmentLagrangian, flat
@@ -251,6 +252,8 @@ def check_segment(lagrangian: Lagrangian, h: float) -> None:
     """Raise InputError for an invalid step, or a configuration space that is no vector space."""
     if not (np.isfinite(h) and h > 0):
         raise InputError(f"a step must be positive and finite, got {h} s.")
+    if not MIN_STEP <= h <= MAX_STEP:
+        raise InputError(f"a step must be from {MIN_STEP:g} to {MAX_STEP:g} s, got {h:g} s.")
     if lagrangian.nq != lagrangian.nv:
         raise InputError(
             "L_d between two points needs joints with nq = nv: lock the others with "

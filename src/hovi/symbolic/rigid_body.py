@@ -19,6 +19,7 @@ from hovi.robot.space import tangent
 from hovi.scene.scene import Scene, require_known_joints
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class RigidBody:
     """Functions of q (nq,), v, a and tau (nv,), in SI units, each built on first use.
