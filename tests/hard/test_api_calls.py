@@ -16,7 +16,7 @@ LEFT_OUT = {
     *("Accuracy", "Certificate", "Flow", "MotionError", "Simulation", "Solution", "Status"),
     *("Tolerance", "Tracking", "Robot", "HoviError"),
     # packages, of which the members are called
-    *("accuracy", "effects", "schemes"),
+    *("accuracy", "effects", "schemes", "symbolic"),
 }
 
 
@@ -43,6 +43,7 @@ def test_every_public_function_and_class_is_called() -> None:
     public = {name for name in dir(hovi) if not name.startswith("_")} - LEFT_OUT
     assert public <= called
     assert {each.__name__ for each in hovi.effects.REGISTRY.values()} - {"Jet"} <= called
+    assert set(hovi.symbolic.__all__) - {"RigidBody"} <= called
 
 
 @pytest.mark.parametrize(
