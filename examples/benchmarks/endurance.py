@@ -40,7 +40,7 @@ def plans() -> Iterator[None]:
     number = 0
     while True:
         scene, limits = scenes[number % len(scenes)], ("urdf", "none")[number // 4 % 2]
-        middle = scene.robot.neutral
+        middle = scene.robot.neutral()
         start, goal = (
             scene.robot.integrate(middle, random.uniform(-0.3, 0.3, scene.robot.nv))
             for _ in range(2)
