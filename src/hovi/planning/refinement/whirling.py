@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.motion_error import sample_points
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.mass_matrix import MassMatrix
 
+SAMPLES = 33
+"""Samples per interval of the velocity, both ends included."""
 WHIRLING_RATIO = 10.0
 """Ratio of a joint's largest velocity and (half a turn + its distance) / T above which it whirls:
 2 for a smooth motion from rest to rest."""
@@ -86,7 +87,9 @@ def whirl(solution: Solution) -> Whirl | None:
     unit = (np.pi + distance) / trajectory.duration
     if np.max(np.abs(trajectory.v) / unit) < WHIRLING_RATIO / 2:  # too slow between nodes, too
         return None
-    v = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).v)
+    N = trajectory.grid.intervals
+    k, s = np.repeat(np.arange(N), SAMPLES), np.tile(np.linspace(0.0, 1.0, SAMPLES), N)
+    v = np.abs(trajectory.jet_intervals(k, s)[1])
     ratio = v.max(axis=0) / unit
     worst = int(joints[np.argmax(ratio[joints])])
     if ratio[worst] <= WHIRLING_RATIO:
