@@ -7,6 +7,7 @@ may lead elsewhere a moment later.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 from collections.abc import Sequence
@@ -122,7 +123,8 @@ class _Descent:
         try:
             below = os.open(name, _FOLDER, dir_fd=self._descriptor)
         except FileNotFoundError:
-            os.mkdir(name, 0o700, dir_fd=self._descriptor)
+            with contextlib.suppress(FileExistsError):  # another process was faster
+                os.mkdir(name, 0o700, dir_fd=self._descriptor)
             below = os.open(name, _FOLDER, dir_fd=self._descriptor)
         os.close(self._descriptor)
         self._descriptor = below

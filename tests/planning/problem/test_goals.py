@@ -107,14 +107,13 @@ def test_via_points_are_passed_in_joints_and_in_space() -> None:
         hovi.Via(1.7, hovi.FrameGoal("tool0", position=above)),
         hovi.Via(0.8, hovi.State([0.4, -1.4, 1.0, -0.5, 0.0, 0.0], free=["wrist_3_joint"])),
     ]
-    solution = hovi.plan(task.scene, task.start, task.goal, 2.5, via=vias, limits="none")
+    rotors = hovi.Scene(robot, [hovi.effects.Gravity(), hovi.effects.Armature(0.1)])
+    solution = hovi.plan(rotors, task.start, task.goal, 2.5, via=vias, limits="none")
     assert solution.success, solution.message
     passed = solution.trajectory.sample([0.8, 1.7])
     np.testing.assert_allclose(passed.q[0, :5], [0.4, -1.4, 1.0, -0.5, 0.0], atol=1e-9)
     np.testing.assert_allclose(placement(robot, "tool0", passed.q[1]).translation, above, atol=1e-9)
-    direct = hovi.plan(
-        task.scene, task.start, task.goal, 2.5, limits="none", guess=solution.trajectory
-    )
+    direct = hovi.plan(rotors, task.start, task.goal, 2.5, limits="none", guess=solution.trajectory)
     assert direct.cost < solution.cost
 
 

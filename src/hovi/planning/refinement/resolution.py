@@ -27,13 +27,7 @@ from hovi.planning.refinement.error_estimate import (
     with_metadata,
 )
 from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_torque
-from hovi.planning.refinement.whirling import (
-    DOUBTFUL_RATIO,
-    MAX_WHIRLING_ERROR,
-    UNUSABLE_RATIO,
-    whirl,
-    whirl_without_minimum,
-)
+from hovi.planning.refinement.whirling import whirl, whirl_without_minimum
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -115,8 +109,8 @@ def resolved(solution: Solution) -> Solution:
         most 1 %. The finer grid has two more modes per interval, of a Galerkin table for any
         scheme; under limits every interval is halved instead;
     (c) that solution was found;
-    (d) no light joint without limits whirls faster than UNUSABLE_RATIO allows, or than
-        DOUBTFUL_RATIO in a motion whose error is above MAX_WHIRLING_ERROR.
+    (d) no light joint without limits whirls too fast for the error of the cost: see
+        `Whirl.is_trusted`.
     Solutions of another status are returned unchanged. If the deadline in force passes before
     all of this is known, the status is TIME_LIMIT.
     """
@@ -279,9 +273,8 @@ def _fault_of_whirling(solution: Solution) -> str:
     whirling = None if solution.problem.limited else whirl(solution)
     if whirling is None:
         return ""
-    error = solution.error_estimate
-    near = _costs_nothing(solution) or error is None or error <= MAX_WHIRLING_ERROR
-    if whirling.ratio <= (UNUSABLE_RATIO if near else DOUBTFUL_RATIO):
+    error = None if _costs_nothing(solution) else solution.error_estimate
+    if whirling.is_trusted(error):
         return ""
     known = "" if error is None else f", with an error of {100 * error:.2g} % of the cost,"
     return f"at {whirling.speed:.3g} rad/s{known} a finer grid may find another motion"

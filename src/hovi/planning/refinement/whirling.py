@@ -40,6 +40,8 @@ UNUSABLE_RATIO = 60.0
 MAX_WHIRLING_ERROR = 1e-3
 """Largest relative error of the cost where a joint whirls fast: with more, grids finer than the one
 that it was compared with tend to find another motion."""
+MAX_HOPELESS_ERROR = 3e-4
+"""The same beyond HOPELESS_RATIO."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,13 @@ class Whirl:
         """
         largest = UNUSABLE_RATIO if nearly_resolved else HOPELESS_RATIO
         return self.ratio > largest or grids >= MAX_GRIDS or alone >= MAX_GRIDS_ALONE
+
+    def is_trusted(self, error: float | None) -> bool:
+        """Whether a grid resolves it. error: of the cost, relative; None for a cost of rounding."""
+        if error is None or self.ratio <= DOUBTFUL_RATIO:
+            return self.ratio <= UNUSABLE_RATIO
+        most = MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR
+        return self.ratio <= UNUSABLE_RATIO and error <= most
 
     def __str__(self) -> str:
         """What it does, and what helps."""

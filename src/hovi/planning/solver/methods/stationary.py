@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csc_matrix, identity
-from scipy.sparse.linalg import SuperLU, splu
 
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.banded_model import BandModel
@@ -16,6 +16,10 @@ from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.status import Status, chart_sentence, unfinished
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import record_interrupt
+
+if TYPE_CHECKING:
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import SuperLU
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +83,7 @@ class _Search:
         n = objective.problem.ld.lagrangian.nv
         D = _matrix(layout.unknowns, metric[..., None, None] * np.eye(n), layout.scales)
         floor = METRIC_FLOOR * max(abs(D).max(), 1e-300)
-        self.metric: SuperLU = splu(csc_matrix(D + floor * identity(layout.size)))
+        self.metric = _factor(D, floor)
 
     def run(self, most: int, report: Report | None) -> Stop:
         """Take steps until the gradient is one of rounding errors; why it stopped."""
@@ -105,7 +109,7 @@ class _Search:
         layout, gradient = model.layout, model.gradient
         H = _matrix(layout.unknowns, model.intervals.hessian, layout.scales)
         try:
-            step = splu(H).solve(-gradient)
+            step = _factor(H).solve(-gradient)
         except RuntimeError:  # exactly singular
             return Stop.DIVERGED
         length = self.objective.relative_size(self.x, step, model)
@@ -136,11 +140,21 @@ class _Search:
         return float(np.sqrt(abs(gradient @ self.metric.solve(gradient))))
 
 
+def _factor(matrix: csc_matrix, floor: float = 0.0) -> SuperLU:
+    """The factors of a sparse matrix plus a multiple of the identity. Raises RuntimeError."""
+    from scipy.sparse import csc_matrix, identity  # slow to import, and only needed here
+    from scipy.sparse.linalg import splu
+
+    return splu(csc_matrix(matrix + floor * identity(matrix.shape[0])) if floor else matrix)
+
+
 def _matrix(unknowns: npt.NDArray[np.intp], hessian: Array, scales: Array | None) -> csc_matrix:
     """A sum over intervals as a sparse matrix of the unknowns.
 
     unknowns: of the columns, (N, m, n), -1 where fixed. hessian: (N, m, m, n, n). scales: (N, m).
     """
+    from scipy.sparse import csc_matrix  # as in _factor
+
     N, m, n = unknowns.shape
     blocks = hessian.transpose(0, 1, 3, 2, 4).reshape(N, m * n, m * n)
     if scales is not None:
