@@ -430,7 +430,8 @@ def _orders() -> list[Call]:
     ends = hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7])
     return [
         build(hovi.TrajectoryProblem, ld=ld, start=rest, goal=moved, limits=None, clearance=None),
-        own(rest, "jet_on", third.coordinates, "start", 3),
+        own(rest, "jet_on", third.coordinates, "start"),
+        own(rest, "require_order", 3, "start"),
         call(_ends_of_order_3, a=[0.0, 0.0], free_acceleration=free, v=[0.0, 0.0], jerk=None),
         call(hovi.solve, third, found.trajectory, seek="minimum"),
         call(hovi.solve, hovi.TrajectoryProblem(first, *ends), "cubic", seek="stationary"),

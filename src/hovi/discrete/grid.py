@@ -267,6 +267,11 @@ class DiscretePath:
         return np.concatenate([self.v[:, None], self.higher], axis=1)
 
     @property
+    def nodes(self) -> Array:
+        """(q, q', ..., q^(k-1)) at the nodes, on a vector space, shape (N + 1, k, nv)."""
+        return np.concatenate([self.q[:, None], self.rates], axis=1)
+
+    @property
     def intervals(self) -> int:
         """Number N of intervals."""
         return len(self.z)

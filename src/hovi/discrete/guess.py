@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import misfit, path_of_order
+from hovi.discrete.interval_paths import misfit, path_of_order, regularized_nodes
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError, InputError, nearest
 from hovi.robot.space.coordinates import Coordinates
@@ -217,9 +217,6 @@ def path_of_any_order(curve: Curve, grid: Grid, ends: Array) -> DiscretePath:
     k, h = grid.order, grid.steps[:, None]
     nodes = np.stack(curve(grid.t)[:k], axis=1)
     nodes[[0, -1]] = ends
-    scaled = np.concatenate([nodes[:-1], nodes[1:]], axis=1)
-    scaled *= (h ** np.tile(np.arange(k), 2))[:, :, None]
-    z = np.matmul(regular_from_nodal(0, k)[k:], scaled) / (h**k)[:, None]
     inner = np.zeros((grid.intervals, grid.inner_modes, nodes.shape[2]))
     for scheme, index in grid.groups:
         r = scheme.inner_modes
@@ -228,12 +225,13 @@ def path_of_any_order(curve: Curve, grid: Grid, ends: Array) -> DiscretePath:
             t = grid.t[:-1][index][:, None] + h[index] * s
             top = curve(t.ravel())[k].reshape(len(index), len(s), -1)
             inner[index, :r] = np.matmul(projection, top)
+    z = regularized_nodes(nodes, grid.steps)
     return path_of_order(k, nodes[:, 0], nodes[:, 1:], z, inner, grid.steps)
 
 
 def moved_any(path: DiscretePath, grid: Grid, ends: Array) -> DiscretePath:
     """As `moved`, for any order k on vector spaces; ends: as in `path_of_any_order`."""
-    change = ends - np.concatenate([path.q[:, None], path.rates], axis=1)[[0, -1]]
+    change = ends - path.nodes[[0, -1]]
     if not change.any():
         return path
     more = path_of_any_order(hermite(change, grid.duration), grid, change)

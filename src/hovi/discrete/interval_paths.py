@@ -43,15 +43,24 @@ def interpolate_any(
     """
     k, r = path.order, table.shape[2] - 2 * path.order + 1
     powers = steps[:, None] ** np.arange(k + 1.0)  # (B, k + 1)
-    ends, modes = path.z[intervals], path.inner[intervals, :r]
-    scaled = [path.rates[intervals] * powers[:, 1:k, None]]
-    scaled += [ends * powers[:, k:, None], modes * powers[:, k:, None]]
-    rows = np.matmul(table.reshape(-1, table.shape[2]), np.concatenate(scaled, axis=1))
+    data = scaled_data(path, intervals, steps[:, None], r)
+    rows = np.matmul(table.reshape(-1, table.shape[2]), data)
     jets = rows.reshape(len(steps), len(table), k + 1, -1) / powers[:, None, :, None]
     jets[:, :, 0] += path.q[intervals][:, None]
     return tuple(
         np.ascontiguousarray(jets[:, :, j]).reshape(-1, jets.shape[3]) for j in range(k + 1)
     )
+
+
+def scaled_data(path: DiscretePath, intervals: Index, steps: Array, modes: int) -> Array:
+    """(h q0', ..., h^(k-1) q0^(k-1), h^k z, h^k inner) of some intervals, (B, 2 k - 1 + r, n).
+
+    steps: h, shape (B, 1). modes: r.
+    """
+    k = path.order
+    ends = path.rates[intervals] * (steps ** np.arange(1, k))[:, :, None]
+    top = np.concatenate([path.z[intervals], path.inner[intervals, :modes]], axis=1)
+    return np.concatenate([ends, top * steps[:, None] ** k], axis=1)
 
 
 def move_any(path: DiscretePath, step: Array, steps: Array) -> DiscretePath:
@@ -69,6 +78,17 @@ def move_any(path: DiscretePath, step: Array, steps: Array) -> DiscretePath:
     inner[:, : step.shape[1] - 2 * k] += step[:, 2 * k :] / powers[:, k:, None]
     rates = path.rates + nodes[:, 1:]
     return path_of_order(k, path.q + nodes[:, 0], rates, z, inner, steps)
+
+
+def regularized_nodes(nodes: Array, steps: Array) -> Array:
+    """z of every interval from (q, q', ..., q^(k-1)) at the nodes, on vector spaces, (N, k, n).
+
+    nodes: shape (N + 1, k, n). steps: h, shape (N,).
+    """
+    k, h = nodes.shape[1], steps[:, None]
+    scaled = np.concatenate([nodes[:-1], nodes[1:]], axis=1)
+    scaled *= (h ** np.tile(np.arange(k), 2))[:, :, None]
+    return np.asarray(np.matmul(regular_from_nodal(0, k)[k:], scaled) / (h**k)[:, None])
 
 
 def path_of_order(

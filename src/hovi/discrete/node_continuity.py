@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import factorial
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_paths import regularized_nodes
 from hovi.errors import InputError
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -46,14 +45,11 @@ def require_continuous(
 
 def _require_ends(path: DiscretePath, grid: Grid) -> None:
     """As `require_continuous`, for any order on vector spaces."""
-    k, h = path.order, grid.steps[:, None]
-    nodes = np.concatenate([path.q[:, None], path.rates], axis=1)  # (N + 1, k, n)
+    k, h, nodes = path.order, grid.steps[:, None], path.nodes
+    gap = regularized_nodes(nodes, grid.steps) - path.z
     for j in range(k):
-        expected = h ** (k - j) * path.z[:, j]
-        for i in range(j, k):
-            expected = expected + h ** (i - j) * nodes[:-1, i] / factorial(i - j)
         name = ("q", "v", "a")[j] if j < 3 else f"derivative {j}"
-        _require_small(name, nodes[1:, j] - expected, nodes[:, j])
+        _require_small(name, h ** (k - j) * gap[:, j], nodes[:, j])
 
 
 def _require_small(name: str, difference: Array, values: Array) -> None:

@@ -74,11 +74,8 @@ class State:
         v = np.zeros(coordinates.nv) if self.v is None else self.v
         return q, coordinates.check_velocity(v, f"{name}.v")
 
-    def jet_on(self, coordinates: Coordinates, name: str, order: int) -> Array:
-        """(q, q', ..., q^(k-1)) on a vector space, shape (k, nv); empty on another. order: k.
-
-        Raises InputError as `on` does, and for derivatives that an end of this order does not have.
-        """
+    def require_order(self, order: int, name: str) -> None:
+        """Raise InputError for derivatives that an end of a motion of this order does not have."""
         given = {"v": self.v, "a": self.a, "jerk": self.jerk}
         for i, (key, value) in enumerate(given.items()):
             if i >= order - 1 and (value is not None or len(getattr(self, _FREE[i + 1])) > 0):
@@ -86,14 +83,19 @@ class State:
                     f"{name} has {key} or {_FREE[i + 1]}, but motions of order {order} end at "
                     f"values of {', '.join(['q', *given][:order])} only: leave them out."
                 )
-        if not coordinates.vector_joints:
-            return np.zeros((0, 0))
+
+    def jet_on(self, coordinates: Coordinates, name: str) -> Array:
+        """(q, v, a, jerk) on a vector space, shape (4, nv), zero where none is given.
+
+        Raises InputError as `on` does.
+        """
+        given = {"a": self.a, "jerk": self.jerk}
         zero = np.zeros(coordinates.nv)
         rates = [
             coordinates.check_velocity(zero if x is None else x, f"{name}.{key}")
             for key, x in given.items()
         ]
-        return np.stack([self.on(coordinates, name)[0], *rates][:order])
+        return np.stack([*self.on(coordinates, name), *rates])
 
     def free_on(self, coordinates: Coordinates, name: str, order: int = 2) -> Mask:
         """Which components of q (in the tangent space), v, ... are free, shape (k, nv).

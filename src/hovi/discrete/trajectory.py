@@ -19,6 +19,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
+from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory_file import read_arrays, require_unchanged, write_arrays
@@ -195,14 +196,11 @@ class Trajectory:
         top = max(2, self.grid.order)
         if not 0 <= order <= top:
             raise InputError(f"this motion has derivatives up to {top}, not {order}.")
-        h, path, d = self.grid.steps[k][:, None], self.path, self.grid.order
+        h, path = self.grid.steps[k][:, None], self.path
         scaled = np.empty((len(k), top + 1, path.v.shape[1]))
         for scheme, members in self.grid.groups:
             here = np.isin(k, members)
-            i, hi = k[here], h[here]
-            modes = np.concatenate([path.z[i], path.inner[i, : scheme.inner_modes]], axis=1)
-            ends = path.rates[i] * (hi ** np.arange(1, d))[:, :, None]
-            data = np.concatenate([ends, modes * hi[:, None] ** d], axis=1)
+            data = scaled_data(path, k[here], h[here], scheme.inner_modes)
             scaled[here] = _rows(scheme, s[here], top) @ data
         x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:

@@ -115,8 +115,11 @@ class TrajectoryProblem:
         k = self.ld.k
         named = (self.start, "start"), (end.state, "goal")
         free = [state.free_on(coordinates, name, k) for state, name in named]
-        jets = np.stack([state.jet_on(coordinates, name, k) for state, name in named])
-        object.__setattr__(self, "end_jets", jets)
+        for state, name in named:
+            state.require_order(k, name)
+        if k != 2:
+            jets = np.stack([state.jet_on(coordinates, name)[:k] for state, name in named])
+            object.__setattr__(self, "end_jets", jets)
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
@@ -174,8 +177,7 @@ class TrajectoryProblem:
         """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
         if self.ld.k == 2:
             return moved(path, self.grid, self.ends(path.q, path.v), self.coordinates)
-        nodes = np.concatenate([path.q[:, None], path.rates], axis=1)[[0, -1]]
-        return moved_any(path, self.grid, self._with_fixed(nodes))
+        return moved_any(path, self.grid, self._with_fixed(path.nodes[[0, -1]]))
 
     def guess(self, name: str) -> DiscretePath:
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
@@ -275,16 +277,20 @@ class TrajectoryProblem:
         return self.ld.grid
 
     @cached_property
+    def _scene(self) -> Scene | None:
+        scene = getattr(self.ld.lagrangian, "scene", None)
+        return scene if isinstance(scene, Scene) else None
+
+    @property
     def about_robot(self) -> bool:
         """Whether the Lagrangian belongs to a scene, and so to a robot."""
-        return isinstance(getattr(self.ld.lagrangian, "scene", None), Scene)
+        return self._scene is not None
 
     @property
     def scene(self) -> Scene:
         """The scene that the Lagrangian belongs to. Raises InputError if it is about no robot."""
-        if self.about_robot:
-            scene: Scene = self.ld.lagrangian.scene  # type: ignore[attr-defined]
-            return scene
+        if self._scene is not None:
+            return self._scene
         raise InputError(
             "frames, obstacles, passive joints and tolerances in lengths need a robot, and this "
             "problem's Lagrangian is about none: use one of a Scene."

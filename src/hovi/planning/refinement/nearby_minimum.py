@@ -71,8 +71,7 @@ class NearbyMinimum:
                 if renewed is None:
                     return None
                 factor = renewed
-            gradient = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
-            step = factor.solve(-model.scatter(gradient))
+            step = factor.solve(-objective.gradient(x, model))
             length = objective.relative_size(x, step, model)
             if not length <= MAX_CONTRACTION * last:
                 if length <= CONVERGED_LENGTH:
@@ -128,8 +127,7 @@ def nearby_minimum(
             before, last = length if correction == 0 else before, length
             if length > LONG_STEP or correction == MAX_CORRECTIONS:
                 break
-            after = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
-            after = model.scatter(after)
+            after = objective.gradient(x, model)
             # trapezoidal rule along the step, with an error of third order in its length
             value += 0.5 * float(np.vdot(gradient + after, step))
             gradient = after

@@ -69,10 +69,11 @@ class Whirl:
 
     def is_trusted(self, error: float | None) -> bool:
         """Whether a grid resolves it. error: of the cost, relative; None for a cost of rounding."""
+        if self.ratio > UNUSABLE_RATIO:
+            return False
         if error is None or self.ratio <= DOUBTFUL_RATIO:
-            return self.ratio <= UNUSABLE_RATIO
-        most = MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR
-        return self.ratio <= UNUSABLE_RATIO and error <= most
+            return True
+        return error <= (MAX_WHIRLING_ERROR if self.ratio <= HOPELESS_RATIO else MAX_HOPELESS_ERROR)
 
     def __str__(self) -> str:
         """What it does, and what helps."""

@@ -226,6 +226,10 @@ class ActionObjective(Objective[DiscretePath]):
             return BandModel(intervals, self.structure.layout, self.structure.metric_band)
         return MergeTreeModel(intervals, self.structure.tree)
 
+    def gradient(self, x: DiscretePath, model: QuadraticModel) -> Array:
+        """The gradient at x in the unknowns of a model at another path."""
+        return model.scatter(self.ld.gradient(x, self.coordinates, self.jets(x)))
+
     def negative_eigenvalues(self, x: DiscretePath) -> int:
         """n_neg of the exact Hessian at x."""
         if not self.problem.plain or self.ld.chart is not None or self.ld.k != 2:

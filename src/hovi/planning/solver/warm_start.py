@@ -54,9 +54,7 @@ class _Action(Smooth[DiscretePath]):
         return self.objective.value(x)
 
     def gradient(self, x: DiscretePath) -> Array:
-        objective = self.objective
-        jets = objective.jets(x)
-        return self.model.scatter(objective.ld.gradient(x, objective.coordinates, jets))
+        return self.objective.gradient(x, self.model)
 
     def retract(self, x: DiscretePath, step: Array) -> DiscretePath:
         return self.objective.retract(x, step, self.model)

@@ -127,11 +127,9 @@ class _Search:
         return Stop.DIVERGED
 
     def _gradient(self, x: DiscretePath, model: BandModel) -> Array:
-        objective = self.objective
-        if not np.isfinite(objective.value(x)):
+        if not np.isfinite(self.objective.value(x)):
             return np.full_like(model.gradient, np.inf)
-        columns = objective.ld.gradient(x, objective.coordinates, objective.jets(x))
-        return model.scatter(columns)
+        return self.objective.gradient(x, model)
 
     def _norm(self, gradient: Array) -> float:
         """|g| in the dual of the metric, sqrt(g^T D^-1 g)."""
