@@ -237,6 +237,7 @@ def _scenes() -> list[Call]:
         ),
         build(e.EffortWeight, weight={"elbow": 2.0}),
         build(e.Gravity, acceleration=9.81, direction=(0.0, 0.0, -1.0)),
+        build(e.JerkCost, weight={"shoulder": 1.0, "elbow": 2.0}),
         build(e.JointLimitPotential, ranges={"elbow": (0, 1)}, slope=10.0, width=0.01, stops=False),
         build(e.JointSprings, stiffness={"elbow": 1.0}, rest=0.0),
         build(e.MovingBase, position=(0, 0, "t"), rotation=(0.0, 0.0, 0.0)),

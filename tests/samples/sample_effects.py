@@ -11,6 +11,7 @@ from hovi.effects import (
     Effect,
     EffortWeight,
     Gravity,
+    JerkCost,
     JointLimitPotential,
     JointSprings,
     MovingBase,
@@ -44,6 +45,7 @@ def sample_effects(robot: Robot) -> dict[str, Effect]:
         EffortWeight({first: 2.0}),
         VelocityCost(0.7),
         AccelerationCost({last: 0.2}),
+        JerkCost(0.3),
         ReferenceCost({last: "0.3*t"}, 4.0),
         PowerCost(0.5, 0.4),
     ]
@@ -51,7 +53,7 @@ def sample_effects(robot: Robot) -> dict[str, Effect]:
 
 
 def zero_strength_effects(robot: Robot) -> dict[str, Effect]:
-    """The same effects with zero strength, if they have one."""
+    """The same effects with zero strength, if they have one; a cost on the jerk needs a weight."""
     first, tip = robot.coordinate_names[0], robot.tip_frame
     effects: list[Effect] = [
         Gravity(0.0),

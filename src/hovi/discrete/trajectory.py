@@ -37,6 +37,8 @@ Index = npt.NDArray[np.intp]
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
 _PATH = ("q", "v", "z", "inner", "higher")
 _TORQUE, _HIGHER = "tau", "higher"
+FEW_SAMPLES = 64
+"""Number of samples up to which repeated positions are not looked for."""
 
 
 class Sample(NamedTuple):
@@ -318,7 +320,14 @@ def _check_shapes(trajectory: Trajectory) -> None:
 
 
 def _rows(scheme: Scheme, s: Array, top: int) -> Array:
-    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r)."""
+    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r).
+
+    Samples of many intervals mostly have the same positions s, of which each is evaluated once.
+    """
+    if len(s) > FEW_SAMPLES:
+        known, index = np.unique(s, return_inverse=True)
+        if len(known) < len(s) / 2:
+            return _rows(scheme, known, top)[index]
     if scheme.derivatives >= top:
         return scheme.rows(s)
     return jet_rows(s, scheme.derivatives, scheme.inner_modes, top)

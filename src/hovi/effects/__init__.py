@@ -16,7 +16,7 @@ from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.effects.gravity import Gravity
 from hovi.effects.joint_limit_potential import JointLimitPotential
 from hovi.effects.joint_springs import JointSprings
-from hovi.effects.motion_cost import AccelerationCost, VelocityCost
+from hovi.effects.motion_cost import AccelerationCost, JerkCost, VelocityCost
 from hovi.effects.moving_base import MovingBase
 from hovi.effects.payload import Payload
 from hovi.effects.power_cost import PowerCost
@@ -40,6 +40,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     EffortWeight,
     VelocityCost,
     AccelerationCost,
+    JerkCost,
     ReferenceCost,
     PowerCost,
 )
@@ -58,6 +59,7 @@ __all__ = [
     "Effect",
     "EffortWeight",
     "Gravity",
+    "JerkCost",
     "JointLimitPotential",
     "JointSprings",
     "MovingBase",

@@ -79,6 +79,10 @@ class Effect(ABC):
         """R of the cost 1/2 tau^T diag(R) tau, shape (nv,); or None."""
         return None
 
+    def jerk_weight(self, robot: Robot) -> Array | None:
+        """W of the cost 1/2 j^T diag(W) j on the jerk, shape (nv,), positive; or None."""
+        return None
+
     @abstractmethod
     def describe(self) -> str:
         """One line: the effect and its parameters with units."""

@@ -24,6 +24,7 @@ from hovi.robot.robot import Robot
 from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.evaluation_cost import SceneAccount, account
+from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.terms import SceneTerms
 
 Array = npt.NDArray[np.float64]
@@ -101,12 +102,21 @@ class Scene:
         return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *indices]))
 
     @property
+    def order(self) -> int:
+        """The order of its effort Lagrangian: 2, or 3 with a cost on the jerk."""
+        return 2 if self.terms.jerk_weight is None else 3
+
+    @property
     def analytic(self) -> bool:
         """Whether the derivatives of RNEA are analytic."""
         return not self._without_kernel
 
-    def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
+    def effort_lagrangian(
+        self, weight: npt.ArrayLike | None = None
+    ) -> EffortLagrangian | JerkLagrangian:
         """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
+
+        With the effect `jerk_cost` it is L~ + 1/2 j^T diag(W) j on T^(3)Q.
 
         weight: R, shape (nv,); by default that of the effect `effort_weight`, or ones. Weights of
             passive joints are set to zero, since their torque vanishes.
@@ -121,7 +131,11 @@ class Scene:
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
         R = np.where(passive, 0.0, R)
-        return EffortLagrangian(self.torques, self, R, self._potential, self._torque_velocity_cost)
+        effort = EffortLagrangian(
+            self.torques, self, R, self._potential, self._torque_velocity_cost
+        )
+        W = self.terms.jerk_weight
+        return effort if W is None else JerkLagrangian(effort, W)
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -139,7 +153,7 @@ class Scene:
         return dataclasses.replace(self, effects=kept)
 
     def graph(self) -> ca.Function:
-        """(q, v, a, t) -> (tau, L~), as one expression graph."""
+        """(q, v, a, t) -> (tau, L~), as one expression graph, without a cost on the jerk."""
         symbols, added = self.terms.symbols, self.terms.torque
         tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
         tau = tau if added is None else tau + added
@@ -152,7 +166,8 @@ class Scene:
     def evaluation(self) -> Callable[..., Any]:
         """(q, v, a, t) -> L~ with its derivatives at a batch of points, as in an optimiser step."""
         lagrangian = self.effort_lagrangian()
-        return lambda q, v, a, t: lagrangian.expand(q, v, a, t=t)
+        more = lagrangian.order - 2
+        return lambda q, v, a, t: lagrangian.expand(q, v, a, *[np.zeros_like(a)] * more, t=t)
 
     def account(self) -> SceneAccount:
         """The cost of each effect in instructions and in measured time."""

@@ -60,6 +60,12 @@ class SceneTerms:
         return named[0] if named else np.ones(self.robot.nv)
 
     @cached_property
+    def jerk_weight(self) -> Array | None:
+        """W of the effect that defines it, shape (nv,); None without a cost on the jerk."""
+        weights = [effect.jerk_weight(self.robot) for effect in self.effects]
+        return next((weight for weight in weights if weight is not None), None)
+
+    @cached_property
     def timed(self) -> tuple[str, ...]:
         """Keys of the effects whose torque, cost or base motion depends on time."""
         resting, robot = dataclasses.replace(self.symbols, base=None), self.robot

@@ -130,6 +130,12 @@ class PlanOptions:
     weight: npt.ArrayLike | None = option(
         None, "weight of each joint's torque in the cost, shape (nv,)."
     )
+    smooth: bool = option(
+        False,
+        "whether the jerk costs something too, with a weight that follows from the inertia and the "
+        "duration: accelerations are zero at both ends, or as given, and torques are continuous.",
+        SceneKey("true or false"),
+    )
     max_iterations: int = whole_number(
         500,
         "maximum number of steps of a solve; with limits, of each of its rounds.",

@@ -24,10 +24,11 @@ from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
+from hovi.planning.search.smoothing import smoothed
 from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from hovi.schemes import is_galerkin
+from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
@@ -104,8 +105,9 @@ def plan(
     chosen = options.with_changes(**changes).on(scene.robot)
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
-    grid = _grid(T, chosen, scene.robot, free is not None)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
+    scene = smoothed(scene, *ends, T) if chosen.smooth else scene
+    grid = _grid(T, chosen, scene, free is not None)
     with deadline.in_force():
         scene.effort_lagrangian(chosen.weight)  # its functions may have to be compiled
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
@@ -147,7 +149,7 @@ def _time(
     return free, free.first
 
 
-def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
+def _grid(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
     """The requested grid, or the first grid of the refinement to a tolerance.
 
     The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
@@ -155,24 +157,25 @@ def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
     """
     guess = options.guess
     if options.tolerance is None:
-        grid = Grid.uniform(T, options.interval_count, options.table)
-    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options):
+        grid = Grid.uniform(T, options.interval_count, of_order(options.table, scene.order))
+    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order):
         grid = guess.grid.stretched(T)
     else:
-        limited = as_limits(robot, options.limits).bounded.any()
+        limited = as_limits(scene.robot, options.limits).bounded.any()
         kinks = limited or options.clearance.wanted or options.via
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
-        grid = first_grid(T, options.interval_count, not kinks, more_points=not few)
+        number, order = options.interval_count, scene.order
+        grid = first_grid(T, number, not kinks, more_points=not few, order=order)
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
 
 
-def _is_first_grid(grid: Grid, options: PlanOptions) -> bool:
+def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
     """Whether a refinement begins on the grid of its guess.
 
     The grid has Galerkin tables only, and more intervals than the first grid would have, up to
-    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others.
+    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others. order: of the Lagrangian.
     """
-    if options.intervals is not None or options.via:
+    if options.intervals is not None or options.via or grid.order != order:
         return False
     refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
     return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS

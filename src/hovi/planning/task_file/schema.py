@@ -160,6 +160,8 @@ class LimitsTable(Table):
     v: Bounds | None = Field(default=None, description=_BOUNDS)
     a: Bounds | None = Field(default=None, description=_BOUNDS)
     tau: Bounds | None = Field(default=None, description=_BOUNDS)
+    jerk: Bounds | None = Field(default=None, description=_BOUNDS)
+    torque_rate: Bounds | None = Field(default=None, description=_BOUNDS)
     margin: FiniteFloat = Field(
         default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
     )
