@@ -355,6 +355,7 @@ def _problems() -> list[Call]:
         call(hovi.Limits.from_dict, limits.to_dict()),
         own(limits, "with_margin", 0.1),
         own(limits, "excess", np.zeros((3, 4, 2))),
+        build(hovi.Limits, lower=-np.ones((6, 2)), upper=np.ones((6, 2)), tolerance=1e-6),
         build(
             hovi.FrameGoal,
             **{"frame": "tip", "position": [0.2, 0.0, 0.0], "rotation": np.eye(3)},
@@ -404,6 +405,7 @@ def _plans() -> list[Call]:
     return [
         call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
+        call(hovi.plan, scene(), *ends, 1.0, smooth=True, **quick),
         build(hovi.PlanOptions, **quick, **options),
         call(hovi.plan_task, _task(), progress=None, intervals=2),
         call(

@@ -357,12 +357,12 @@ ENTRIES: dict[str, Entry] = {
     "intervals.contract": Entry(
         intervals.contract,
         {
-            **{"table": _in("Q 3 m"), "weights": _in("Q"), "steps": _in("B")},
+            **{"table": _in("Q R m"), "weights": _in("Q"), "steps": _in("B")},
             **{"columns_gradient": _out("B m n"), "columns_hessian": _out("B m m n n")},
-            **{"gradient": _in("B*Q 3*n"), "hessian": _in("B*Q 3*n 3*n")},
+            **{"gradient": _in("B*Q R*n"), "hessian": _in("B*Q R*n R*n")},
         },
         _PORTABLE,
-        letters={"n": (0, 12), "m": (0, 6)},
+        letters={"n": (0, 12), "m": (0, 6), "R": (2, 5)},
     ),
     "intervals.interpolate": Entry(
         intervals.interpolate,

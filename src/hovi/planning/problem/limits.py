@@ -58,9 +58,8 @@ class Limits:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        if len(self.lower) != FIRST_KINDS:
-            require_shape("lower", self.lower, len(KINDS), None)
-        require_shape("lower", self.lower, None, None)
+        few = self.lower.shape[:1] == (FIRST_KINDS,)
+        require_shape("lower", self.lower, FIRST_KINDS if few else len(KINDS), None)
         require_shape("upper", self.upper, *self.lower.shape)
         if np.isnan(self.lower).any() or np.isnan(self.upper).any():
             raise InputError("a limit is not a number; use -inf or inf for no bound.")

@@ -72,6 +72,13 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
+_JOINTS = 'a list of joint names, or ["all"]'
+_ACCELERATION = (
+    "for a motion with a cost on the jerk: a list of finite numbers, one per velocity, or a table "
+    "of joint names"
+)
+
+
 class EndTable(Table):
     """[start] or [goal]."""
 
@@ -83,9 +90,8 @@ class EndTable(Table):
         default=None,
         description="a list of finite numbers, one per velocity, or a table of joint names",
     )
-
-
-_JOINTS = 'a list of joint names, or ["all"]'
+    a: Coordinates | None = Field(default=None, description=_ACCELERATION)
+    free_acceleration: list[str] = Field(default=[], description=_JOINTS)
 
 
 class StartTable(EndTable):
@@ -117,6 +123,8 @@ class GoalTable(Table):
         default=None,
         description="a list of finite numbers, one per velocity, or a table of joint names",
     )
+    a: Coordinates | None = Field(default=None, description=_ACCELERATION)
+    free_acceleration: list[str] = Field(default=[], description=_JOINTS)
     free: list[str] = Field(default=[], description=_JOINTS)
     free_velocity: list[str] = Field(default=[], description=_JOINTS)
     turns: ByJoint = Field(
