@@ -21,7 +21,7 @@ from hovi.effects import REGISTRY, Effect
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
-from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
+from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.evaluation_cost import SceneAccount, account
 from hovi.scene.terms import SceneTerms
@@ -91,7 +91,7 @@ class Scene:
     @cached_property
     def terms(self) -> SceneTerms:
         """The terms that effects add to RNEA and to the cost, as expressions."""
-        return SceneTerms(self.robot, self.effects)
+        return SceneTerms(self.robot, self.effects, self.model)
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
@@ -106,7 +106,7 @@ class Scene:
         return not self._without_kernel
 
     def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
-        """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
+        """L~ = 1/2 tau^T diag(R) tau + V(q, v, a, t) + C(q, v, a, tau, t) on T^(2)Q.
 
         weight: R, shape (nv,); by default that of the effect `effort_weight`, or ones. Weights of
             passive joints are set to zero, since their torque vanishes.
@@ -121,7 +121,7 @@ class Scene:
                 f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
             )
         R = np.where(passive, 0.0, R)
-        return EffortLagrangian(self.torques, self, R, self._potential, self._torque_velocity_cost)
+        return EffortLagrangian(self.torques, self, R, self._potential, self._running_cost)
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -145,7 +145,7 @@ class Scene:
         tau = tau if added is None else tau + added
         weight = np.where(self._is_passive, 0.0, self.terms.effort_weight)
         cost = ca.dot(ca.DM(weight), tau**2) / 2
-        for more in (self.terms.potential, self._drive_cost(tau, symbols.v)):
+        for more in (self.terms.potential, self._cost_of(tau)):
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
@@ -214,14 +214,14 @@ class Scene:
         )
 
     @cached_property
-    def _torque_velocity_cost(self) -> TorqueVelocityCost | None:
-        tau, v = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.v
-        phi = self._drive_cost(tau, v)
-        return None if phi is None else TorqueVelocityCost(tau, v, phi, self.compile)
+    def _running_cost(self) -> RunningCostTerm | None:
+        tau, columns = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.columns()
+        C, space = self._cost_of(tau), self.robot.curved_space
+        return None if C is None else RunningCostTerm(columns, tau, C, self.compile, space)
 
-    def _drive_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """phi(tau, v) of the drives: what is left of a passive joint's torque costs nothing."""
-        return self.terms.effort_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau, v)
+    def _cost_of(self, tau: ca.SX) -> ca.SX | None:
+        """C(q, v, a, tau, t): what is left of a passive joint's torque costs nothing."""
+        return self.terms.running_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau)
 
     def _derivatives(self) -> str:
         if self.analytic:
