@@ -7,6 +7,7 @@ their JSON schema, and can be stored in motion files.
 from __future__ import annotations
 
 from hovi.effects.armature import Armature
+from hovi.effects.casadi_cost import CasadiCost
 from hovi.effects.custom import Custom
 from hovi.effects.drag import Drag
 from hovi.effects.dry_friction import DryFriction
@@ -22,6 +23,7 @@ from hovi.effects.payload import Payload
 from hovi.effects.power_cost import PowerCost
 from hovi.effects.reference_cost import ReferenceCost
 from hovi.effects.registration import REGISTRY, register
+from hovi.effects.running_cost import RunningCost
 from hovi.effects.viscous_friction import ViscousFriction
 from hovi.effects.wrench import Wrench
 
@@ -42,6 +44,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     AccelerationCost,
     ReferenceCost,
     PowerCost,
+    RunningCost,
 )
 """In the order of the JSON schema."""
 for _effect in EFFECTS:
@@ -52,6 +55,7 @@ __all__ = [
     "REGISTRY",
     "AccelerationCost",
     "Armature",
+    "CasadiCost",
     "Custom",
     "Drag",
     "DryFriction",
@@ -64,6 +68,7 @@ __all__ = [
     "Payload",
     "PowerCost",
     "ReferenceCost",
+    "RunningCost",
     "SceneSymbols",
     "Touch",
     "VelocityCost",

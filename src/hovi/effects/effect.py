@@ -43,6 +43,8 @@ class Effect(ABC):
     """Name of the effect's table in a scene file."""
     touches: ClassVar[tuple[Touch, ...]] = (Touch.TORQUE,)
     """What it modifies; a scene refuses an effect that modifies anything else."""
+    storable: ClassVar[bool] = True
+    """Whether its fields are data that files contain."""
 
     def __post_init__(self) -> None:
         """Convert lists to tuples, so that effects read from a file equal those written.

@@ -83,7 +83,7 @@ class RunningCostTerm:
 
     def gradient(self, at: CostDerivatives, J: Array) -> Array:
         """C_x + J^T C_tau, shape (P, 3 nv). J: d tau/dx, shape (P, nv, 3 nv)."""
-        gradient = np.matmul(at.torque[:, None], J)[:, 0]
+        gradient: Array = np.matmul(at.torque[:, None], J)[:, 0]
         gradient[:, self.columns] += at.jet
         return gradient
 
@@ -92,9 +92,21 @@ class RunningCostTerm:
         half = np.matmul(0.5 * at.torque_torque, J)
         half[:, :, self.columns] += at.torque_jet
         S = np.matmul(J.transpose(0, 2, 1), half)
-        hessian = S + S.transpose(0, 2, 1)
+        hessian: Array = S + S.transpose(0, 2, 1)
         hessian[:, self.columns, self.columns] += at.jet_jet
         return hessian
+
+    def curvature(
+        self, *jet: Array, tau: Array, t: Array | None = None
+    ) -> tuple[Array, Array, Array]:
+        """C_tautau, C_taua and C_aa, each of shape (P, nv, nv)."""
+        at = self.derivatives(*jet, tau=tau, t=t)
+        n = tau.shape[1]
+        torque_jet = np.zeros((len(tau), n, 3 * n))
+        torque_jet[:, :, self.columns] = at.torque_jet
+        jet_jet = np.zeros((len(tau), 3 * n, 3 * n))
+        jet_jet[:, self.columns, self.columns] = at.jet_jet
+        return at.torque_torque, torque_jet[:, :, 2 * n :], jet_jet[:, 2 * n :, 2 * n :]
 
 
 class PotentialTerm:
