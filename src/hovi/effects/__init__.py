@@ -1,7 +1,7 @@
 """Effects: opt-in physics and costs of a scene beyond rigid-body inertia, one file each.
 
 This file lists them: an effect in EFFECTS and __all__ is public, a table of scene files and of
-their JSON schema, and can be stored in motion files.
+their JSON schema, and can be stored in motion files. A CasadiCost holds a function, and is neither.
 """
 
 from __future__ import annotations

@@ -57,7 +57,7 @@ def base_reaction(robot: Robot, symbols: SceneSymbols) -> tuple[ca.SX, ca.SX]:
     """Force [N] and moment [N m] of the ground on the base, by RNEA, each of shape (3,).
 
     In the axes of the world; the moment is about its origin. They carry the weight and the inertia
-    of all that the joints move; wrenches and drag at frames are not part of them.
+    of all links, the base's own weight included; wrenches and drag at frames are no part of them.
     Raises SceneError with a moving base.
     """
     if symbols.base is not None:
