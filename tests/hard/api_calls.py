@@ -235,7 +235,7 @@ def _scenes() -> list[Call]:
             **{"coulomb": {"elbow": 1.0}, "static": {"elbow": 2.0}, "stribeck_velocity": 0.1},
             **{"width": 0.05, "from_urdf": False},
         ),
-        build(e.CasadiCost, function=_squared_torque()),
+        build(e.CasadiCost, cost=_squared_torque()),
         build(e.EffortWeight, weight={"elbow": 2.0}),
         build(e.EffortWeight, matrix=[[2.0, "sin(t)"], ["sin(t)", 1.0]]),
         build(e.Gravity, acceleration=9.81, direction=(0.0, 0.0, -1.0)),

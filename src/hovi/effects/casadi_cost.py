@@ -25,11 +25,11 @@ class CasadiCost(Effect):
     should use tau and not repeat RNEA. Files do not contain it: `hovi.effects.RunningCost` has
     formulas instead.
 
-    function: a casadi.Function, or a Python function, of (q, v, a, tau, t), shapes (nq,), (nv,),
+    cost: a casadi.Function, or a Python function, of (q, v, a, tau, t), shapes (nq,), (nv,),
         (nv,), (nv,) and (), with one number as its result.
     """
 
-    function: Callable[..., Any]
+    cost: Callable[..., Any]
     key: ClassVar[str] = "casadi_cost"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
     storable: ClassVar[bool] = False
@@ -42,21 +42,20 @@ class CasadiCost(Effect):
         """The function's result."""
         q, v, a, t = symbols.columns()
         try:
-            found = self.function(q, v, a, tau, t)
-            cost = ca.SX(found)
+            found = ca.SX(self.cost(q, v, a, tau, t))
         except Exception as error:
             reason = str(error).strip().splitlines()[-1:] or [type(error).__name__]
             raise SceneError(
-                "effect 'casadi_cost': function must map the SX symbols (q, v, a, tau, t), of "
+                "effect 'casadi_cost': cost must map the SX symbols (q, v, a, tau, t), of "
                 f"{q.numel()}, {v.numel()}, {a.numel()}, {tau.numel()} and 1 rows, to one number, "
                 f"but it failed: {reason[0].removesuffix('.')}."
             ) from error
-        _require_number(cost, [q, v, a, tau, t])
-        return None if cost.is_zero() else cost
+        _require_number(found, [q, v, a, tau, t])
+        return None if found.is_zero() else found
 
     def describe(self) -> str:
         """One line for the description of a scene."""
-        name = self.function.name() if isinstance(self.function, ca.Function) else self.function
+        name = self.cost.name() if isinstance(self.cost, ca.Function) else self.cost
         return f"casadi_cost: {getattr(name, '__name__', name)} of (q, v, a, tau, t)"
 
 
@@ -64,7 +63,7 @@ def _require_number(cost: ca.SX, symbols: list[ca.SX]) -> None:
     """Raise SceneError unless a cost is one number of these symbols alone."""
     if not cost.is_scalar():
         raise SceneError(
-            f"effect 'casadi_cost': function must have one number as its result, got {cost.shape}."
+            f"effect 'casadi_cost': cost must have one number as its result, got {cost.shape}."
         )
     known = {each.element_hash() for x in symbols for each in ca.vertsplit(x)}
     foreign = [str(each) for each in ca.symvar(cost) if each.element_hash() not in known]
