@@ -283,6 +283,19 @@ def test_a_joint_without_a_motor_has_no_torque_to_pay_for(two_link: Robot) -> No
         np.testing.assert_array_equal(found, expected)
 
 
+def test_a_joint_without_a_motor_swings_where_no_torque_has_a_weight(two_link: Robot) -> None:
+    """Its torque is an equation, whose penalty is scaled by the weights there are."""
+    more = [EffortWeight(0.0), RunningCost({"x": "0.5*dot(tau, tau)"})]
+    ends = np.array([-1.5, 0.0]), np.array([-1.2, 0.0])
+    known, found = (
+        plan(Scene(two_link, [Gravity(), *added], passive=["elbow"]), *ends, 1.0, limits="none")
+        for added in ([], more)
+    )
+    assert known.success
+    assert found.success
+    assert found.cost == pytest.approx(known.cost, rel=1e-6)
+
+
 # Minima
 
 
