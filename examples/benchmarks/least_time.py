@@ -1,7 +1,7 @@
 """Nearly least time by hovi, and TOPP-RA's least time on the same path (`pip install toppra`).
 
-hovi minimises T + w/2 integral |tau|^2 with a small w within bounds on v and tau, and finds the path
-as well; TOPP-RA, which is given that path, minimises T alone.
+hovi minimises T + w/2 integral |tau|^2 with a small w within bounds on v and tau, and finds the
+path as well; TOPP-RA, which is given that path, minimises T alone.
 """
 
 from __future__ import annotations
