@@ -236,7 +236,7 @@ def test_an_effect_survives_toml(two_link: Robot, tmp_path: Path, key: str) -> N
 
 def test_time_dependent_effects_are_detected(panda: Robot) -> None:
     scene = Scene(panda, list(sample_effects(panda).values()))
-    timed = ("wrench", "drag", "moving_base", "custom", "reference_cost")
+    timed = ("wrench", "drag", "moving_base", "custom", "reference_cost", "running_cost")
     assert set(scene.terms.timed) == set(timed)
     assert Scene(panda, list(zero_strength_effects(panda).values())[:7]).terms.timed == ()
 

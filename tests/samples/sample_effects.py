@@ -18,6 +18,7 @@ from hovi.effects import (
     Payload,
     PowerCost,
     ReferenceCost,
+    RunningCost,
     VelocityCost,
     ViscousFriction,
     Wrench,
@@ -48,6 +49,12 @@ def sample_effects(robot: Robot) -> dict[str, Effect]:
         JerkCost(0.3),
         ReferenceCost({last: "0.3*t"}, 4.0),
         PowerCost(0.5, 0.4),
+        RunningCost(
+            {
+                "drives": f'0.3*dot(tau, tau) + exp(-t)*tau["{first}"]*v["{first}"]',
+                "tip": f'0.1*acceleration["{tip}", "z"]**2 + 0.2*a["{last}"]*tau["{first}"]',
+            }
+        ),
     ]
     return {effect.key: effect for effect in effects}
 
@@ -72,5 +79,6 @@ def zero_strength_effects(robot: Robot) -> dict[str, Effect]:
         AccelerationCost(0.0),
         ReferenceCost({first: 1.0}, 0.0),
         PowerCost(0.0),
+        RunningCost({"nothing": "0*dot(tau, v)"}),
     ]
     return {effect.key: effect for effect in effects}

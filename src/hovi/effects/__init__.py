@@ -1,12 +1,13 @@
 """Effects: opt-in physics and costs of a scene beyond rigid-body inertia, one file each.
 
 This file lists them: an effect in EFFECTS and __all__ is public, a table of scene files and of
-their JSON schema, and can be stored in motion files.
+their JSON schema, and can be stored in motion files. A CasadiCost holds a function, and is neither.
 """
 
 from __future__ import annotations
 
 from hovi.effects.armature import Armature
+from hovi.effects.casadi_cost import CasadiCost
 from hovi.effects.custom import Custom
 from hovi.effects.drag import Drag
 from hovi.effects.dry_friction import DryFriction
@@ -22,6 +23,7 @@ from hovi.effects.payload import Payload
 from hovi.effects.power_cost import PowerCost
 from hovi.effects.reference_cost import ReferenceCost
 from hovi.effects.registration import REGISTRY, register
+from hovi.effects.running_cost import RunningCost
 from hovi.effects.viscous_friction import ViscousFriction
 from hovi.effects.wrench import Wrench
 
@@ -43,6 +45,7 @@ EFFECTS: tuple[type[Effect], ...] = (
     JerkCost,
     ReferenceCost,
     PowerCost,
+    RunningCost,
 )
 """In the order of the JSON schema."""
 for _effect in EFFECTS:
@@ -53,6 +56,7 @@ __all__ = [
     "REGISTRY",
     "AccelerationCost",
     "Armature",
+    "CasadiCost",
     "Custom",
     "Drag",
     "DryFriction",
@@ -66,6 +70,7 @@ __all__ = [
     "Payload",
     "PowerCost",
     "ReferenceCost",
+    "RunningCost",
     "SceneSymbols",
     "Touch",
     "VelocityCost",
