@@ -7,6 +7,9 @@ from . import symbolic as symbolic
 from .discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
 from .discrete.grid import DiscretePath as DiscretePath
 from .discrete.grid import Grid as Grid
+from .discrete.measures.motion_extremes import Extreme as Extreme
+from .discrete.measures.motion_extremes import Extremes as Extremes
+from .discrete.measures.motion_extremes import extremes as extremes
 from .discrete.motion_error import MotionError as MotionError
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory

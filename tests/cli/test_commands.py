@@ -95,6 +95,32 @@ def test_json_is_one_object_with_the_documented_keys(run: Run) -> None:
     assert fields["excess"] is None
 
 
+def test_json_has_the_effort_and_the_extremes(run: Run, tmp_path: Path) -> None:
+    motion = tmp_path / "reach.npz"
+    fields = only_object(run("plan", "two_link_reach", "--json", "--out", motion)[1])
+    assert fields["effort"] == pytest.approx(fields["cost"], rel=1e-12)
+    trajectory = Trajectory.load(motion)
+    a = trajectory.sample(np.linspace(0, trajectory.duration, 2001)).a
+    found = fields["acceleration"]
+    assert found["largest"] == pytest.approx(np.abs(a).max(), rel=1e-3)
+    assert found["largest"] == max(found["joints"].values()) == found["joints"][found["joint"]]
+    assert 0 <= found["t"] <= trajectory.duration
+    names = ["shoulder", "elbow"]
+    assert [found["start"][name] for name in names] == pytest.approx(a[0])
+    assert [found["end"][name] for name in names] == pytest.approx(a[-1])
+    assert (found["unit"], fields["jerk"]["unit"]) == ("rad/s^2", "rad/s^3")
+    assert list(fields["jerk"]) == list(found)
+
+
+def test_the_report_says_the_effort_the_largest_acceleration_and_jerk(run: Run) -> None:
+    out = run("plan", "two_link_reach", "--no-certificate")[1]
+    assert re.search(r"^effort +20\.2088", out, re.MULTILINE)
+    ends = r".*; up to \S+ \(elbow\) at the start, \S+ \(elbow\) at the end$"
+    for label, unit in (("accel\\.", "2"), ("jerk", "3")):
+        line = rf"^{label} +at most \S+ rad/s\^{unit} \(elbow, t = \S+ s\){ends}"
+        assert re.search(line, out, re.MULTILINE), out
+
+
 def test_options_override_the_scene(run: Run) -> None:
     options = ("--scheme", "galerkin-1", "--intervals", "24", "--seed", "7", "--starts", "1")
     _, out, _ = run("plan", "two_link_reach", "--json", *options)
@@ -120,9 +146,9 @@ def test_with_limits_the_report_shows_the_margins(run: Run) -> None:
     assert code == 0
     assert "beyond" not in out
     assert "* at a limit" in out
-    (row,) = [line for line in out.splitlines() if "elbow_joint" in line]
-    assert re.search(r"3\.14 +\*0\.0 %", row)  # its velocity, of 3.14 rad/s
-    (row,) = [line for line in out.splitlines() if "shoulder_lift_joint" in line]
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert re.search(r"3\.14 +\*0\.0 %", rows["elbow_joint"])  # its velocity, of 3.14 rad/s
+    row = rows["shoulder_lift_joint"]
     assert "*" not in row
 
 

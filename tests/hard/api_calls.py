@@ -329,6 +329,7 @@ def _motions() -> list[Call]:
         ),
         *(own(trajectory, name, [0.0, 0.5]) for name in ("sample", "configurations", "jet")),
         *(own(trajectory, name, k, s) for name in ("jet_intervals", "sample_intervals")),
+        call(hovi.extremes, trajectory),
     ]
 
 
