@@ -41,6 +41,9 @@ from .planning.clearance.clearance import Clearance as Clearance
 from .planning.clearance.obstacles import Box as Box
 from .planning.clearance.obstacles import Capsule as Capsule
 from .planning.clearance.obstacles import Sphere as Sphere
+from .planning.problem.arms.limit_set import LimitSet as LimitSet
+from .planning.problem.arms.limit_set import LimitSource as LimitSource
+from .planning.problem.arms.limit_set import limit_sets as limit_sets
 from .planning.problem.frame_goal import FrameGoal as FrameGoal
 from .planning.problem.goals import Via as Via
 from .planning.problem.limits import Limits as Limits

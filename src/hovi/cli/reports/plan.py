@@ -10,6 +10,7 @@ from typing import Any
 from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
+from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines
 from hovi.cli.reports.extremes import extremes_json, extremes_lines
 from hovi.cli.reports.limit_margins import LimitMargins, Margins
@@ -51,6 +52,7 @@ def as_json(
         "minima": list(solution.minima),
         "peaks": _peaks_json(peaks(trajectory)),
         **extremes_json(extremes(trajectory)),
+        "limit_set": limit_set_json(limit_set_of(task), trajectory.grid.order),
         "limits": None if limits is None else limits.by_kind(),
         "excess": None if limits is None else limits.excess,
         "least_distance": margins.distance,
@@ -71,6 +73,9 @@ def print_report(
     """Print a summary, the peaks of the motion, the certificate and the output file."""
     for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
+    arm = limit_set_of(task)
+    if arm is not None:
+        print(f"limits   {limit_set_text(arm, solution.trajectory.grid.order)}")
     largest = peaks(solution.trajectory)
     if margins.limits is not None:
         print_table(_margins_table(largest, margins.limits), width=120)

@@ -13,6 +13,8 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
+from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.arms.limit_set import is_limit_set, limit_set
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -145,10 +147,10 @@ def urdf_limits(robot: Robot) -> Limits:
 def as_limits(coordinates: Coordinates, limits: str | Limits | Mapping[str, Any]) -> Limits:
     """Limits from a name or a mapping, as `plan` and scene files accept them.
 
-    limits: "urdf" (of a robot), "none", a Limits, or a mapping with any of `base` ("urdf", the
-        default, or "none"), `q`, `v`, `a`, `tau`, `margin` and `tolerance`. A kind is a number or
-        a list of numbers x for -x and x, a list of pairs (lower, upper), or a mapping from joint
-        names to either.
+    limits: "urdf" (of a robot), "none", the name of an arm of `hovi.limit_sets`, a Limits, or a
+        mapping with any of `base` (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`,
+        `margin` and `tolerance`. A kind is a number or a list of numbers x for -x and x, a list of
+        pairs (lower, upper), or a mapping from joint names to either.
     Raises InputError for unknown keys or joints and for bounds that do not fit the
     coordinates. Warns of ranges of angles that look like degrees.
     """
@@ -189,11 +191,28 @@ def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
 def _by_name(coordinates: Coordinates, name: Any) -> Limits:
     if name == "none":
         return no_limits(coordinates)
+    if is_limit_set(name):
+        return _of_arm(coordinates, name)
     if name != "urdf":
-        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {name!r}.")
+        hint = f": {nearest(name, ('urdf', 'none', *ARMS))}" if isinstance(name, str) else "."
+        raise InputError(
+            f"limits are 'urdf', 'none', the name of an arm or given by kind, not {name!r}{hint}"
+        )
     if not isinstance(coordinates, Robot):
         raise InputError(f"{coordinates.owner} has no URDF: limits need base = 'none' here.")
     return urdf_limits(coordinates)
+
+
+def _of_arm(coordinates: Coordinates, name: str) -> Limits:
+    """Those of a limit set; joints that its arm does not have keep the limits of the URDF."""
+    base = urdf_limits(coordinates) if isinstance(coordinates, Robot) else no_limits(coordinates)
+    lower, upper = base.lower.copy(), base.upper.copy()
+    bounds = limit_set(name).on(coordinates)
+    for row, kind in enumerate(KINDS[: len(lower)]):
+        for joint, pair in bounds[kind].items():
+            i = coordinates.coordinate_names.index(joint)
+            lower[row, i], upper[row, i] = pair
+    return Limits(lower, upper)
 
 
 def _entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:

@@ -83,8 +83,8 @@ class PlanOptions:
     )
     limits: str | Limits | Mapping[str, Any] = option(
         "urdf",
-        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", a '
-        "Limits, or a mapping as for as_limits.",
+        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", the '
+        "name of an arm of hovi.limit_sets, a Limits, or a mapping as for as_limits.",
     )
     starts: int = whole_number(
         1,
