@@ -330,6 +330,7 @@ def _motions() -> list[Call]:
         *(own(trajectory, name, [0.0, 0.5]) for name in ("sample", "configurations", "jet")),
         *(own(trajectory, name, k, s) for name in ("jet_intervals", "sample_intervals")),
         call(hovi.extremes, trajectory),
+        call(hovi.limit_sets),
         own(hovi.limit_sets()["panda"], "beyond", 2),
         own(hovi.limit_sets()["panda"], "on", _panda()),
     ]
