@@ -7,6 +7,9 @@ from . import symbolic as symbolic
 from .discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangian
 from .discrete.grid import DiscretePath as DiscretePath
 from .discrete.grid import Grid as Grid
+from .discrete.measures.motion_extremes import Extreme as Extreme
+from .discrete.measures.motion_extremes import Extremes as Extremes
+from .discrete.measures.motion_extremes import extremes as extremes
 from .discrete.motion_error import MotionError as MotionError
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory
@@ -38,6 +41,9 @@ from .planning.clearance.clearance import Clearance as Clearance
 from .planning.clearance.obstacles import Box as Box
 from .planning.clearance.obstacles import Capsule as Capsule
 from .planning.clearance.obstacles import Sphere as Sphere
+from .planning.problem.arms.limit_set import LimitSet as LimitSet
+from .planning.problem.arms.limit_set import LimitSource as LimitSource
+from .planning.problem.arms.limit_set import limit_sets as limit_sets
 from .planning.problem.frame_goal import FrameGoal as FrameGoal
 from .planning.problem.goals import Via as Via
 from .planning.problem.limits import Limits as Limits

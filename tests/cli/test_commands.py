@@ -19,7 +19,9 @@ import numpy as np
 import pytest
 
 from hovi.cli.application import main
+from hovi.cli.reports.arm_limits import limit_set_json, limit_set_text
 from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.arms.limit_set import limit_set
 from hovi.robot.bundled_models import example, example_scenes
 
 REACH = example("two_link_reach.toml").read_text()
@@ -95,6 +97,32 @@ def test_json_is_one_object_with_the_documented_keys(run: Run) -> None:
     assert fields["excess"] is None
 
 
+def test_json_has_the_effort_and_the_extremes(run: Run, tmp_path: Path) -> None:
+    motion = tmp_path / "reach.npz"
+    fields = only_object(run("plan", "two_link_reach", "--json", "--out", motion)[1])
+    assert fields["effort"] == pytest.approx(fields["cost"], rel=1e-12)
+    trajectory = Trajectory.load(motion)
+    a = trajectory.sample(np.linspace(0, trajectory.duration, 2001)).a
+    found = fields["acceleration"]
+    assert found["largest"] == pytest.approx(np.abs(a).max(), rel=1e-3)
+    assert found["largest"] == max(found["joints"].values()) == found["joints"][found["joint"]]
+    assert 0 <= found["t"] <= trajectory.duration
+    names = ["shoulder", "elbow"]
+    assert [found["start"][name] for name in names] == pytest.approx(a[0])
+    assert [found["end"][name] for name in names] == pytest.approx(a[-1])
+    assert (found["unit"], fields["jerk"]["unit"]) == ("rad/s^2", "rad/s^3")
+    assert list(fields["jerk"]) == list(found)
+
+
+def test_the_report_says_the_effort_the_largest_acceleration_and_jerk(run: Run) -> None:
+    out = run("plan", "two_link_reach", "--no-certificate")[1]
+    assert re.search(r"^effort +20\.2088", out, re.MULTILINE)
+    ends = r".*; up to \S+ \(elbow\) at the start, \S+ \(elbow\) at the end$"
+    for label, unit in (("accel\\.", "2"), ("jerk", "3")):
+        line = rf"^{label} +at most \S+ rad/s\^{unit} \(elbow, t = \S+ s\){ends}"
+        assert re.search(line, out, re.MULTILINE), out
+
+
 def test_options_override_the_scene(run: Run) -> None:
     options = ("--scheme", "galerkin-1", "--intervals", "24", "--seed", "7", "--starts", "1")
     _, out, _ = run("plan", "two_link_reach", "--json", *options)
@@ -120,9 +148,9 @@ def test_with_limits_the_report_shows_the_margins(run: Run) -> None:
     assert code == 0
     assert "beyond" not in out
     assert "* at a limit" in out
-    (row,) = [line for line in out.splitlines() if "elbow_joint" in line]
-    assert re.search(r"3\.14 +\*0\.0 %", row)  # its velocity, of 3.14 rad/s
-    (row,) = [line for line in out.splitlines() if "shoulder_lift_joint" in line]
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert re.search(r"3\.14 +\*0\.0 %", rows["elbow_joint"])  # its velocity, of 3.14 rad/s
+    row = rows["shoulder_lift_joint"]
     assert "*" not in row
 
 
@@ -139,6 +167,42 @@ def test_json_has_the_margin_to_each_limit(run: Run, tmp_path: Path) -> None:
         left = (3.14 - fields["peaks"][name]["v"]) / 6.28
         assert math.isclose(room, left, abs_tol=1e-4)
     assert set(fields["limits"]["a"].values()) == {None}
+
+
+def test_the_limits_of_an_arm_are_reported_with_what_they_leave_out(run: Run) -> None:
+    options = ("--limits", "ur5", "--no-certificate")
+    _, out, _ = run("plan", "ur5_reach", *options)
+    line = r"^limits +ur5, of a UR5 \(CB3\); no limits on acceleration, jerk and torque rate are"
+    assert re.search(line, out, re.MULTILINE)
+    fields = only_object(run("plan", "ur5_reach", "--json", *options)[1])
+    assert fields["limit_set"]["name"] == "ur5"
+    assert fields["limit_set"]["unpublished"] == ["a", "jerk", "torque_rate"]
+    assert fields["limit_set"]["not_applied"] == []
+    assert all(url.startswith("https://") for url in fields["limit_set"]["sources"])
+    assert fields["excess"] < 1e-6
+
+
+def test_a_report_says_that_jerk_limits_do_not_apply() -> None:
+    arm = limit_set("panda")
+    text = limit_set_text(arm, 2)
+    assert "without those on jerk and torque rate, for which a motion needs order 3" in text
+    assert "without" not in limit_set_text(arm, 3)
+    found = limit_set_json(arm, 2)
+    assert found is not None
+    assert (found["not_applied"], found["unpublished"]) == (["jerk", "torque_rate"], [])
+
+
+def test_an_unknown_arm_is_refused_with_a_hint(run: Run) -> None:
+    assert_refused(run("plan", "ur5_reach", "--limits", "pnda"), "'pnda'", "'panda'")
+    assert_refused(run("plan", "ur5_reach", "--limits", "panda"), "panda_joint1", "'ur5'")
+
+
+def test_info_names_the_sources_of_the_limits_of_an_arm(run: Run, tmp_path: Path) -> None:
+    text = example("ur5_reach.toml").read_text().replace('limits = "none"', 'limits = "ur5"')
+    code, out, _ = run("info", scene(tmp_path, text, None))
+    assert code == 0
+    assert "limits of a UR5 (CB3), published in" in out
+    assert "github.com/UniversalRobots" in out
 
 
 def test_split_intervals_are_counted(run: Run) -> None:

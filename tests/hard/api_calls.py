@@ -339,7 +339,17 @@ def _motions() -> list[Call]:
         ),
         *(own(trajectory, name, [0.0, 0.5]) for name in ("sample", "configurations", "jet")),
         *(own(trajectory, name, k, s) for name in ("jet_intervals", "sample_intervals")),
+        call(hovi.extremes, trajectory),
+        call(hovi.limit_sets),
+        own(hovi.limit_sets()["panda"], "beyond", 2),
+        own(hovi.limit_sets()["panda"], "on", _panda()),
     ]
+
+
+@cache
+def _panda() -> hovi.Robot:
+    """An arm with a limit set."""
+    return hovi.load_robot("panda")
 
 
 def _state_on_robot(**fields: Any) -> object:

@@ -15,6 +15,7 @@ LEFT_OUT = {
     # results, which hovi makes
     *("Accuracy", "Certificate", "Flow", "MotionError", "Simulation", "Solution", "Status"),
     *("Tolerance", "Tracking", "Robot", "HoviError"),
+    *("Extreme", "Extremes", "LimitSet", "LimitSource"),
     # packages, of which the members are called
     *("accuracy", "effects", "schemes", "symbolic"),
 }

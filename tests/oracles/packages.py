@@ -32,6 +32,7 @@ FLOORS = [
 INSIDE = {
     "robot": [{"space", "urdf"}, {""}],
     "effects": [{"expressions"}, {""}],
+    "discrete": [{""}, {"measures"}],
     "planning": [
         {"clearance"},
         {"problem"},

@@ -88,14 +88,14 @@ def test_distances_of_a_clearance_are_built_once_whatever_else_changes() -> None
     assert options.with_changes(margin=0.1).clearance.margin == 0.1
 
 
-def test_options_are_resolved_for_a_robot(
+def test_options_are_resolved_for_a_scene(
     arm_scene: Scene,
 ) -> None:
-    options = PlanOptions(tolerance="0.1 mm").on(arm_scene.robot)
+    options = PlanOptions(tolerance="0.1 mm").on(arm_scene)
     assert isinstance(options.tolerance, Tolerance)
     assert isinstance(options.limits, hovi.Limits)
     with pytest.raises(InputError, match="no such frame"):
-        PlanOptions(tolerance="1 mm at foot").on(arm_scene.robot)
+        PlanOptions(tolerance="1 mm at foot").on(arm_scene)
 
 
 def test_a_job_is_pickled_without_its_guess(arm_scene: Scene) -> None:

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from hovi.system.deadline import Deadline
 
 GUESSES = ("cubic", "minimum-jerk")
-LIMITS = ("urdf", "none")
 MAX_CERTIFIED_INTERVALS = 2000
 """Largest number of intervals for which a certificate is computed."""
 CERTIFICATE_SECONDS = 30.0
@@ -37,7 +36,10 @@ def plan(
     intervals: Annotated[int | None, typer.Option(help="Override the scene's.")] = None,
     starts: Annotated[int | None, typer.Option(help="Number of initial guesses.")] = None,
     limits: Annotated[
-        str | None, typer.Option(metavar="urdf|none", help="Override the scene's.")
+        str | None,
+        typer.Option(
+            metavar="urdf|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random guesses.")] = None,
     time_limit: Annotated[
@@ -79,6 +81,7 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     """The plan options given as flags. Raises InputError."""
     from hovi.cli.arguments.durations import positive_seconds
     from hovi.errors import InputError, nearest
+    from hovi.planning.problem.arms.limit_set import NAMES
     from hovi.planning.search.option_fields import option_infos
     from hovi.planning.search.options import PlanOptions
 
@@ -88,9 +91,9 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     }
     if "time_limit" in given:
         given["time_limit"] = positive_seconds("--time-limit", given["time_limit"])
-    limits = given.get("limits", "none")
-    if limits not in LIMITS:
-        hint = nearest(limits, LIMITS)
+    limits, names = given.get("limits", "none"), ("urdf", "none", *NAMES)
+    if limits not in names:
+        hint = nearest(limits, names)
         raise InputError(f"--limits {limits!r}: {hint} Give other limits in the scene file.")
     return given | {"guess": _guess(given["guess"])} | _tolerance_override(given)
 

@@ -10,10 +10,13 @@ from typing import Any
 from rich.table import Table
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
+from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines
+from hovi.cli.reports.extremes import extremes_json, extremes_lines
 from hovi.cli.reports.limit_margins import LimitMargins, Margins
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.discrete.measures.motion_extremes import extremes
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
@@ -36,6 +39,7 @@ def as_json(
         "status": str(solution.status),
         "message": solution.message,
         "cost": solution.cost,
+        "effort": solution.effort,
         "error_estimate": _estimate(solution, certificate),
         "scheme": scheme_text(task, trajectory.grid),
         "intervals": trajectory.grid.intervals,
@@ -47,6 +51,8 @@ def as_json(
         "seed": task.options.seed,
         "minima": list(solution.minima),
         "peaks": _peaks_json(peaks(trajectory)),
+        **extremes_json(extremes(trajectory)),
+        "limit_set": limit_set_json(limit_set_of(task), trajectory.grid.order),
         "limits": None if limits is None else limits.by_kind(),
         "excess": None if limits is None else limits.excess,
         "least_distance": margins.distance,
@@ -67,14 +73,19 @@ def print_report(
     """Print a summary, the peaks of the motion, the certificate and the output file."""
     for label, text in _summary(solution, task):
         print(f"{label:9s}{text}")
-    extremes = peaks(solution.trajectory)
+    arm = limit_set_of(task)
+    if arm is not None:
+        print(f"limits   {limit_set_text(arm, solution.trajectory.grid.order)}")
+    largest = peaks(solution.trajectory)
     if margins.limits is not None:
-        print_table(_margins_table(extremes, margins.limits), width=120)
+        print_table(_margins_table(largest, margins.limits), width=120)
         print(_margins_note(margins.limits))
     else:
-        print_table(_peaks_table(extremes), width=120)
-        if any(each.any() for each in extremes.beyond().values()):
+        print_table(_peaks_table(largest), width=120)
+        if any(each.any() for each in largest.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
+    for label, text in extremes_lines(extremes(solution.trajectory)):
+        print(f"{label:9s}{text}")
     if margins.missing:
         print(f"margins  none: {margins.missing}")
     if margins.distance is not None:
@@ -103,6 +114,7 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("status", str(solution.status)),
         ("message", solution.message),
         ("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"),
+        ("effort", "none" if solution.effort is None else f"{solution.effort:.10g}"),
         ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
         ("nit", f"{solution.nit}"),
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),

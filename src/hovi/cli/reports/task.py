@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 def describe_task(task: Task) -> str:
     """Describe the boundary states, the scheme, the scene and the robot of a task."""
+    from hovi.cli.reports.arm_limits import limit_set_of, source_lines
     from hovi.planning.problem.tolerance import as_number_or_text
 
     robot, options = task.scene.robot, task.options
@@ -24,6 +25,9 @@ def describe_task(task: Task) -> str:
         how = f"tolerance {as_number_or_text(options.effective_tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
+    arm = limit_set_of(task)
+    if arm is not None:
+        lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
     if options.clearance.wanted:
         lines.append(f"keeps {options.clearance.margin:g} m from {_kept_from(task)}")
     lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)

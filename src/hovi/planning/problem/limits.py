@@ -14,6 +14,8 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
+from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.arms.limit_set import is_limit_set, limit_set
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -170,28 +172,32 @@ def urdf_limits(robot: Robot) -> Limits:
     return Limits(lower, upper)
 
 
-def as_limits(coordinates: Coordinates, limits: str | Limits | Mapping[str, Any]) -> Limits:
+def as_limits(
+    coordinates: Coordinates, limits: str | Limits | Mapping[str, Any], order: int = 2
+) -> Limits:
     """Limits from a name or a mapping, as `plan` and scene files accept them.
 
-    limits: "urdf" (of a robot), "none", a Limits, or a mapping with any of `base` ("urdf", the
-        default, or "none"), `q`, `v`, `a`, `tau`, `jerk`, `torque_rate`, `margin` and `tolerance`.
-        A kind is a number or a list of numbers x for -x and x, a list of pairs (lower, upper), or
-        a mapping from joint names to either.
+    limits: "urdf" (of a robot), "none", the name of an arm of `hovi.limit_sets`, a Limits, or a
+        mapping with any of `base` (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`,
+        `jerk`, `torque_rate`, `margin` and `tolerance`. A kind is a number or a list of numbers x
+        for -x and x, a list of pairs (lower, upper), or a mapping from joint names to either.
+    order: of the motion's Lagrangian. What an arm's set says of the jerk and the torque rate
+        applies from order 3 on.
     Raises InputError for unknown keys or joints and for bounds that do not fit the
     coordinates. Warns of ranges of angles that look like degrees.
     """
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _warned_of_degrees(coordinates, _by_name(coordinates, limits))
+        return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
             raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
-    base = _by_name(coordinates, limits.get("base", "urdf"))
-    missing = 0 if limits.keys().isdisjoint(KINDS[FIRST_KINDS:]) else len(KINDS) - len(base.lower)
-    more = np.full((missing, coordinates.nv), np.inf)
-    lower, upper = np.concatenate([base.lower, -more]), np.concatenate([base.upper, more])
+    base = _by_name(coordinates, limits.get("base", "urdf"), order)
+    if not limits.keys().isdisjoint(KINDS[FIRST_KINDS:]):
+        base = _with_all_kinds(base)
+    lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):
         for i, (low, high) in _entries(coordinates, kind, limits.get(kind, {})).items():
             lower[row, i], upper[row, i] = low, high
@@ -216,14 +222,39 @@ def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
     return float(value)
 
 
-def _by_name(coordinates: Coordinates, name: Any) -> Limits:
+def _by_name(coordinates: Coordinates, name: Any, order: int) -> Limits:
     if name == "none":
         return no_limits(coordinates)
+    if is_limit_set(name):
+        return _of_arm(coordinates, name, order)
     if name != "urdf":
-        raise InputError(f"limits are 'urdf', 'none' or given by kind, not {name!r}.")
+        hint = f": {nearest(name, ('urdf', 'none', *ARMS))}" if isinstance(name, str) else "."
+        raise InputError(
+            f"limits are 'urdf', 'none', the name of an arm or given by kind, not {name!r}{hint}"
+        )
     if not isinstance(coordinates, Robot):
         raise InputError(f"{coordinates.owner} has no URDF: limits need base = 'none' here.")
     return urdf_limits(coordinates)
+
+
+def _of_arm(coordinates: Coordinates, name: str, order: int) -> Limits:
+    """Those of a limit set; joints that its arm does not have keep the limits of the URDF."""
+    base = urdf_limits(coordinates) if isinstance(coordinates, Robot) else no_limits(coordinates)
+    base = base if order < 3 else _with_all_kinds(base)
+    lower, upper = base.lower.copy(), base.upper.copy()
+    bounds = limit_set(name).on(coordinates)
+    for row, kind in enumerate(base.kinds):
+        for joint, pair in bounds[kind].items():
+            i = coordinates.coordinate_names.index(joint)
+            lower[row, i], upper[row, i] = pair
+    return Limits(lower, upper)
+
+
+def _with_all_kinds(limits: Limits) -> Limits:
+    """The limits with rows for the jerk and the torque rate, without bounds if they had none."""
+    more = np.full((len(KINDS) - len(limits.kinds), limits.lower.shape[1]), np.inf)
+    lower, upper = np.concatenate([limits.lower, -more]), np.concatenate([limits.upper, more])
+    return Limits(lower, upper, limits.tolerance)
 
 
 def _entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:

@@ -27,7 +27,7 @@ from hovi.planning.search.option_fields import (
     require_known,
     whole_number,
 )
-from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
 
 DEFAULT_TOLERANCE = 1e-3
@@ -83,8 +83,8 @@ class PlanOptions:
     )
     limits: str | Limits | Mapping[str, Any] = option(
         "urdf",
-        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", a '
-        "Limits, or a mapping as for as_limits.",
+        'bounds on q, v, a and tau along the whole motion: "urdf" (those of the URDF), "none", the '
+        "name of an arm of hovi.limit_sets, a Limits, or a mapping as for as_limits.",
     )
     starts: int = whole_number(
         1,
@@ -217,15 +217,16 @@ class PlanOptions:
             options.__dict__["clearance"] = self.clearance
         return options
 
-    def on(self, robot: Robot) -> Self:
-        """These options with limits and tolerance resolved for a robot, defaults included.
+    def on(self, scene: Scene) -> Self:
+        """These options with limits and tolerance resolved for a scene's robot, with defaults.
 
         Raises InputError for values that do not fit the robot.
         """
-        tolerance = self.effective_tolerance
+        tolerance, robot = self.effective_tolerance, scene.robot
         if tolerance is not None:
             tolerance = Tolerance.of(tolerance, robot)
-        return self.with_changes(limits=as_limits(robot, self.limits), tolerance=tolerance)
+        limits = as_limits(robot, self.limits, 3 if self.smooth else scene.order)
+        return self.with_changes(limits=limits, tolerance=tolerance)
 
 
 explain(PlanOptions, PlanOptions)

@@ -102,7 +102,7 @@ def plan(
         )
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
-    chosen = options.with_changes(**changes).on(scene.robot)
+    chosen = options.with_changes(**changes).on(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, moved, stretched
+from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import State, as_state
@@ -77,6 +78,15 @@ class Solution:
     solve_seconds: float = 0.0
     forces: list[PointTerms] | None = field(default=None, repr=False)
     check: Callable[[Solution], Solution] | None = field(default=None, repr=False)
+
+    @cached_property
+    def effort(self) -> float | None:
+        """1/2 integral |tau|^2 dt of the plain torques of the actuated joints, computed when asked.
+
+        By the quadrature rule of the cost, which it equals where the cost is nothing else; weights,
+        other costs and the price of time are left out. None for a Lagrangian without torques.
+        """
+        return effort_of(self.trajectory)
 
     @cached_property
     def duration_derivative(self) -> float:

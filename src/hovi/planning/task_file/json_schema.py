@@ -6,13 +6,13 @@ With it editors complete and check scene files: run `hovi schema --out scene.sch
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import Field, create_model
 
 from hovi.effects import REGISTRY
 from hovi.planning.task_file.effect_tables import effect_schema
-from hovi.planning.task_file.schema import LimitsTable, Table, TaskTable
+from hovi.planning.task_file.schema import LimitsName, LimitsTable, Table, TaskTable
 
 _NO_DEFAULT = ("default", None)
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -24,7 +24,7 @@ def json_schema() -> dict[str, Any]:
         key: (effect_schema(effect) | None, Field(default=None, description=_purpose(effect)))
         for key, effect in REGISTRY.items()
     }
-    limits = Literal["urdf", "none"] | LimitsTable
+    limits = LimitsName | LimitsTable
     keys: dict[str, Any] = {
         "effects": (
             create_model("EffectsTable", __base__=Table, **effects) | None,

@@ -9,21 +9,23 @@ import numpy as np
 from pydantic import ValidationError
 
 from hovi.errors import InputError
+from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.limits import KINDS, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml
 from hovi.planning.task_file.schema import LimitsTable
 from hovi.robot.robot import Robot
 
-NAMES = ("urdf", "none")
+NAMES = ("urdf", "none", *ARMS)
 
 
 def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any]:
     """The value of `limits` in a file, as `hovi.plan` accepts it."""
     if isinstance(given, str) and given in NAMES:
+        _check(("limits",), given, robot, toml)
         return given
     if not isinstance(given, dict):
-        expected = '"urdf", "none" or a table [limits]'
+        expected = '"urdf", "none", the name of an arm or a table [limits]'
         raise toml.error(("limits",), f"`limits` must be {expected}, but it is {in_toml(given)}")
     try:
         LimitsTable.model_validate(given)
@@ -70,7 +72,7 @@ def _check_kind(kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
         _check(("limits", kind), {"base": "none", kind: given}, robot, toml)
 
 
-def _check(keys: Keys, limits: Mapping[str, Any], robot: Robot, toml: TomlText) -> None:
+def _check(keys: Keys, limits: str | Mapping[str, Any], robot: Robot, toml: TomlText) -> None:
     try:
         as_limits(robot, limits)
     except InputError as wrong:

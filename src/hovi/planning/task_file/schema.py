@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
+from hovi.planning.problem.arms.limit_set import LimitSetName
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
@@ -160,10 +161,16 @@ class SchemeTable(Table):
     )
 
 
+LimitsName = Literal["urdf", "none", LimitSetName]
+"""The limits that have a name."""
+
+
 class LimitsTable(Table):
     """[limits]."""
 
-    base: Literal["urdf", "none"] = Field(default="urdf", description='"urdf" or "none"')
+    base: LimitsName = Field(
+        default="urdf", description='"urdf", "none" or the name of an arm, such as "panda"'
+    )
     q: Bounds | None = Field(default=None, description=_BOUNDS)
     v: Bounds | None = Field(default=None, description=_BOUNDS)
     a: Bounds | None = Field(default=None, description=_BOUNDS)
@@ -194,7 +201,9 @@ class ShapedTable(Table):
         description='a positive number of seconds, a text such as "2 s", or a list [lower, upper] '
         "of two"
     )
-    limits: Any = Field(default="urdf", description='"urdf", "none" or a table [limits]')
+    limits: Any = Field(
+        default="urdf", description='"urdf", "none", the name of an arm or a table [limits]'
+    )
     obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
     start: StartTable = Field(description="a table [start] with q and, if moving, v")
     goal: GoalTable = Field(

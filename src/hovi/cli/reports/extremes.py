@@ -1,0 +1,55 @@
+"""The largest acceleration and jerk of a motion, and both at its ends, as text and as JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.measures.motion_extremes import Extreme, Extremes
+
+Array = npt.NDArray[np.float64]
+
+
+def extremes_json(extremes: Extremes) -> dict[str, Any]:
+    """`acceleration` and `jerk`: the largest of all, the largest of each joint, and the ends."""
+    return {
+        "acceleration": _json(extremes.acceleration),
+        "jerk": _json(extremes.jerk),
+    }
+
+
+def _json(extreme: Extreme) -> dict[str, Any]:
+    by_joint = {
+        "joints": extreme.largest,
+        "start": extreme.start,
+        "end": extreme.end,
+    }
+    return {
+        "largest": extreme.value,
+        "unit": extreme.unit,
+        "joint": extreme.joint,
+        "t": extreme.t,
+        **{key: dict(zip(extreme.names, x.tolist(), strict=True)) for key, x in by_joint.items()},
+    }
+
+
+def extremes_lines(extremes: Extremes) -> list[tuple[str, str]]:
+    """Labels and their text."""
+    return [("accel.", _text(extremes.acceleration)), ("jerk", _text(extremes.jerk))]
+
+
+def _text(extreme: Extreme) -> str:
+    ends = f"{_end(extreme, extreme.start)} at the start, {_end(extreme, extreme.end)} at the end"
+    return (
+        f"at most {extreme.value:.4g} {extreme.unit} ({extreme.joint}, t = {extreme.t:.4g} s); "
+        f"up to {ends}"
+    )
+
+
+def _end(extreme: Extreme, values: Array) -> str:
+    """The largest |x| at one end, with its joint."""
+    joint = int(np.argmax(np.abs(values)))
+    size = abs(float(values[joint]))
+    return f"{size:.4g}" if size == 0.0 else f"{size:.4g} ({extreme.names[joint]})"

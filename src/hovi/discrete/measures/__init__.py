@@ -1,0 +1,1 @@
+"""Numbers that say what a motion takes: its effort, its extremes."""

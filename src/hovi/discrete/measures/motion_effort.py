@@ -1,0 +1,53 @@
+"""The effort of a motion: 1/2 integral |tau|^2 dt, whatever the cost was that it minimizes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.interval_batch import IntervalBatch, interval_batches
+from hovi.discrete.interval_charts import jet_on
+from hovi.discrete.trajectory import Trajectory
+
+Array = npt.NDArray[np.float64]
+
+
+def effort_of(trajectory: Trajectory) -> float | None:
+    """1/2 integral |tau|^2 dt over the motion, in [N^2 m^2 s] (N^2 s for sliding joints).
+
+    By the quadrature rule of the grid's schemes, at whose points the cost is measured, so that it
+    equals a cost that is nothing but the effort. Torques have weight one; those of passive joints,
+    which vanish in the limit of fine grids, are left out.
+    Returns None for a motion without torques, and for schemes of order 1, which have no
+    accelerations.
+    """
+    stored = trajectory.torque
+    known = trajectory.scene is not None if stored is None else stored.values.shape[2] > 0
+    if not known or trajectory.grid.order < 2:
+        return None
+    active = _active(trajectory)
+    total = 0.0
+    for batch in interval_batches(trajectory.grid):
+        tau = _torques(trajectory, batch)[:, active]
+        total += 0.5 * float(batch.weights.ravel() @ np.vecdot(tau, tau))
+    return total
+
+
+def _active(trajectory: Trajectory) -> npt.NDArray[np.bool_]:
+    """Which coordinates are actuated, (nv,)."""
+    active = np.ones(trajectory.v.shape[1], dtype=bool)
+    if trajectory.scene is not None:
+        active[trajectory.scene.passive_coordinates] = False
+    return active
+
+
+def _torques(trajectory: Trajectory, batch: IntervalBatch) -> Array:
+    """tau at the quadrature points of a batch, (P, nv)."""
+    if trajectory.torque is not None:
+        points = batch.scheme.points
+        k, s = np.repeat(batch.numbers, len(points)), np.tile(points, len(batch.numbers))
+        return trajectory.torque(k, s)
+    assert trajectory.scene is not None
+    space, path = trajectory.space, trajectory.path
+    q, v, a = (batch.jet(path) if space is None else jet_on(space, batch, path))[:3]
+    return trajectory.scene.inverse_dynamics(q, v, a, batch.t)

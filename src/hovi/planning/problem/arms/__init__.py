@@ -1,0 +1,1 @@
+"""Limit sets of arms, as their makers publish them: one TOML file each, with its sources."""
