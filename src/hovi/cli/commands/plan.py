@@ -151,12 +151,14 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     with progress(quiet=json) as report:
         certificate = _certificate(solution, deadline, report) if certified else None
         margins = _margins(solution, deadline, report)
-    if json:
-        print(as_json(solution, task, written, margins, certificate))
-    else:
-        print_report(solution, task, written, margins, certificate)
-    if save_error is not None:
-        raise save_error
+    try:
+        if json:
+            print(as_json(solution, task, written, margins, certificate))
+        else:
+            print_report(solution, task, written, margins, certificate)
+    finally:  # also where nobody reads the report
+        if save_error is not None:
+            raise save_error
     return 0 if solution.success else 1
 
 
