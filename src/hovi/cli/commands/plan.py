@@ -98,11 +98,12 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
 def _tolerance_override(given: dict[str, Any]) -> dict[str, Any]:
     """A grid given as flags overrides the scene's tolerance. Raises InputError for both."""
     from hovi.errors import InputError
+    from hovi.planning.search.options import TOLERANCE_AND_SCHEME
 
     if "scheme" not in given and "intervals" not in given:
         return {}
     if "tolerance" in given:
-        raise InputError("--tolerance chooses the scheme and the intervals; leave them out.")
+        raise InputError(f"--{TOLERANCE_AND_SCHEME}")
     return {"tolerance": None}
 
 
