@@ -164,8 +164,8 @@ def test_an_interval_without_decay_is_split_into_four() -> None:
 def least_work(grid: Grid, rho: Array, demand: Demand, joints: int) -> float:
     """The work of the cheapest grid, from all pairs of numbers of modes, counted out.
 
-    A point is one evaluation of a robot, an interval with r modes has r + 2 of them, and the Hessian
-    of each interval has r + 4 columns, of the scheme with more modes where there are two.
+    An interval with r modes has r + 2 points, and its Hessian r + 4 columns, those of the scheme
+    with more modes where there are two.
     """
     choices: list[list[tuple[int, int] | None]] = []
     for modes in (2, 3, 4, 5, 6, 8, 10, 12):
@@ -197,7 +197,7 @@ def least_work(grid: Grid, rho: Array, demand: Demand, joints: int) -> float:
 
 
 def work_of(intervals: list[tuple[int, int]], largest: int, two: bool, joints: int) -> float:
-    """The work of intervals, each as (number of pieces, modes). two: whether there are two schemes."""
+    """The work of intervals, each as (pieces, modes). two: whether there are two schemes."""
     points = sum(s * (r + 2) for s, r in intervals)
     hessians = 0.05 * sum(s for s, _ in intervals) * (largest + 4) ** 2
     is_split = any(s > 1 for s, _ in intervals)

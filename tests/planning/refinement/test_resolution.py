@@ -260,3 +260,21 @@ def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> 
         assert f"a finer grid changes its cost by {told:.2g} %" in found.message
         times += 1
     assert times >= 2
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6, 1e9])
+def test_a_robot_at_rest_is_resolved_whatever_the_unit_of_mass(
+    two_link: Robot, scale: float
+) -> None:
+    """Its cost is one of rounding errors, which grow with the square of its weight."""
+    model = two_link.model.copy()
+    for i in range(1, model.njoints):
+        model.inertias[i] = pin.Inertia(
+            scale * model.inertias[i].mass,
+            model.inertias[i].lever,
+            scale * model.inertias[i].inertia,
+        )
+    hanging = Scene(hovi.load_robot(model), [hovi.effects.Gravity()], passive=["shoulder"])
+    found = hovi.plan(hanging, [-np.pi / 2, 0.0], [-np.pi / 2, 0.0], 2.0, limits="none")
+    assert found.status is Status.MINIMUM, found.message
+    assert found.cost < 1e-20 * scale**2
