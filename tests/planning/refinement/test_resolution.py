@@ -262,19 +262,17 @@ def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> 
     assert times >= 2
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1e3, 1e6, 1e9])
-def test_a_robot_at_rest_is_resolved_whatever_the_unit_of_mass(
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e6])
+def test_what_is_resolved_does_not_depend_on_the_unit_of_mass(
     two_link: Robot, scale: float
 ) -> None:
-    """Its cost is one of rounding errors, which grow with the square of its weight."""
+    """Stiff springs against which a small motion oscillates, and the same with other masses."""
     model = two_link.model.copy()
     for i in range(1, model.njoints):
-        model.inertias[i] = pin.Inertia(
-            scale * model.inertias[i].mass,
-            model.inertias[i].lever,
-            scale * model.inertias[i].inertia,
-        )
-    hanging = Scene(hovi.load_robot(model), [hovi.effects.Gravity()], passive=["shoulder"])
-    found = hovi.plan(hanging, [-np.pi / 2, 0.0], [-np.pi / 2, 0.0], 2.0, limits="none")
-    assert found.status is Status.MINIMUM, found.message
-    assert found.cost < 1e-20 * scale**2
+        body = model.inertias[i]
+        model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
+    scene = Scene(hovi.load_robot(model), [hovi.effects.JointSprings(1e3 * scale)])
+    grid = Grid.uniform(2.0, 4, by_name("galerkin-2x8"))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    ends = hovi.State([0.0, 0.0]), hovi.State([1e-7, -1e-7])
+    assert hovi.solve(hovi.TrajectoryProblem(ld, *ends)).status is Status.UNRESOLVED
