@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.cli.application import main
 from hovi.errors import InputError
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.tolerance import Tolerance
@@ -68,6 +69,32 @@ def test_a_time_limit_is_a_positive_time(limit: Any) -> None:
 def test_a_scheme_is_a_name_or_a_table() -> None:
     with pytest.raises(InputError, match="expected a Scheme, got a int"):
         PlanOptions(scheme=2)  # type: ignore[arg-type]
+
+
+def test_a_tolerance_and_a_scheme_are_refused_together_as_by_the_command(
+    arm_scene: Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rivals: dict[str, Any] = {"tolerance": 1e-6, "scheme": "galerkin-1"}
+    task = hovi.Task(arm_scene, hovi.State(HANG), hovi.State(REACH_Q), 1.0)
+    for take in (
+        lambda: hovi.plan(arm_scene, HANG, REACH_Q, 1.0, **rivals),
+        lambda: hovi.plan_task(task, **rivals),
+        lambda: PlanOptions(**rivals),
+    ):
+        with pytest.raises(InputError) as refused:
+            take()
+        words = ["--tolerance", "1e-6", "--scheme", "galerkin-1"]
+        assert main(["plan", "two_link_reach", *words]) == 2
+        assert capsys.readouterr().err == f"error: --{refused.value}\n"
+
+
+def test_a_tolerance_replaces_a_scheme_named_before_and_a_scheme_a_tolerance() -> None:
+    by_scheme = PlanOptions(scheme="galerkin-1", intervals=5)
+    by_tolerance = by_scheme.with_changes(tolerance="0.1 mm")
+    assert (by_tolerance.scheme, by_tolerance.effective_tolerance) == (None, "0.1 mm")
+    again = by_tolerance.with_changes(scheme="galerkin-3")
+    assert (again.scheme, again.effective_tolerance, again.intervals) == ("galerkin-3", None, 5)
+    assert again.with_changes(tolerance=None, starts=2).scheme == "galerkin-3"
 
 
 def test_times_may_be_texts(arm_scene: Scene) -> None:

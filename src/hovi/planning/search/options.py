@@ -36,6 +36,8 @@ DEFAULT_SCHEME = "galerkin-2"
 """Scheme if only the intervals are named."""
 DEFAULT_INTERVALS = 16
 """Number of intervals if only the scheme is named, and of the first grid of a refinement."""
+TOLERANCE_AND_SCHEME = "tolerance chooses the scheme and the intervals; leave them out."
+"""The message where a tolerance and a scheme are given together."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CHECKED_HERE = (
@@ -43,6 +45,7 @@ _CHECKED_HERE = (
     *("max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
+_RIVALS = "scheme", "tolerance"
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
@@ -163,6 +166,8 @@ class PlanOptions:
         object.__setattr__(self, "via", tuple(via))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
         expect(self.table, Scheme, "a name such as 'galerkin-2' as the scheme")
+        if self.tolerance is not None and self.scheme is not None:
+            raise InputError(TOLERANCE_AND_SCHEME)
 
     @property
     def time_limit_seconds(self) -> float | None:
@@ -207,12 +212,12 @@ class PlanOptions:
         return Clearance(self.obstacles, self.margin, self.self_collision)
 
     def with_changes(self, **changes: Any) -> Self:
-        """These options with some of them changed.
+        """These options with some of them changed; a tolerance replaces a scheme, and vice versa.
 
         Raises InputError for unknown options and invalid values.
         """
         require_known(type(self), changes)
-        options = dataclasses.replace(self, **changes)
+        options = dataclasses.replace(self, **_without_rival(changes), **changes)
         if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
         return options
@@ -227,6 +232,12 @@ class PlanOptions:
             tolerance = Tolerance.of(tolerance, robot)
         limits = as_limits(robot, self.limits, 3 if self.smooth else scene.order)
         return self.with_changes(limits=limits, tolerance=tolerance)
+
+
+def _without_rival(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """What is withdrawn by changes that name a tolerance but no scheme, or the reverse."""
+    named = [name for name in _RIVALS if changes.get(name) is not None]
+    return {rival: None for rival in _RIVALS if named and rival not in changes}
 
 
 explain(PlanOptions, PlanOptions)

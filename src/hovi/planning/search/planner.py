@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
-from hovi.discrete.state import State, as_state
+from hovi.discrete.state import State, as_state, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -115,6 +115,7 @@ def plan(
         grid.stretched(bound)  # raises for steps that are too short or too long
     search = Search(job, deadline, progress or _silent, free)
     problem = job.problem()  # raises for invalid input before the search
+    _warn_of_degrees(scene.robot, *ends, chosen)
     started = time.perf_counter()
     with deadline.in_force():
         best, minima = search.run()
@@ -189,6 +190,16 @@ def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:
         return goal
     state = as_state(goal, robot)
     return state if options.turns is None else dataclasses.replace(state, turns=options.turns)
+
+
+def _warn_of_degrees(
+    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions
+) -> None:
+    """Warn if the given configurations, in order of time, look like degrees."""
+    stops = sorted(options.via, key=lambda via: via.time)
+    given = [start, *(via.goal for via in stops), goal]
+    states = [each for each in given if isinstance(each, State)]
+    warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
 
 
 def _silent(text: str, fraction: float) -> None:
