@@ -1,11 +1,12 @@
-"""Motions of least effort and jerk: hovi against Ipopt, and smooth moves of a Panda.
+"""Motions of least effort and jerk: the weight, hovi against Ipopt, and smooth moves of a Panda.
 
+- The move of panda_lift.toml with several weights of the jerk.
 - The reach of ur5_reach.toml with a cost on the jerk: hovi against CasADi and Ipopt with the jerk
   as control, in the same transcription, on grids with an error of 1e-7 and 1e-9 of the cost.
 - Random moves of a Panda that lifts 2 kg, with smooth = true, within the limits that its maker
   publishes on q, v, a, jerk, torque and torque rate; everything is checked at 50,001 samples.
 
-    python jerk_cost.py [--moves 20] [--seed 0]
+    python jerk_cost.py [weights] [ipopt] [moves] [--moves 20] [--seed 0]
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 from measuring import alone, best_time, print_machine, print_table
 from transcription import Transcription
 
@@ -34,17 +36,14 @@ GRIDS = ((2, 12), (2, 16), (3, 12), (3, 16), (4, 12), (4, 16), (4, 24))
 """Inner modes and intervals."""
 ACCURACIES = (1e-7, 1e-9)
 SAMPLES = 50_001
+ACCELERATIONS = [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0]
+"""The limits on a of the set "panda"."""
 ARM = "panda"
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
-LIMITS = {
-    "base": "urdf",
-    "v": [2.175] * 4 + [2.61] * 3,
-    "a": [15.0, 7.5, 10.0, 12.5, 15.0, 20.0, 20.0],
-    "tau": [87.0] * 4 + [12.0] * 3,
-    "jerk": [7500.0, 3750.0, 5000.0, 6250.0, 7500.0, 10000.0, 10000.0],
-    "torque_rate": 1000.0,
-}
-"""Of libfranka and the data sheet."""
+LIMITS = "panda"
+"""The limit set of the arm."""
+SHARES = (0.002, 0.005, 0.01, 0.02, 0.05)
+"""Smoothing times of the heaviest joint, of the duration; `smooth` has the middle one."""
 STATIC_SHARE, DURATIONS = 0.9, (1.5, 3.0)
 """Largest static torque at the ends, of its limit; durations, in times at the velocity limits."""
 
@@ -157,7 +156,7 @@ def moved(number: int, seed: int) -> dict[str, object]:
     robot = hovi.load_robot(ARM, locked=FINGERS)
     payload = hovi.effects.Payload("panda_hand_tcp", 2.0)
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), payload])
-    limits = as_limits(robot, LIMITS)
+    limits = as_limits(robot, LIMITS, order=3)
     start, goal, T = _draw(scene, limits, np.random.default_rng([seed, number]))
     hovi.plan(scene, start, start + 0.01, 1.0, limits=limits, smooth=True)
     began = time.perf_counter()
@@ -192,14 +191,61 @@ def _draw(
             return ends[0], ends[1], max(random.uniform(*DURATIONS) * shortest, 0.5)
 
 
+def weights() -> None:
+    """The table of weights, on the lift."""
+    task = hovi.load_task(hovi.example("panda_lift"))
+    data = task.scene.model.createData()
+    ends = (task.start.q, task.goal.q)  # type: ignore[union-attr]
+    M = max(np.linalg.eigvalsh(pin.crba(task.scene.model, data, np.asarray(q))).max() for q in ends)
+    net = np.abs(np.subtract(*ends))
+    plans = [
+        ("least effort", task.scene, "urdf"),
+        ("least effort, a limited", task.scene, {"base": "urdf", "a": ACCELERATIONS}),
+    ]
+    for share in SHARES:
+        cost = hovi.effects.JerkCost(float((share * task.duration * M) ** 2))
+        scene = hovi.Scene(task.scene.robot, [*task.scene.effects, cost])
+        plans.append((f"T / {1 / share:.0f}", scene, "panda"))
+    rows = []
+    for name, scene, limits in plans:
+        began = time.perf_counter()
+        found = hovi.plan(scene, *ends, task.duration, limits=limits)
+        seconds = time.perf_counter() - began
+        largest = hovi.extremes(found.trajectory)
+        t = np.linspace(0.0, task.duration, 5_001)
+        travel = np.abs(np.diff(found.trajectory.sample(t).q, axis=0)).sum(axis=0)
+        rows.append(
+            [
+                *(name, str(found.status), f"{found.effort:.1f}"),
+                f"{largest.acceleration.value:.1f}",
+                f"{np.abs(largest.acceleration.start).max():.2g}",
+                f"{largest.jerk.value:.0f}",
+                f"{travel[6]:.2f}",
+                f"{(travel - net)[:6].max():.2f}",
+                f"{seconds:.2f}",
+            ]
+        )
+    header = [
+        *("sqrt(w) / M", "status", "effort", "largest a [rad/s^2]", "at the start"),
+        *("largest jerk [rad/s^3]", "way of joint 7 [rad]", "largest detour of another [rad]"),
+        "wall [s]",
+    ]
+    print_table(header, rows)
+
+
 def main() -> None:
-    """Print both tables."""
+    """Print the chosen tables, or all."""
+    tables = {"weights": weights, "ipopt": compare}
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tables", nargs="*", choices=[*tables, "moves", []])
     parser.add_argument("--moves", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    compare()
-    moves(given.moves, given.seed)
+    for name in given.tables or [*tables, "moves"]:
+        if name == "moves":
+            moves(given.moves, given.seed)
+        else:
+            tables[name]()
     print_machine()
 
 
