@@ -130,7 +130,9 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
     """The motion that follows from that with heavy rotors, as they become lighter."""
     if isinstance(task.duration, tuple):
         raise UnmeasurableError("rotors need a fixed duration.")
-    grid = Grid.uniform(task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4))
+    grid = Grid.uniform(
+        task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4, task.scene.order)
+    )
     options = task.options.on(task.scene)
     job = split_for_charts(Job(task.scene, grid, task.start, task.goal, options), options.guess)
     guess: str | Trajectory = options.guess

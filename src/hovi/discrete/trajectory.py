@@ -140,7 +140,7 @@ class Trajectory:
     def jet(self, t: npt.ArrayLike, order: int = 2) -> tuple[Array, ...]:
         """(q, v, a) of `sample`, without computing torques.
 
-        order: the highest derivative, up to that of the Lagrangian if it is above 2: 3 for jerk.
+        order: the highest derivative: 3 for the jerk, or that of the Lagrangian; up to 2 on groups.
         """
         return self._interpolate(*self._locate(t), order)
 
@@ -195,9 +195,10 @@ class Trajectory:
 
     def _interpolate(self, k: Index, s: Array, order: int) -> tuple[Array, ...]:
         """(q, v, ..., q^(order)), each (M, n): rows(s) @ (h v0, Z, c) in the interval's chart."""
-        top = max(2, self.grid.order)
-        if not 0 <= order <= top:
-            raise InputError(f"this motion has derivatives up to {top}, not {order}.")
+        most = max(2 if self.space is not None else 3, self.grid.order)
+        if not 0 <= order <= most:
+            raise InputError(f"this motion has derivatives up to {most}, not {order}.")
+        top = max(2, self.grid.order, order)
         h, path = self.grid.steps[k][:, None], self.path
         scaled = np.empty((len(k), top + 1, path.v.shape[1]))
         for scheme, members in self.grid.groups:
