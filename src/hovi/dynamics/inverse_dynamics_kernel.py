@@ -17,6 +17,7 @@ from hovi.errors import InputError, ModelError
 from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
+DOUBLE = np.dtype(np.float64)
 
 
 def joints_without_kernel(model: pin.Model) -> tuple[str, ...]:
@@ -148,7 +149,8 @@ class InverseDynamicsKernel:
 
 def _numbers(name: str, x: Array, shape: tuple[int, ...] | None = None) -> Array:
     """x as contiguous doubles of a shape; None for any of one dimension or more."""
-    x = np.ascontiguousarray(numbers_of(name, x))
+    if not (type(x) is np.ndarray and x.dtype is DOUBLE and x.flags.c_contiguous and x.ndim > 0):
+        x = np.ascontiguousarray(numbers_of(name, x))
     if shape not in (None, x.shape):
         raise InputError(f"{name} must have shape {shape}, got {x.shape}.")
     return x

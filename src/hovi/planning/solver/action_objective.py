@@ -70,7 +70,8 @@ class ActionObjective(Objective[DiscretePath]):
         self.multipliers = multipliers
         self.moments = problem.torque_moments
         on = problem.coordinates
-        self._integrate = partial(without_checks(type(on).integrate), on)
+        integrate = partial(without_checks(type(on).integrate), on)
+        self._integrate = np.add if on.vector_joints else integrate
         self.ld = problem.ld if multipliers is None else _penalized(problem, multipliers)
         self.structure = structure or problem.structure
         small = problem.grid.intervals <= MAX_BAND_INTERVALS
