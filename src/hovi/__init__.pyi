@@ -8,6 +8,7 @@ from .discrete.discrete_lagrangian import DiscreteLagrangian as DiscreteLagrangi
 from .discrete.grid import DiscretePath as DiscretePath
 from .discrete.grid import Grid as Grid
 from .discrete.motion_error import MotionError as MotionError
+from .discrete.state import Periodic as Periodic
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory
 from .errors import HoviError as HoviError

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -28,7 +29,12 @@ def least_action(
     ends = [np.concatenate(end)[:, None] for end in ((q0, v0), (q1, v1))]
     all_nodes = ca.horzcat(ends[0], nodes, ends[1])
     left, right = all_nodes[:, :-1], all_nodes[:, 1:]
-    actions, outputs, moments = _interval_action(problem).map(N)(left, right, modes)
+    counts = [N] if problem.ld.segments is None else np.bincount(problem.ld.segments)
+    ends_of, parts = np.cumsum([0, *counts]), []
+    for scene, a, b in zip(problem.scenes, ends_of[:-1], ends_of[1:], strict=True):
+        interval = _interval_action(problem, scene).map(int(b - a))
+        parts.append(interval(left[:, a:b], right[:, a:b], modes[:, r * a : r * b]))
+    actions, outputs, moments = (ca.horzcat(*each) for each in zip(*parts, strict=True))
     action = ca.sum2(actions)
     x = ca.vertcat(ca.vec(nodes), ca.vec(modes))
     quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-8}
@@ -36,9 +42,10 @@ def least_action(
     bounds = {name: np.zeros(moments.numel()) for name in ("lbg", "ubg")}
     if problem.limits is not None:
         program["g"] = ca.vertcat(program["g"], ca.vec(outputs))
-        rows = outputs.shape[0] * N // problem.limits.lower.size
-        for name, bound in (("lbg", problem.limits.lower), ("ubg", problem.limits.upper)):
-            bounds[name] = np.append(bounds[name], np.tile(bound.ravel(), rows))
+        points = outputs.shape[0] // problem.limits.lower.size
+        for name, bound in zip(("lbg", "ubg"), problem.limits.on(grid.t), strict=True):
+            each = np.broadcast_to(bound, (N, *bound.shape[1:])).reshape(N, -1)
+            bounds[name] = np.append(bounds[name], np.tile(each, points).ravel())
     solver = ca.nlpsol("least_action", "ipopt", program, quiet)
     inner = np.concatenate([np.hstack([guess.q, guess.v])[1:-1].ravel(), guess.inner.ravel()])
     start = inner + move * np.random.default_rng(seed).standard_normal(inner.shape)
@@ -48,14 +55,14 @@ def least_action(
     return float(result["f"]), found.reshape(N - 1, 2 * n)
 
 
-def _interval_action(problem: TrajectoryProblem) -> ca.Function:
+def _interval_action(problem: TrajectoryProblem, scene: Scene) -> ca.Function:
     """L_d(q0 v0, q1 v1, c) of an interval: h sum_j w_j 1/2 |tau_j|^2 by the scheme's numbers.
 
     And (q, v, a, tau) at its quadrature points, one after the other, and the moments of the passive
     torques against P_0 .. P_{r+1}. Without passive joints there are no moments.
     """
     scheme, h, n = problem.grid.schemes[0], float(problem.grid.steps[0]), problem.robot.nv
-    tau = casadi_functions(problem.scene.model).inverse_dynamics
+    tau = casadi_functions(scene.model).inverse_dynamics
     left, right = ca.SX.sym("left", 2 * n), ca.SX.sym("right", 2 * n)
     c = ca.SX.sym("c", n, scheme.inner_modes)
     q0, v0, q1, v1 = left[:n], left[n:], right[:n], right[n:]

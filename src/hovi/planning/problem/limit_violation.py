@@ -67,8 +67,9 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
     outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N))
     outputs = outputs.reshape(N, SAMPLES, 4, nv)
-    lower, at_lower = _Side(trajectory, limits, -1.0, limits.lower).extremes(outputs)
-    upper, at_upper = _Side(trajectory, limits, 1.0, limits.upper).extremes(outputs)
+    below, above = limits.on(trajectory.t)
+    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs)
+    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs)
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -76,7 +77,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 class _Side:
     """The lower or the upper bounds of a motion's outputs.
 
-    sign: -1 for lower bounds, 1 for upper ones. bound: shape (4, nv).
+    sign: -1 for lower bounds, 1 for upper ones. bound: shape (N or 1, 4, nv).
     """
 
     trajectory: Trajectory
@@ -90,7 +91,7 @@ class _Side:
         outputs: of all samples, shape (N, SAMPLES, 4, nv).
         """
         raise_if_late()
-        excess = self.sign * (outputs - self.bound) / self.limits.ranges
+        excess = self.sign * (outputs - self.bound[:, None]) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
@@ -112,6 +113,7 @@ class _Side:
         k: intervals. sample: the extreme samples. kind, joint: of the outputs. All (M,).
         """
         rows = np.arange(len(k))
+        bound = self.bound[np.minimum(k, len(self.bound) - 1), kind, joint]
         begin = POSITIONS[np.maximum(sample - 1, 0)]
         end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
         for _ in range(3):
@@ -119,7 +121,7 @@ class _Side:
             around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
             outputs = _outputs(self.trajectory, np.repeat(k, REFINED_SAMPLES), around.ravel())
             values = outputs.reshape(len(k), REFINED_SAMPLES, 4, -1)[rows, :, kind, joint]
-            excess = self.sign * (values - self.bound[kind, joint][:, None])
+            excess = self.sign * (values - bound[:, None])
             excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
             at = around[rows, best]
@@ -171,7 +173,8 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
     s = float(position[k, kind, joint])
     value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
-    bound = (limits.upper if above else limits.lower)[kind, joint]
+    bounds = limits.on(trajectory.t)[int(above)]
+    bound = bounds[min(int(k), len(bounds) - 1), kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     unit = coordinates.coordinate_units[joint][kind]
     return (

@@ -39,12 +39,15 @@ class Limits:
     lower, upper: shape (4, nv), one row per kind, in [rad], [rad/s], [rad/s^2] and [N m] (metres
         and newtons for sliding joints).
     tolerance: share of its range by which a limit may be exceeded anywhere.
+    parts, ends: of a motion in segments, see `of_segments`.
     Raises InputError for NaN and for a range that is empty to rounding.
     """
 
     lower: Array
     upper: Array
     tolerance: float = TOLERANCE
+    parts: tuple[Limits, ...] = ()
+    ends: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         require_shape("lower", self.lower, len(KINDS), None)
@@ -58,6 +61,48 @@ class Limits:
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
+
+    @classmethod
+    def of_segments(cls, parts: Sequence[Limits], ends: Sequence[float]) -> Limits:
+        """Limits that differ between the segments of a motion.
+
+        lower, upper are then the loosest finite bounds of any segment, in whose ranges an excess is
+        measured, and the tolerance the smallest of any.
+        parts: of each segment. ends: times at which all but the last end, ascending, in [s].
+        Raises InputError for another number of ends, or limits of different sizes.
+        """
+        if len(parts) == 0 or len(ends) != len(parts) - 1:
+            raise InputError(
+                f"there must be limits, or None, for each of the {len(ends) + 1} segments, got "
+                f"{len(parts)}."
+            )
+        for each in parts:
+            require_shape("the limits of a segment", each.lower, *parts[0].lower.shape)
+        lower = np.stack([each.lower for each in parts])
+        upper = np.stack([each.upper for each in parts])
+        low = np.min(np.where(np.isfinite(lower), lower, np.inf), axis=0)
+        high = np.max(np.where(np.isfinite(upper), upper, -np.inf), axis=0)
+        high[np.isinf(high)] = np.inf
+        low[np.isinf(low) | (low >= high)] = -np.inf  # one-sided bounds of different segments
+        tolerance = min(each.tolerance for each in parts)
+        return cls(low, high, tolerance, tuple(parts), tuple(ends))
+
+    def on(self, nodes: Array) -> Range:
+        """Lower and upper bounds in each interval, (N, 4, nv); (1, 4, nv) without segments.
+
+        nodes: their times, shape (N + 1,), in [s].
+        """
+        if not self.parts:
+            return self.lower[None], self.upper[None]
+        middle = (nodes[1:] + nodes[:-1]) / 2
+        part = np.searchsorted(np.array(self.ends), middle)
+        lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))
+        return lower[part], upper[part]
+
+    @property
+    def at_ends(self) -> tuple[Limits, Limits]:
+        """The limits at the start and at the goal."""
+        return (self.parts[0], self.parts[-1]) if self.parts else (self, self)
 
     @property
     def _empty(self) -> npt.NDArray[np.bool_]:
@@ -120,6 +165,8 @@ class Limits:
         if not (np.isfinite(margin) and 0 <= margin < 0.5):
             raise InputError(f"a margin must be a share of the range in [0, 0.5), got {margin}.")
         shift = margin * self.ranges
+        if self.parts:
+            return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
         return Limits(self.lower + shift, self.upper - shift, self.tolerance)
 
 
