@@ -180,7 +180,7 @@ class Periodic:
             shift = coordinates.check_velocity(self.displacement, "the displacement of a period")
         held = _chosen_coordinates(coordinates, "Periodic", "held", self.held)
         if not timed and not held.any():
-            held[_phase_coordinate(coordinates, shift, v)] = True
+            held[_phase_coordinate(coordinates, shift, v if order > 1 else 0 * v)] = True
         names = coordinates.coordinate_names
         free = tuple(name for name, is_held in zip(names, held, strict=True) if not is_held)
         rest = dict.fromkeys(_FREE[1:order], ALL)
@@ -197,7 +197,8 @@ def _phase_coordinate(coordinates: Coordinates, shift: Array, v: Array) -> int:
     raise InputError(
         "the Lagrangian does not depend on time, so that a periodic motion can be shifted along "
         "itself: name a joint that passes the start's position with a velocity, such as "
-        f"Periodic(held=[{coordinates.coordinate_names[0]!r}]), or give the start a velocity."
+        f"Periodic(held=[{coordinates.coordinate_names[0]!r}]), or give a displacement, or the "
+        "start a velocity where it has one."
     )
 
 
