@@ -279,6 +279,24 @@ def test_a_periodic_motion_is_saved_and_certified(tmp_path: Path) -> None:
     assert certificate.residual < 1e-10
 
 
+@pytest.mark.parametrize("k", [2, 3])
+def test_a_guess_of_any_curve_is_made_periodic(k: int) -> None:
+    problem = problem_of(forced(k), Periodic([0.5], held=["q[0]"]), State([0.2]))
+
+    def curve(t: Array) -> tuple[Array, ...]:
+        return tuple(np.exp(t)[:, None] for _ in range(4))
+
+    path = problem.path(curve)
+    for each in (path, problem.moved(path)):
+        expected = np.concatenate([[0.2], np.ones(k - 1)])
+        np.testing.assert_allclose(each.nodes[0, :, 0], expected, rtol=0, atol=1e-14)
+        expected[0] += 0.5
+        np.testing.assert_allclose(each.nodes[-1, :, 0], expected, rtol=0, atol=1e-14)
+    other = problem_of(forced(k), Periodic([0.5]), State([0.2]))
+    again = other.moved(path)
+    np.testing.assert_allclose(again.nodes[-1, 0] - again.nodes[0, 0], 0.5, rtol=0, atol=1e-14)
+
+
 def test_what_a_periodic_motion_does_not_have_is_refused() -> None:
     L = CasadiLagrangian([Q, V, A], A**2 / 2 - ca.cos(Q))
     refused: list[tuple[Any, str]] = [
