@@ -40,7 +40,7 @@ def test_it_depends_on_time() -> None:
 
 @pytest.mark.parametrize("ends", [(1.0,), (1.0, 1.0), (0.0, 1.0), (1.0, np.nan)])
 def test_segments_end_at_ascending_times(ends: tuple[float, ...]) -> None:
-    with pytest.raises(InputError, match="a time between each two|ascending times"):
+    with pytest.raises(InputError, match=r"a time between each two|ascending times"):
         SegmentedLagrangian((FIRST, SECOND, FIRST), ends)
 
 

@@ -268,6 +268,15 @@ def test_a_periodic_motion_is_replanned_with_another_displacement() -> None:
     np.testing.assert_allclose(between.trajectory.v[-1], 0.0, atol=1e-12)
 
 
+def test_a_period_that_becomes_a_motion_between_free_ends_is_none_any_more() -> None:
+    everything = {"free": "all", "free_velocity": "all"}
+    start, goal = State([0.0], **everything), State([0.5], **everything)  # type: ignore[arg-type]
+    found = hovi.solve(problem_of(forced(2), Periodic(), start)).replan(goal=goal)
+    fresh = hovi.solve(problem_of(forced(2), goal, start))
+    assert found.cost == pytest.approx(fresh.cost, rel=1e-9)
+    assert found.trajectory.momenta[0] == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_periodic_motion_is_saved_and_certified(tmp_path: Path) -> None:
     found = hovi.solve(problem_of(forced(2)))
     found.trajectory.save(tmp_path / "motion.npz")
@@ -284,7 +293,7 @@ def test_a_guess_of_any_curve_is_made_periodic(k: int) -> None:
     problem = problem_of(forced(k), Periodic([0.5], held=["q[0]"]), State([0.2]))
 
     def curve(t: Array) -> tuple[Array, ...]:
-        return tuple(np.exp(t)[:, None] for _ in range(4))
+        return tuple(np.exp(t)[:, None] for _ in range(k + 1))
 
     path = problem.path(curve)
     for each in (path, problem.moved(path)):

@@ -17,8 +17,10 @@ from scipy.integrate import solve_bvp
 import hovi
 from hovi.discrete.state import State
 from hovi.errors import InputError
-from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.contradictions import static_sentence
+from hovi.planning.problem.limit_violation import closeness, excess_along
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import by_name, galerkin
@@ -222,6 +224,42 @@ def test_an_end_outside_the_limits_of_its_segment_is_named() -> None:
     message = hovi.solve(lift([None, tight])).message
     assert "the position of joint 'shoulder' at the goal is 1 rad, outside its limits" in message
     assert "outside its limits" not in hovi.solve(lift([tight, None])).message
+
+
+def test_limits_are_checked_in_each_segment_against_its_own() -> None:
+    motion = lifted().trajectory
+    parts = [bounds(v=[1.2, 9.0], tau=[30.0, 4.4]), bounds(v=[1.5, 4.0], tau=[4.0, 7.5])]
+    found = excess_along(motion, Limits.of_segments(parts, (0.6,)))
+    t = np.linspace(0.0, 1.0, 20_001)
+    for segment, span in zip(parts, (slice(0, 6), slice(6, 15)), strict=True):
+        for k in range(span.start, span.stop):
+            m = motion.sample_intervals(np.full(len(t), k), t)
+            for row, values in ((1, m.v), (3, m.tau)):
+                ranges = 2 * np.maximum(parts[0].upper[row], parts[1].upper[row])
+                above = ((values - segment.upper[row]) / ranges).max(axis=0)
+                below = ((segment.lower[row] - values) / ranges).max(axis=0)
+                for dense, side in ((above, found.upper), (below, found.lower)):
+                    near = dense > -1e-3
+                    np.testing.assert_allclose(side[k, row][near], dense[near], atol=1e-6)
+                    assert (side[k, row][~near] < -5e-4).all()
+
+
+def test_the_torque_that_holds_the_goal_is_that_of_the_last_scene() -> None:
+    goal, zero = np.array([[1.0, 0.5]]), np.zeros((1, 2))
+    tau = empty_and_loaded()[1].inverse_dynamics(goal, zero, zero)[0]
+    problem = lift([None, bounds(tau=[0.8 * abs(tau[0]), 30.0])])
+    assert problem.limits is not None
+    sentence = static_sentence(problem, problem.limits)
+    assert f"holding the robot still at the goal takes {tau[0]:.4g} N m" in sentence
+
+
+def test_the_curvature_of_a_finer_model_is_weighted_by_the_torques_of_each_scene() -> None:
+    problem, path = lifted().problem, lifted().trajectory.path
+    assert problem is not None
+    slopes = interpolated_slopes(problem.ld, path, problem.ld)
+    for slope, jet, t in zip(slopes, problem.ld.jets(path), problem.ld.point_times, strict=True):
+        scene = empty_and_loaded()[int(t[0] > 0.6)]
+        np.testing.assert_allclose(slope, scene.inverse_dynamics(*jet), rtol=0, atol=1e-11)
 
 
 def test_a_motion_in_segments_is_replanned() -> None:
