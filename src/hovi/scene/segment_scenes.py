@@ -77,7 +77,10 @@ class SegmentScenes:
 
     @classmethod
     def from_tables(cls, tables: dict[str, Any]) -> Self:
-        """The inverse of `to_tables`. Raises InputError for anything else, KeyError if it lacks."""
+        """The inverse of `to_tables`. Raises InputError for anything else."""
+        missing = {"scenes", "segments", "scenes_sha256"} - set(tables)
+        if missing:
+            raise InputError(f"a motion in segments lacks {min(missing)!r}")
         scenes, segments = tables["scenes"], tables["segments"]
         if not isinstance(scenes, list) or _digest(scenes) != tables["scenes_sha256"]:
             raise InputError("its scenes do not match the stored SHA-256")

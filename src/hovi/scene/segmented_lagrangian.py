@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import Lagrangian
@@ -106,6 +107,9 @@ class SegmentedLagrangian(Lagrangian):
 
         Raises InputError if no node is at the end of a segment, or the motion ends before the last.
         """
+        require_shape("nodes", nodes, None)
+        if len(nodes) < 2 or not np.isfinite(nodes).all():
+            raise InputError(f"a grid has two or more nodes at finite times, got {len(nodes)}.")
         for end in self.ends:
             nearest = float(nodes[np.argmin(np.abs(nodes - end))])
             if abs(nearest - end) > NODE_TOLERANCE * nodes[-1] or end >= nodes[-1]:
@@ -137,6 +141,9 @@ class SegmentedLagrangian(Lagrangian):
         """The results of a function of (L, jet, t) at the points of each segment, put together."""
         if t is None:
             raise InputError("the Lagrangian of a motion in segments needs t, one time per point.")
+        require_shape("t", t, None)
+        for x in jet:
+            require_shape("every derivative of the jet", x, len(t), None)
         number = self.segments_at(t)
         present = np.unique(number) if len(number) else np.array([0])
         parts = []

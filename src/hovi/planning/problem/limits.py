@@ -94,6 +94,7 @@ class Limits:
         """
         if not self.parts:
             return self.lower[None], self.upper[None]
+        require_shape("nodes", nodes, None)
         middle = (nodes[1:] + nodes[:-1]) / 2
         part = np.searchsorted(np.array(self.ends), middle)
         lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))

@@ -6,7 +6,7 @@ import copy
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -29,7 +29,7 @@ from hovi.discrete.guess import (
 from hovi.discrete.state import Periodic, State
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, ModelError
+from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
@@ -39,10 +39,10 @@ from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.torque_moments import TorqueMoments
-from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
+from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
-from hovi.scene.scene import Scene, require_known_joints
+from hovi.scene.scene import Scene, require_plannable
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
@@ -385,15 +385,3 @@ def _require_supported(problem: TrajectoryProblem) -> None:
             f"{' and '.join(named)} are there for Lagrangians of order 2, and this one is of order "
             f"{k}: leave them out."
         )
-
-
-@lru_cache(maxsize=64)
-def require_plannable(scene: Scene) -> None:
-    """Raise ModelError for a robot without moving joints or with an invalid mass matrix."""
-    robot = scene.robot
-    require_known_joints(robot)
-    if robot.nv == 0:
-        raise ModelError(
-            f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
-        )
-    check_mass_matrix(scene.model)
