@@ -213,6 +213,16 @@ def test_limits_of_segments_are_those_of_ipopt() -> None:
     assert found.cost == pytest.approx(cost, rel=2e-4)
 
 
+def test_limits_of_segments_are_not_written_as_those_of_one_motion() -> None:
+    problem = lift([bounds(v=1.0), None])
+    assert problem.limits is not None
+    with pytest.raises(InputError, match="limits of segments are written one by one"):
+        problem.limits.to_dict()
+    tight = problem.limits.with_margin(0.25)
+    assert tight.parts[0].upper[1, 0] == pytest.approx(0.5)
+    assert tight.parts[1].bounded.sum() == 0
+
+
 def test_limits_of_one_segment_alone_do_not_limit_the_other() -> None:
     found = hovi.solve(lift([bounds(v=[20.0, 20.0]), None]))
     assert found.cost == pytest.approx(lifted().cost, rel=1e-7)
@@ -276,6 +286,41 @@ def test_a_via_point_is_where_segments_meet() -> None:
     assert found.success, found.message
     np.testing.assert_allclose(found.trajectory.q[6], [0.7, 0.9], rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.trajectory.v[6], 0.0, rtol=0, atol=1e-9)
+
+
+def test_a_frame_is_the_goal_of_the_last_segment() -> None:
+    robot = empty_and_loaded()[0].robot
+    target = robot.frame_position("tip", np.array([[1.0, 0.5]]))[0]
+    goal = hovi.FrameGoal("tip", position=target)
+    found = hovi.solve(dataclasses.replace(lift(), goal=goal))
+    assert found.success, found.message
+    reached = robot.frame_position("tip", found.trajectory.q[-1:])[0]
+    np.testing.assert_allclose(reached, target, rtol=0, atol=1e-8)
+    assert found.cost <= lifted().cost * (1 + 1e-9)
+
+
+def test_an_obstacle_is_avoided_in_every_segment() -> None:
+    robot = empty_and_loaded()[0].robot
+    at = robot.frame_position("tip", lifted().trajectory.configurations([0.8]))[0]
+    clearance = hovi.Clearance((hovi.Sphere(at, 0.05),), margin=0.01)
+    found = hovi.solve(lift(clearance=clearance))
+    assert found.success, found.message
+    assert found.cost > 1.001 * lifted().cost
+    tips = robot.frame_position("tip", found.trajectory.configurations(np.linspace(0, 1.5, 301)))
+    assert np.linalg.norm(tips - at, axis=1).min() > 0.06
+
+
+def test_the_derivative_in_the_duration_stretches_every_segment() -> None:
+    def cost(stretch: float) -> float:
+        efforts = [scene.effort_lagrangian() for scene in empty_and_loaded()]
+        lengths = ((0.6, 6), (0.9, 9))
+        segments = [on(L, stretch * T, n) for L, (T, n) in zip(efforts, lengths, strict=True)]
+        ends = State([0.0, 0.0]), State([1.0, 0.5])
+        return float(hovi.solve(hovi.TrajectoryProblem.of_segments(segments, *ends)).cost)
+
+    d = 1e-4
+    expected = (cost(1 + d) - cost(1 - d)) / (2 * d * 1.5)
+    assert lifted().duration_derivative == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_motion_in_segments_is_saved_with_its_scenes(tmp_path: Path) -> None:

@@ -127,7 +127,9 @@ class Limits:
         return np.where(np.isfinite(both), both, single)
 
     def to_dict(self) -> dict[str, Any]:
-        """The limits as JSON-able data; None for no bound."""
+        """The limits as JSON-able data; None for no bound. Raises InputError for segments."""
+        if self.parts:
+            raise InputError("limits of segments are written one by one: use those of its `parts`.")
         rows = {
             name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
             for name, bound in (("lower", self.lower), ("upper", self.upper))

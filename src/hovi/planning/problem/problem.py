@@ -106,7 +106,8 @@ class TrajectoryProblem:
             timed = self.ld.lagrangian.timed
             first, last = last.ends(self.start, coordinates, k, timed)
         start = first.on(coordinates, "start")
-        end = goal_state(last, "goal", coordinates, start[0], self.limits)
+        last_limits = None if self.limits is None else self.limits.at_ends[1]
+        end = goal_state(last, "goal", coordinates, start[0], last_limits)
         goal = end.state.on(coordinates, "goal")
         conditions = [NodeCondition(N, condition) for condition in end.conditions]
         unreachable = end.reason
