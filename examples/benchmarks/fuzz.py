@@ -32,6 +32,7 @@ KINDS = {
     "urdf": ("hard.mutated_urdf", 10_000),
     "scene": ("hard.mutated_scene", 6_000),
     "trajectory": ("hard.mutated_motion", 6_000),
+    "segments": ("hard.mutated_segments", 6_000),
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
     "mesh": ("hard.mutated_mesh", 3_000),

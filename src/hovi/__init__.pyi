@@ -11,6 +11,7 @@ from .discrete.measures.motion_extremes import Extreme as Extreme
 from .discrete.measures.motion_extremes import Extremes as Extremes
 from .discrete.measures.motion_extremes import extremes as extremes
 from .discrete.motion_error import MotionError as MotionError
+from .discrete.state import Periodic as Periodic
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory
 from .errors import HoviError as HoviError

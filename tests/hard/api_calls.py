@@ -28,6 +28,8 @@ from hard.verdict import Mutant, Verdict, judge
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.flows.legendre_transforms import legendre
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.scene.segment_scenes import SegmentScenes
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import by_name, galerkin
 from samples.slider import SLIDER
 
@@ -140,6 +142,7 @@ def calls() -> dict[str, Call]:
         _problems,
         _plans,
         _orders,
+        _segments_and_periods,
         _symbolic,
         _flows,
         _files,
@@ -466,6 +469,46 @@ def _orders() -> list[Call]:
         ),
         *(own(ld, name, path) for name in ("values", "action", "gradient", "derivatives")),
     ]
+
+
+def _segments_and_periods() -> list[Call]:
+    """Motions in two segments, and periodic ones."""
+    ld, ends = problem().ld, (hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7]))
+    limits = problem().limits
+    assert limits is not None
+    of_segments = hovi.TrajectoryProblem.of_segments
+    both = of_segments([ld, ld], *ends, [limits, None])
+    lagrangian = both.ld.lagrangian
+    assert isinstance(lagrangian, SegmentedLagrangian)
+    assert both.limits is not None
+    motion = hovi.solve(of_segments([ld, ld], *ends)).trajectory
+    assert motion.segments is not None
+    jet, t = [np.zeros((3, 2))] * 3, np.array([0.5, 1.5, 1.0])
+    return [
+        call(
+            of_segments,
+            **{"segments": [ld, ld], "start": ends[0], "goal": ends[1], "limits": [limits, None]},
+            **{"via": (hovi.Via(1.0, ends[0]),), "clearance": None},
+        ),
+        call(hovi.Grid.joined, [ld.grid, ld.grid]),
+        call(hovi.Limits.of_segments, [limits, limits], [1.0]),
+        own(both.limits, "on", both.ld.grid.t),
+        own(both.limits, "with_margin", 0.1),
+        build(SegmentedLagrangian, lagrangians=lagrangian.lagrangians, ends=lagrangian.ends),
+        *(own(lagrangian, name, *jet, t=t) for name in ("value", "evaluate", "output")),
+        own(lagrangian, "segments_of", both.ld.grid.t),
+        build(SegmentScenes, scenes=motion.segments.scenes, intervals=(N, N)),
+        call(SegmentScenes.from_tables, motion.segments.to_tables()),
+        own(motion, "sample", [0.5, 1.5]),
+        own(motion, "save", folder() / "segments.npz"),
+        call(_period, displacement=[6.0, 0.0], held=("elbow",)),
+        own(hovi.Periodic([6.0, 0.0]), "ends", ends[0], robot(), 2, False),
+    ]
+
+
+def _period(**fields: Any) -> object:
+    """A periodic goal of the arm's effort."""
+    return hovi.TrajectoryProblem(problem().ld, hovi.State([0.0, 0.0]), hovi.Periodic(**fields))
 
 
 def _ends_of_order_3(**fields: Any) -> object:

@@ -84,13 +84,13 @@ def mutate(random: Random) -> Mutant:
     if kind < 0.75:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(entries, random)
-        _rehash(entries, random)
-        return Mutant(_packed(entries, random))
+        rehash(entries, random)
+        return Mutant(packed(entries, random))
     change = random.choice(_INVALIDATING_CHANGES + _UNNOTICEABLE_CHANGES)
     change(entries, random)
     if change not in _UNNOTICEABLE_CHANGES:
-        _rehash(entries, random)
-    return Mutant(_packed(entries, random), (change.__doc__ or "").split("\n")[0])
+        rehash(entries, random)
+    return Mutant(packed(entries, random), (change.__doc__ or "").split("\n")[0])
 
 
 def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
@@ -117,7 +117,8 @@ def error_in(motion: Trajectory, folder: Path) -> str:
     return ""
 
 
-def _packed(entries: Entries, random: Random) -> bytes:
+def packed(entries: Entries, random: Random) -> bytes:
+    """The entries as a file."""
     stream = io.BytesIO()
     method = random.choice((zipfile.ZIP_STORED, zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
     with zipfile.ZipFile(stream, "w", method) as archive:
@@ -141,7 +142,8 @@ def _names(entries: Entries) -> list[str]:
     return [name for name in entries if name != "header"] or ["q"]
 
 
-def _edit(entries: Entries, change: Callable[[dict[str, Any]], object]) -> None:
+def edit(entries: Entries, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change the header, unless an earlier change has removed what is changed."""
     try:
         header = json.loads(entries["header"])
         change(header)
@@ -158,15 +160,15 @@ def _update_hashes(header: dict[str, Any]) -> None:
     header["scene_sha256"] = hashlib.sha256(text.encode()).hexdigest()
 
 
-def _rehash(entries: Entries, random: Random) -> None:
+def rehash(entries: Entries, random: Random) -> None:
     """Remove the hash of the contents, or recompute it, or leave the one of the original."""
     kind = random.random()
     if kind < 0.3:
-        _edit(entries, lambda header: header.pop("sha256"))
+        edit(entries, lambda header: header.pop("sha256"))
     elif kind < 0.7:
         with contextlib.suppress(Exception):  # an array cannot be read
             arrays = {name: _array_of(entries, name) for name in entries if name != "header"}
-            _edit(entries, lambda header: header.update(sha256=_contents_hash(header, arrays)))
+            edit(entries, lambda header: header.update(sha256=_contents_hash(header, arrays)))
 
 
 def _contents_hash(header: dict[str, Any], arrays: dict[str, Any]) -> str:
@@ -193,15 +195,15 @@ def _header_value(entries: Entries, random: Random) -> None:
         else:
             table[key] = random.choice(UNUSUAL_VALUES)
 
-    _edit(entries, change)
+    edit(entries, change)
     if random.random() < 0.7:
-        _edit(entries, _update_hashes)
+        edit(entries, _update_hashes)
 
 
 def _robot(entries: Entries, random: Random) -> None:
     urdf = mutated_urdf.mutate(random).content.decode(errors="replace")
-    _edit(entries, lambda header: header["scene"]["robot"].update(urdf=urdf))
-    _edit(entries, _update_hashes)
+    edit(entries, lambda header: header["scene"]["robot"].update(urdf=urdf))
+    edit(entries, _update_hashes)
 
 
 def _header_bytes(entries: Entries, random: Random) -> None:
@@ -296,13 +298,13 @@ def _scene(entries: Entries, random: Random) -> None:
         robot = header["scene"]["robot"]
         robot["urdf"] = robot["urdf"].replace("0.375", random.choice(("0.376", "NaN", "-1")))
 
-    _edit(entries, change)
+    edit(entries, change)
 
 
 def _number(entries: Entries, random: Random) -> None:
     """the header holds a number that is not finite"""
     value = random.choice((float("nan"), float("inf"), -float("inf")))
-    _edit(entries, lambda header: header["metadata"].update(cost=value))
+    edit(entries, lambda header: header["metadata"].update(cost=value))
 
 
 _INVALIDATING_CHANGES: tuple[Change, ...] = (
@@ -324,13 +326,13 @@ def _other_scheme(entries: Entries, random: Random) -> None:
     """the scheme is another one"""
     schemes = ("galerkin-0", "galerkin-1", "hermite-simpson", "taylor-midpoint")
     name = random.choice(schemes)
-    _edit(entries, lambda header: header.update(schemes=[[name, 4]]))
+    edit(entries, lambda header: header.update(schemes=[[name, 4]]))
 
 
 def _metadata(entries: Entries, random: Random) -> None:
     """the cost or the status is edited"""
     key, value = random.choice((("cost", 1.0), ("cost", -1), ("status", "x"), ("status", 7)))
-    _edit(entries, lambda header: header["metadata"].update({key: value}))
+    edit(entries, lambda header: header["metadata"].update({key: value}))
 
 
 _UNNOTICEABLE_CHANGES: tuple[Change, ...] = (_momenta, _momenta, _other_scheme, _metadata)

@@ -17,6 +17,7 @@ from hard import (
     mutated_mesh,
     mutated_motion,
     mutated_scene,
+    mutated_segments,
     mutated_urdf,
 )
 from hard.verdict import Verdict
@@ -25,6 +26,7 @@ MUTATED = (
     mutated_urdf,
     mutated_scene,
     mutated_motion,
+    mutated_segments,
     mutated_mesh,
     compiled_calls,
     api_calls,

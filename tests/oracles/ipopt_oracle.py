@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -41,7 +42,13 @@ def least_action(
     all_nodes = ca.horzcat(ends[0], nodes, ends[1])
     left, right = all_nodes[:, :-1], all_nodes[:, 1:]
     times = ca.DM(grid.t[None, :-1])
-    actions, outputs, moments = _interval_action(problem, cost).map(N)(left, right, modes, times)
+    counts = [N] if problem.ld.segments is None else np.bincount(problem.ld.segments)
+    ends_of, parts = np.cumsum([0, *counts]), []
+    for scene, a, b in zip(problem.scenes, ends_of[:-1], ends_of[1:], strict=True):
+        interval = _interval_action(problem, scene, cost).map(int(b - a))
+        own = left[:, a:b], right[:, a:b], modes[:, r * a : r * b], times[:, a:b]
+        parts.append(interval(*own))
+    actions, outputs, moments = (ca.horzcat(*each) for each in zip(*parts, strict=True))
     action = ca.sum2(actions)
     x = ca.vertcat(ca.vec(nodes), ca.vec(modes))
     quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-8}
@@ -49,9 +56,10 @@ def least_action(
     bounds = {name: np.zeros(moments.numel()) for name in ("lbg", "ubg")}
     if problem.limits is not None:
         program["g"] = ca.vertcat(program["g"], ca.vec(outputs))
-        rows = outputs.shape[0] * N // problem.limits.lower.size
-        for name, bound in (("lbg", problem.limits.lower), ("ubg", problem.limits.upper)):
-            bounds[name] = np.append(bounds[name], np.tile(bound.ravel(), rows))
+        points = outputs.shape[0] // problem.limits.lower.size
+        for name, bound in zip(("lbg", "ubg"), problem.limits.on(grid.t), strict=True):
+            each = np.broadcast_to(bound, (N, *bound.shape[1:])).reshape(N, -1)
+            bounds[name] = np.append(bounds[name], np.tile(each, points).ravel())
     solver = ca.nlpsol("least_action", "ipopt", program, quiet)
     inner = np.concatenate([np.hstack([guess.q, guess.v])[1:-1].ravel(), guess.inner.ravel()])
     start = inner + move * np.random.default_rng(seed).standard_normal(inner.shape)
@@ -61,14 +69,14 @@ def least_action(
     return float(result["f"]), found.reshape(N - 1, 2 * n)
 
 
-def _interval_action(problem: TrajectoryProblem, cost: Cost | None) -> ca.Function:
+def _interval_action(problem: TrajectoryProblem, scene: Scene, cost: Cost | None) -> ca.Function:
     """L_d(q0 v0, q1 v1, c, t0) of an interval: h sum_j w_j C_j by the scheme's numbers.
 
     And (q, v, a, tau) at its quadrature points, one after the other, and the moments of the passive
     torques against P_0 .. P_{r+1}. Without passive joints there are no moments.
     """
     scheme, h, n = problem.grid.schemes[0], float(problem.grid.steps[0]), problem.robot.nv
-    tau = casadi_functions(problem.scene.model).inverse_dynamics
+    tau = casadi_functions(scene.model).inverse_dynamics
     left, right = ca.SX.sym("left", 2 * n), ca.SX.sym("right", 2 * n)
     c, t0 = ca.SX.sym("c", n, scheme.inner_modes), ca.SX.sym("t0")
     q0, v0, q1, v1 = left[:n], left[n:], right[:n], right[n:]

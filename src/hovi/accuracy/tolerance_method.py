@@ -16,6 +16,7 @@ from hovi.accuracy.run import MAX_JOINT_ERROR
 from hovi.accuracy.variational_method import on_grid
 from hovi.discrete.guess import Curve
 from hovi.discrete.motion_error import MotionError
+from hovi.discrete.state import Periodic
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.refinement.adaptive import first_grid, solve_to_tolerance
@@ -180,6 +181,7 @@ def default_choice(
     unnamed = options.with_changes(scheme=None, intervals=None, tolerance=None, time_weight=0.0)
     unnamed = unnamed.with_changes(smooth=False)  # the problem has its cost on the jerk already
     first = _on_first_grid(problem, DEFAULT_INTERVALS)
+    assert not isinstance(problem.goal, Periodic)  # that of a task
     ends = problem.start, problem.goal, problem.grid.duration
 
     def solve(**changes: Any) -> Solution:

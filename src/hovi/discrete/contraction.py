@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.discrete.interval_charts import IntervalCharts
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
+
+    The m = 2 k + r columns are (q0, h v0, q1, h v1, c) if nodal, (q0, h v0, Z0, Z1, c) if
+    regularized, and for any order k (q0, h q0', ..., q1, h q1', ..., c); inner modes that an
+    interval does not have are zero.
+
+    values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
+    outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
+        steps; they have no rows if the Lagrangian has no outputs.
+    charts: of the intervals, one per batch; None if the chart is the identity.
+    """
+
+    values: Array
+    gradient: Array
+    hessian: Array
+    outputs: list[tuple[Array, Array]]
+    charts: list[IntervalCharts] | None = None
+
+    @property
+    def action(self) -> float:
+        """The discrete action, the sum of all L_d."""
+        return float(np.sum(self.values))
 
 
 def contract(

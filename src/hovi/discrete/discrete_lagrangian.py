@@ -15,44 +15,19 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.discrete.contraction import contract
+from hovi.discrete.contraction import Expansion, contract
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
 from hovi.discrete.interval_charts import IntervalCharts, charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
 from hovi.scene.lagrangian import Lagrangian, PointTerms
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes.scheme import regular_from_nodal
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
-
-
-@dataclass(frozen=True, eq=False)
-class Expansion:
-    """Second-order expansion of every L_d of a path, in scaled coordinates of the intervals.
-
-    The m = 2 k + r columns are (q0, h v0, q1, h v1, c) if nodal, (q0, h v0, Z0, Z1, c) if
-    regularized, and for any order k (q0, h q0', ..., q1, h q1', ..., c); inner modes that an
-    interval does not have are zero.
-
-    values: L_d, shape (N,). gradient: shape (N, m, n). hessian: shape (N, m, m, n, n).
-    outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
-        steps; they have no rows if the Lagrangian has no outputs.
-    charts: of the intervals, one per batch; None if the chart is the identity.
-    """
-
-    values: Array
-    gradient: Array
-    hessian: Array
-    outputs: list[tuple[Array, Array]]
-    charts: list[IntervalCharts] | None = None
-
-    @property
-    def action(self) -> float:
-        """The discrete action, the sum of all L_d."""
-        return float(np.sum(self.values))
 
 
 @check_arguments
@@ -82,6 +57,7 @@ class DiscreteLagrangian:
                 f"boundary value problems of order {self.k} need joints with nq = nv: lock the "
                 "others with load_robot(..., locked=[...])."
             )
+        _ = self.segments  # raises where the grid has no node at the end of one
 
     @property
     def k(self) -> int:
@@ -106,16 +82,17 @@ class DiscreteLagrangian:
         """
         self._check(path, jets)
         values = np.empty(self.grid.intervals)
-        for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
-            values[batch.index] = batch.sums(self.lagrangian.value(*jet, t=batch.t))
+        parts = zip(self.lagrangians, self.batches, jets or self.jets(path), strict=True)
+        for lagrangian, batch, jet in parts:
+            values[batch.index] = batch.sums(lagrangian.value(*jet, t=batch.t))
         return values
 
     def action(self, path: DiscretePath, jets: list[Jet] | None = None) -> float:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
         self._check(path, jets)
-        triples = zip(self.batches, jets or self.jets(path), self.point_weights, strict=True)
-        value = self.lagrangian.value
-        return sum(float(weights @ value(*jet, t=batch.t)) for batch, jet, weights in triples)
+        known, weights = jets or self.jets(path), self.point_weights
+        parts = zip(self.lagrangians, self.batches, known, weights, strict=True)
+        return sum(float(w @ L.value(*jet, t=batch.t)) for L, batch, jet, w in parts)
 
     def expand(
         self,
@@ -147,7 +124,8 @@ class DiscreteLagrangian:
                 raise_if_late()
             multiplier = None if multipliers is None else multipliers[i]
             term = None if terms is None else terms[i]
-            point = self.lagrangian.expand(*known[i], t=batch.t, multiplier=multiplier, terms=term)
+            jet, L = known[i], self.lagrangians[i]
+            point = L.expand(*jet, t=batch.t, multiplier=multiplier, terms=term)
             value, outputs = batch.sums(point.value), [(point.outputs, point.jacobian)]
             if charts is not None:
                 gradient, hessian = charts[i].expand(point.gradient, point.hessian)
@@ -172,8 +150,9 @@ class DiscreteLagrangian:
         """
         self._check(path, jets)
         gradient = np.zeros((self.grid.intervals, self.columns, self.lagrangian.nv))
-        for batch, jet in zip(self.batches, jets or self.jets(path), strict=True):
-            point_gradient = self.lagrangian.gradient(*jet, t=batch.t)
+        parts = zip(self.lagrangians, self.batches, jets or self.jets(path), strict=True)
+        for lagrangian, batch, jet in parts:
+            point_gradient = lagrangian.gradient(*jet, t=batch.t)
             if self.chart is None:
                 part = batch.contracted(point_gradient, coordinates)
             else:
@@ -202,8 +181,8 @@ class DiscreteLagrangian:
         step: in the intervals' scaled coordinates, shape (N, m, n).
         """
         steps = self._point_steps(step, coordinates, expansion)
-        pairs = zip(expansion.outputs, steps, strict=True)
-        return [self.lagrangian.predicted_slope(y, J, dx) for (y, J), dx in pairs]
+        parts = zip(self.lagrangians, expansion.outputs, steps, strict=True)
+        return [L.predicted_slope(y, J, dx) for L, (y, J), dx in parts]
 
     def predicted_outputs(
         self, expansion: Expansion, step: Array, coordinates: Coordinates
@@ -329,8 +308,8 @@ class DiscreteLagrangian:
         self._check_terms(forces)
         known = jets or self.jets(path)
         terms: Sequence[PointTerms | None] = forces or [None] * len(known)
-        triples = zip(self.batches, known, terms, strict=True)
-        return [self.lagrangian.gradient(*jet, t=b.t, terms=term) for b, jet, term in triples]
+        parts = zip(self.lagrangians, self.batches, known, terms, strict=True)
+        return [L.gradient(*jet, t=b.t, terms=term) for L, b, jet, term in parts]
 
     def duration_derivative(
         self, path: DiscretePath, forces: list[PointTerms] | None = None
@@ -392,5 +371,19 @@ class DiscreteLagrangian:
 
     @cached_property
     def batches(self) -> list[IntervalBatch]:
-        """The intervals in batches of one scheme, which are evaluated together."""
-        return list(interval_batches(self.grid))
+        """The intervals in batches of one scheme and segment, which are evaluated together."""
+        return list(interval_batches(self.grid, self.segments))
+
+    @cached_property
+    def segments(self) -> Index | None:
+        """The number of the segment of every interval, shape (N,); None for a single one."""
+        L = self.lagrangian
+        return L.segments_of(self.grid.t) if isinstance(L, SegmentedLagrangian) else None
+
+    @cached_property
+    def lagrangians(self) -> list[Lagrangian]:
+        """The Lagrangian of every batch."""
+        L = self.lagrangian
+        if self.segments is None or not isinstance(L, SegmentedLagrangian):
+            return [L] * len(self.batches)
+        return [L.lagrangians[self.segments[batch.numbers[0]]] for batch in self.batches]

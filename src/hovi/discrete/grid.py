@@ -75,6 +75,17 @@ class Grid:
             )
         return cls(np.full(intervals, duration / intervals), (scheme,) * intervals)
 
+    @classmethod
+    def joined(cls, grids: Sequence[Grid]) -> Grid:
+        """The intervals of several grids, one after the other.
+
+        Raises InputError for no grid, and for schemes for Lagrangians of different orders.
+        """
+        if len(grids) == 0:
+            raise InputError("there is nothing to join: give one or more grids.")
+        schemes = tuple(scheme for grid in grids for scheme in grid.schemes)
+        return cls(np.concatenate([grid.steps for grid in grids]), schemes)
+
     def stretched(self, duration: float) -> Grid:
         """The grid with all steps scaled to another duration.
 

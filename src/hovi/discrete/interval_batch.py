@@ -100,13 +100,19 @@ class IntervalBatch:
         return np.asarray(np.matmul(table.T, weighted.reshape(len(self.h), Q * rows, -1)))
 
 
-def interval_batches(grid: Grid) -> Iterator[IntervalBatch]:
-    """Batches of at most CHUNK intervals, each of one scheme."""
-    t0 = grid.t
-    for scheme, index in grid.groups:
+def interval_batches(grid: Grid, segments: Index | None = None) -> Iterator[IntervalBatch]:
+    """Batches of at most CHUNK intervals, each of one scheme.
+
+    segments: number of the segment of every interval, (N,): a batch is in one of them.
+    """
+    t0, groups = grid.t, grid.groups
+    if segments is not None:
+        parts = ((scheme, index, segments[index]) for scheme, index in groups)
+        groups = tuple((s, i[of == part]) for s, i, of in parts for part in np.unique(of))
+    for scheme, index in groups:
         for first in range(0, len(index), CHUNK):
             numbers = index[first : first + CHUNK]
-            alone = len(grid.groups) == 1
+            alone = len(groups) == 1
             chosen = slice(first, first + len(numbers)) if alone else numbers
             h = grid.steps[chosen]
             t = t0[:-1][chosen][:, None] + h[:, None] * scheme.points

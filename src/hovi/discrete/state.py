@@ -136,6 +136,75 @@ class State:
         return full
 
 
+@check_arguments_except("displacement")
+@dataclass(frozen=True, eq=False)
+class Periodic:
+    """A goal: q(T) = q(0) + displacement, and the same q', ..., q^(k-1) at both ends.
+
+    The start is then a guess of the motion at t = 0, and all of it is optimized but for the
+    positions of some joints, which are held. If the Lagrangian does not depend on time, a periodic
+    motion can be shifted along itself, and a joint is held to choose the phase: the motion has to
+    pass its position with a velocity other than zero, so that nothing is held but the phase.
+
+    displacement: of a period, shape (nv,), in [rad] or [m]; zero if None. In a full turn of a
+        revolute joint it is 2 pi.
+    held: names of the joints that are held at the start's position. By default, if the Lagrangian
+        does not depend on time, the one with the largest displacement; without any the one with the
+        largest velocity at the start. Where the Lagrangian is the same for translated
+        configurations, one more for each direction.
+    For vector spaces.
+    """
+
+    displacement: npt.ArrayLike | None = None
+    _: KW_ONLY
+    held: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.held, str):
+            object.__setattr__(self, "held", (self.held,))
+
+    def ends(
+        self, start: State, coordinates: Coordinates, order: int, timed: bool
+    ) -> tuple[State, State]:
+        """Both ends of a motion as states, free but for the joints that are held.
+
+        order: k. timed: whether the Lagrangian depends on time.
+        Raises InputError for groups, unknown joints, a displacement of another shape, and where
+        the phase is not determined.
+        """
+        if not coordinates.vector_joints:
+            raise InputError(
+                "periodic motions need joints with nq = nv: lock the others with load_robot(..., "
+                "locked=[...])."
+            )
+        q, v = start.on(coordinates, "start")
+        shift = np.zeros(coordinates.nv)
+        if self.displacement is not None:
+            shift = coordinates.check_velocity(self.displacement, "the displacement of a period")
+        held = _chosen_coordinates(coordinates, "Periodic", "held", self.held)
+        if not timed and not held.any():
+            held[_phase_coordinate(coordinates, shift, v if order > 1 else 0 * v)] = True
+        names = coordinates.coordinate_names
+        free = tuple(name for name, is_held in zip(names, held, strict=True) if not is_held)
+        rest = dict.fromkeys(_FREE[1:order], ALL)
+        given = {"v": start.v, "a": start.a, "jerk": start.jerk}
+        one, other = (State(each, **given, free=free, **rest) for each in (q, q + shift))  # type: ignore[arg-type]
+        return one, other
+
+
+def _phase_coordinate(coordinates: Coordinates, shift: Array, v: Array) -> int:
+    """The coordinate that chooses the phase of a periodic motion; raises InputError if none."""
+    for size in (np.abs(shift), np.abs(v)):
+        if size.any():
+            return int(np.argmax(size))
+    raise InputError(
+        "the Lagrangian does not depend on time, so that a periodic motion can be shifted along "
+        "itself: name a joint that passes the start's position with a velocity, such as "
+        f"Periodic(held=[{coordinates.coordinate_names[0]!r}]), or give a displacement, or the "
+        "start a velocity where it has one."
+    )
+
+
 def _check_part(
     coordinates: Coordinates, state: str, first: int, free: Mask, angular: Sequence[int]
 ) -> None:

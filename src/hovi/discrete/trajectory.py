@@ -18,17 +18,25 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
-from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
+from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.stored_torque import StoredTorque
-from hovi.discrete.trajectory_file import read_arrays, require_unchanged, write_arrays
+from hovi.discrete.trajectory_file import (
+    read_arrays,
+    require_known_name,
+    require_names,
+    require_unchanged,
+    schemes_of,
+    write_arrays,
+)
 from hovi.errors import HoviError, InputError, TrajectoryFileError
 from hovi.robot.robot import Robot
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.scene import Scene
-from hovi.schemes import Scheme, by_name
+from hovi.scene.segment_scenes import SegmentScenes
+from hovi.schemes import Scheme
 from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
@@ -64,10 +72,11 @@ class Trajectory:
     grid: the intervals, each with its step and scheme.
     path: nodes, regularized coordinates and inner modes.
     momenta: p and p~ at the nodes, shape (N + 1, k, nv) for a Lagrangian of order k.
-    scene: None for a Lagrangian without one, and for a loaded motion of a robot that was given as
-        a Pinocchio model.
+    scene: None for a Lagrangian without one, for a loaded motion of a robot that was given as a
+        Pinocchio model, and for a motion in segments.
     metadata: JSON-compatible data about the origin (cost, status, versions), without wall times.
     torque: torques by interval if there is no scene to compute them.
+    segments: the scenes of a motion in segments.
     """
 
     grid: Grid
@@ -76,17 +85,19 @@ class Trajectory:
     scene: Scene | None = field(repr=False)
     metadata: Mapping[str, Any] = field(default_factory=dict)
     torque: StoredTorque | None = None
+    segments: SegmentScenes | None = None
 
     def __post_init__(self) -> None:
         """Raise InputError for arrays that do not match the grid and the robot."""
         _check_shapes(self)
-        if self.scene is None and self.torque is None:
+        if self.scene is None and self.torque is None and self.segments is None:
             raise InputError("a trajectory needs a scene, or the torques themselves.")
 
     @property
     def robot(self) -> Robot | None:
-        """The scene's robot; None without a scene."""
-        return None if self.scene is None else self.scene.robot
+        """The robot of the scene or the scenes; None without one."""
+        about = self.segments if self.scene is None else self.scene
+        return None if about is None else about.robot
 
     @property
     def duration(self) -> float:
@@ -111,16 +122,16 @@ class Trajectory:
     @cached_property
     def space(self) -> ConfigurationSpace | None:
         """The configuration space; None if it is a vector space."""
-        if self.scene is not None:
-            return self.scene.robot.curved_space
+        if self.robot is not None:
+            return self.robot.curved_space
         parts = self.metadata.get("space")
         return None if parts is None else ConfigurationSpace(tuple(parts))
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
         """A name per velocity coordinate: that of the joint, with an index if it has several."""
-        if self.scene is not None:
-            return tuple(self.scene.robot.coordinate_names)
+        if self.robot is not None:
+            return tuple(self.robot.coordinate_names)
         nv = self.path.v.shape[1]
         return tuple(self.metadata.get("coordinates") or (f"joint{i}" for i in range(nv)))
 
@@ -159,8 +170,10 @@ class Trajectory:
         q, v, a = self._interpolate(k, s, 2)
         if self.torque is not None:
             return Sample(q, v, a, self.torque(k, s))
-        assert self.scene is not None
         t = self.t[k] + s * self.grid.steps[k]
+        if self.segments is not None:
+            return Sample(q, v, a, self.segments.inverse_dynamics(k, (q, v, a), t))
+        assert self.scene is not None
         return Sample(q, v, a, self.scene.inverse_dynamics(q, v, a, t))
 
     def _checked(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Index, Array]:
@@ -218,7 +231,7 @@ class Trajectory:
         path: the file, usually `*.npz`. Raises TrajectoryFileError.
         """
         for scheme, _ in self.grid.groups:
-            _check_name(scheme)
+            require_known_name(scheme)
         arrays = {
             "steps": self.grid.steps,
             "q": self.path.q,
@@ -230,9 +243,10 @@ class Trajectory:
         if self.path.higher.size:
             arrays[_HIGHER] = self.path.higher
         metadata = {"versions": _versions(), **self.metadata}
-        scene = None
-        if self.scene is not None and self.scene.robot.source.kind != "model":
-            scene = self.scene.to_dict()
+        scene, segments = None, {}
+        if self.robot is not None and self.robot.source.kind != "model":
+            scene = None if self.scene is None else self.scene.to_dict()
+            segments = {} if self.segments is None else self.segments.to_tables()
         else:
             metadata["coordinates"] = list(self.coordinate_names)
             if self.space is not None:
@@ -243,6 +257,7 @@ class Trajectory:
             "metadata": metadata,
             "scene": scene,
             "scene_sha256": _digest(scene),
+            **segments,
         }
         write_arrays(path, header, arrays)
 
@@ -254,20 +269,23 @@ class Trajectory:
         """
         header, arrays = read_arrays(path, _ARRAYS, optional=[_TORQUE, _HIGHER])
         try:
-            schemes = _schemes(header["schemes"], arrays["inner"].shape)
+            schemes = schemes_of(header["schemes"], arrays["inner"].shape)
             metadata = header["metadata"]
             if not isinstance(metadata, dict):
                 raise InputError("the metadata is not a table")
             scene = _scene(header["scene"], header["scene_sha256"])
-            if scene is None:
-                _check_coordinates(metadata["coordinates"], arrays["v"].shape)
+            segments = SegmentScenes.from_tables(header) if "segments" in header else None
+            stored = scene is None and segments is None
+            if stored:
+                require_names(metadata["coordinates"], arrays["v"].shape)
             loaded = cls(
                 grid=Grid(arrays["steps"], schemes),
                 path=DiscretePath(*(arrays[name] for name in _PATH if name in arrays)),
                 momenta=arrays["momenta"],
                 scene=scene,
                 metadata=metadata,
-                torque=StoredTorque(arrays[_TORQUE]) if scene is None else None,
+                torque=StoredTorque(arrays[_TORQUE]) if stored else None,
+                segments=segments,
             )
             require_continuous(loaded.path, loaded.grid, loaded.space)
             require_unchanged(header, arrays)
@@ -295,15 +313,22 @@ class Trajectory:
 def _check_shapes(trajectory: Trajectory) -> None:
     path, grid = trajectory.path, trajectory.grid
     N, nv = grid.intervals, path.v.shape[-1]
-    nq = path.q.shape[-1] if trajectory.scene is None else trajectory.scene.robot.nq
+    robot = trajectory.robot
+    nq = path.q.shape[-1] if robot is None else robot.nq
     expected = {
         "q": (path.q, (N + 1, nq)),
-        "v": (path.v, (N + 1, nv if trajectory.scene is None else trajectory.scene.robot.nv)),
+        "v": (path.v, (N + 1, nv if robot is None else robot.nv)),
         "z": (path.z, (N, grid.order, nv)),
         "momenta": (trajectory.momenta, (N + 1, grid.order, nv)),
     }
     if grid.order > 2:
         expected["higher"] = (path.higher, (N + 1, grid.order - 2, nv))
+    segments = trajectory.segments
+    if segments is not None and (trajectory.scene, sum(segments.intervals)) != (None, N):
+        raise InputError(
+            f"a motion in segments has no scene of its own, and its segments need {N} intervals, "
+            f"got {sum(segments.intervals)}."
+        )
     if trajectory.torque is not None:
         points, given = trajectory.torque.values.shape[1:]
         expected["tau"] = (trajectory.torque.values, (N, points, nv if given else 0))
@@ -338,49 +363,12 @@ def _span(values: Array) -> str:
     return f"{values.min():g} to {values.max():g}" if values.size else "none"
 
 
-def _check_name(scheme: Scheme) -> None:
-    """Raise TrajectoryFileError for a scheme that cannot be restored from its name."""
-    try:
-        same = np.array_equal(by_name(scheme.name).table, scheme.table)
-    except HoviError:
-        same = False
-    if not same:
-        raise TrajectoryFileError(
-            f"the scheme {scheme.name!r} cannot be restored from its name; "
-            "use a scheme of hovi.schemes.by_name."
-        )
-
-
-def _schemes(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
-    """One scheme per interval from [name, count] pairs; `inner` is the shape of the inner modes."""
-    if not isinstance(runs, list) or not all(isinstance(run, list) for run in runs):
-        raise InputError("the schemes are not a list of [name, count]")
-    schemes: list[Scheme] = []
-    for name, count in runs:
-        if not isinstance(name, str) or type(count) is not int or not 0 < count <= MAX_INTERVALS:
-            raise InputError(f"{[name, count]!r} is not a scheme's name and a count")
-        modes = name.rpartition("-")[2]
-        if modes.isdecimal() and int(modes) > inner[1]:
-            raise InputError(f"the scheme {name!r} has more inner modes than the file")
-        schemes += [by_name(name)] * count
-        if len(schemes) > inner[0]:
-            raise InputError("there are more schemes than intervals")
-    return tuple(schemes)
-
-
 def _scene(description: Any, sha256: Any) -> Scene | None:
     if description is None:
         return None
     if _digest(description) != sha256:
         raise InputError("its scene does not match the stored SHA-256")
     return Scene.from_dict(description)
-
-
-def _check_coordinates(names: Any, shape: tuple[int, ...]) -> None:
-    if not isinstance(names, list) or len(names) != shape[-1]:
-        raise InputError(f"{shape[-1]} names of coordinates are needed")
-    if not all(isinstance(name, str) for name in names):
-        raise InputError("the names of the coordinates are not all strings")
 
 
 def _digest(description: Any) -> str:

@@ -23,7 +23,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hovi.errors import HoviWarning, InputError, TrajectoryFileError
+from hovi.discrete.grid import MAX_INTERVALS
+from hovi.errors import HoviError, HoviWarning, InputError, TrajectoryFileError
+from hovi.schemes import Scheme, by_name
 from hovi.system.files import reason, require_file, whole_file
 
 Array = npt.NDArray[np.float64]
@@ -123,6 +125,44 @@ def require_unchanged(header: Mapping[str, Any], arrays: Mapping[str, Array]) ->
         warnings.warn(message, HoviWarning, stacklevel=3)
     elif header[_HASH] != _digest(header, arrays):
         raise InputError("its contents do not match their stored SHA-256")
+
+
+def require_known_name(scheme: Scheme) -> None:
+    """Raise TrajectoryFileError for a scheme that cannot be restored from its name."""
+    try:
+        same = np.array_equal(by_name(scheme.name).table, scheme.table)
+    except HoviError:
+        same = False
+    if not same:
+        raise TrajectoryFileError(
+            f"the scheme {scheme.name!r} cannot be restored from its name; "
+            "use a scheme of hovi.schemes.by_name."
+        )
+
+
+def schemes_of(runs: Any, inner: tuple[int, ...]) -> tuple[Scheme, ...]:
+    """One scheme per interval from [name, count] pairs; `inner` is the shape of the inner modes."""
+    if not isinstance(runs, list) or not all(isinstance(run, list) for run in runs):
+        raise InputError("the schemes are not a list of [name, count]")
+    schemes: list[Scheme] = []
+    for name, count in runs:
+        if not isinstance(name, str) or type(count) is not int or not 0 < count <= MAX_INTERVALS:
+            raise InputError(f"{[name, count]!r} is not a scheme's name and a count")
+        modes = name.rpartition("-")[2]
+        if modes.isdecimal() and int(modes) > inner[1]:
+            raise InputError(f"the scheme {name!r} has more inner modes than the file")
+        schemes += [by_name(name)] * count
+        if len(schemes) > inner[0]:
+            raise InputError("there are more schemes than intervals")
+    return tuple(schemes)
+
+
+def require_names(names: Any, shape: tuple[int, ...]) -> None:
+    """Raise InputError unless there is a name for each of the velocities, shape (N + 1, nv)."""
+    if not isinstance(names, list) or len(names) != shape[-1]:
+        raise InputError(f"{shape[-1]} names of coordinates are needed")
+    if not all(isinstance(name, str) for name in names):
+        raise InputError("the names of the coordinates are not all strings")
 
 
 def _digest(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> str:

@@ -162,6 +162,11 @@ def _driver(plan: Trajectory, feedback: str, scene: Scene, bandwidth: float) -> 
             f"computed torques need a motor at every joint, and {', '.join(scene.passive)} {have} "
             "none; choose the feedback 'pd'."
         )
+    if plan.segments is not None:
+        raise InputError(
+            "computed torques need one scene, and a plan in segments has several; choose the "
+            "feedback 'pd'."
+        )
     if plan.scene is None:
         raise InputError(
             "computed torques need the plan's scene, which files do not store for a robot given as "

@@ -177,6 +177,8 @@ class _ForwardDynamics:
 
 def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:
     scene = trajectory.scene
+    if trajectory.segments is not None:
+        raise InputError("a motion in segments has several scenes, and this takes one")
     if scene is None:
         raise InputError("the motion was saved without its scene")
     return scene, scene.robot

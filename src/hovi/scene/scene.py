@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -19,6 +19,7 @@ from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics,
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
 from hovi.effects import REGISTRY, Effect, EffortWeight
 from hovi.errors import ModelError, SceneError, nearest
+from hovi.robot.mass_matrix import check_mass_matrix
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
 from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
@@ -305,6 +306,18 @@ def require_known_joints(robot: Robot) -> None:
             check_coupling(robot.model, coupling)
         except ModelError as wrong:
             raise ModelError(f"robot {robot.name!r} does not support planning: {wrong}") from None
+
+
+@lru_cache(maxsize=64)
+def require_plannable(scene: Scene) -> None:
+    """Raise ModelError for a robot without moving joints or with an invalid mass matrix."""
+    robot = scene.robot
+    require_known_joints(robot)
+    if robot.nv == 0:
+        raise ModelError(
+            f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
+        )
+    check_mass_matrix(scene.model)
 
 
 def _effect(key: str, values: object) -> Effect:

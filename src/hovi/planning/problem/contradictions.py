@@ -34,7 +34,8 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
         for row, values in enumerate((*state, *more[i])):
             held = ~problem.free_ends[i, row]
-            sentence = _outside(problem.coordinates, end, row, values, limits, held)
+            here = limits.at_ends[i]
+            sentence = _outside(problem.coordinates, end, row, values, here, held)
             if sentence:
                 return sentence
     return (
@@ -53,11 +54,12 @@ def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
     for i, (end, q, v) in enumerate((("start", q0, v0), ("goal", q1, v1))):
         if np.any(v != 0) or problem.free_ends[i].any():
             continue
-        tau = problem.scene.inverse_dynamics(q[None], zero, zero)[0]
-        over = np.maximum(limits.lower[3] - tau, tau - limits.upper[3])
+        here, scene = limits.at_ends[i], problem.scenes[-i]
+        tau = scene.inverse_dynamics(q[None], zero, zero)[0]
+        over = np.maximum(here.lower[3] - tau, tau - here.upper[3])
         i = int(np.argmax(over))
         if over[i] > 0:
-            bound = limits.upper[3, i] if tau[i] > 0 else limits.lower[3, i]
+            bound = here.upper[3, i] if tau[i] > 0 else here.lower[3, i]
             return (
                 f"; holding the robot still at the {end} takes {tau[i]:.4g} "
                 f"{problem.coordinates.coordinate_units[i].tau} at joint "
@@ -91,6 +93,8 @@ def _via_outside(problem: TrajectoryProblem, limits: Limits) -> str:
         if not isinstance(via, JointCondition):
             continue
         end = f"via point at {t[each.node]:g} s"
+        if limits.parts:  # of both segments where it is at their shared node
+            continue
         for row, values in enumerate((space.coordinates(via.target), via.velocity)):
             sentence = _outside(problem.coordinates, end, row, values, limits, via.held[row])
             if sentence:
@@ -126,6 +130,8 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
 def _duration_too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
     """Which joint cannot cover its distance at its velocity limit in time; "" if all can."""
     q0, _, q1, _ = problem.boundary
+    if limits.parts:
+        return ""
     distance = problem.coordinates.difference(q0, q1)
     T = problem.grid.duration
     fastest = np.where(distance >= 0, limits.upper[1], -limits.lower[1])

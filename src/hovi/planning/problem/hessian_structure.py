@@ -25,16 +25,18 @@ class ActionStructure:
     grid: the intervals. dof: n, the degrees of freedom.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, n); None for fixed ends.
+    periodic: whether both ends are one node, whose free components are those of the start.
     """
 
     grid: Grid
     dof: int
     free_ends: Mask | None = None
+    periodic: bool = False
 
     @cached_property
     def metric(self) -> dict[Coordinates, Array]:
         """The trust region's metric in both kinds of columns, (N, m, m)."""
-        return {name: action_metric(self.grid, name) for name in COORDINATES}
+        return {name: action_metric(self.grid, name, self.periodic) for name in COORDINATES}
 
     @cached_property
     def sizes(self) -> dict[Coordinates, Array]:
@@ -50,7 +52,8 @@ class ActionStructure:
     @cached_property
     def layout(self) -> BandLayout:
         """The indices of nodes and inner modes in a banded matrix."""
-        return BandLayout.of(unknowns(self.grid, self.dof, self.free_ends), self._scales())
+        numbers = unknowns(self.grid, self.dof, self.free_ends, self.periodic)
+        return BandLayout.of(numbers, self._scales())
 
     @cached_property
     def metric_band(self) -> Array:
@@ -77,8 +80,11 @@ class ActionStructure:
         return MergeTree(levels, grid.intervals, grid.inner_modes, self.dof, present)
 
 
-def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
-    """The trust region's metric: T^(2k-1) integral |dq^(k)|^2 over each interval, (N, m, m)."""
+def action_metric(grid: Grid, coordinates: Coordinates, periodic: bool = False) -> Array:
+    """The trust region's metric: T^(2k-1) integral |dq^(k)|^2 over each interval, (N, m, m).
+
+    For periodic motions plus integral |dq|^2 / T, as without it a translation has no length.
+    """
     k = grid.order
     m = 2 * k + grid.inner_modes
     metric = np.zeros((grid.intervals, m, m))
@@ -87,14 +93,20 @@ def action_metric(grid: Grid, coordinates: Coordinates) -> Array:
         own = rows.shape[1]
         scale = (grid.duration / grid.steps[index]) ** (2 * k - 1)
         metric[index, :own, :own] = scale[:, None, None] * ((rows.T * scheme.weights) @ rows)
+        if periodic:
+            rows = (scheme.nodal_table if coordinates == "nodal" else scheme.regular_table)[:, 0]
+            share = grid.steps[index] / grid.duration
+            metric[index, :own, :own] += share[:, None, None] * ((rows.T * scheme.weights) @ rows)
     return metric
 
 
-def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
+def unknowns(grid: Grid, n: int, free_ends: Mask | None = None, periodic: bool = False) -> Index:
     """Indices of the unknowns of each interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
 
-    Nodes and inner modes alternate along the motion. Shape (N, m, n).
-    free_ends: as in ActionStructure.
+    Nodes and inner modes alternate along the motion. Shape (N, m, n). A periodic motion is a cycle
+    of them, folded at its start: the first, second, last, third, last but one, and so on, so that
+    the band is only twice as wide as that of a motion between two ends, and nothing is bordered.
+    free_ends, periodic: as in ActionStructure.
     """
     N, r, k = grid.intervals, grid.inner_modes, grid.order
     modes = np.zeros(N, dtype=np.intp)
@@ -104,6 +116,22 @@ def unknowns(grid: Grid, n: int, free_ends: Mask | None = None) -> Index:
     free[0::2, k:] = False
     free[[0, -1], :k] = False if free_ends is None else free_ends
     free[1::2] = np.arange(max(k, r))[:, None] < modes[:, None, None]
-    numbers = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
+    if periodic:
+        free[-1] = False
+        order = _folded(2 * N)
+        numbers = np.full(free.shape, -1)
+        folded = free[order]
+        numbers[order] = np.where(folded, np.cumsum(folded).reshape(folded.shape) - 1, -1)
+        numbers[-1] = numbers[0]
+    else:
+        numbers = np.where(free, np.cumsum(free).reshape(free.shape) - 1, -1)
     nodes, inner = numbers[0::2, :k], numbers[1::2, :r]
     return np.concatenate([nodes[:-1], nodes[1:], inner], axis=1)
+
+
+def _folded(length: int) -> Index:
+    """The numbers of a cycle from both sides: 0, 1, length - 1, 2, length - 2, ..."""
+    order = np.zeros(length, dtype=np.intp)
+    order[1::2] = np.arange(1, length // 2 + 1)
+    order[2::2] = np.arange(length - 1, length // 2, -1)
+    return order

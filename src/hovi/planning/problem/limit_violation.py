@@ -68,8 +68,9 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     N, shape = trajectory.grid.intervals, limits.lower.shape
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N)
     outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *shape)
-    lower, at_lower = _Side(trajectory, limits, -1.0, limits.lower).extremes(outputs)
-    upper, at_upper = _Side(trajectory, limits, 1.0, limits.upper).extremes(outputs)
+    below, above = limits.on(trajectory.t)
+    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs)
+    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs)
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -77,7 +78,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 class _Side:
     """The lower or the upper bounds of a motion's outputs.
 
-    sign: -1 for lower bounds, 1 for upper ones. bound: shape (kinds, nv).
+    sign: -1 for lower bounds, 1 for upper ones. bound: shape (N or 1, kinds, nv).
     """
 
     trajectory: Trajectory
@@ -91,7 +92,7 @@ class _Side:
         outputs: of all samples, shape (N, SAMPLES, kinds, nv).
         """
         raise_if_late()
-        excess = self.sign * (outputs - self.bound) / self.limits.ranges
+        excess = self.sign * (outputs - self.bound[:, None]) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
@@ -113,6 +114,7 @@ class _Side:
         k: intervals. sample: the extreme samples. kind, joint: of the outputs. All (M,).
         """
         rows = np.arange(len(k))
+        bound = self.bound[np.minimum(k, len(self.bound) - 1), kind, joint]
         begin = POSITIONS[np.maximum(sample - 1, 0)]
         end = POSITIONS[np.minimum(sample + 1, SAMPLES - 1)]
         for _ in range(3):
@@ -120,9 +122,9 @@ class _Side:
             around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
             every = np.repeat(k, REFINED_SAMPLES)
             outputs = _outputs(self.trajectory, every, around.ravel(), self.limits)
-            shape = len(k), REFINED_SAMPLES, *self.bound.shape
+            shape = len(k), REFINED_SAMPLES, *self.bound.shape[1:]
             values = outputs.reshape(shape)[rows, :, kind, joint]
-            excess = self.sign * (values - self.bound[kind, joint][:, None])
+            excess = self.sign * (values - bound[:, None])
             excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
             at = around[rows, best]
@@ -184,7 +186,8 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
     s = float(position[k, kind, joint])
     value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
-    bound = (limits.upper if above else limits.lower)[kind, joint]
+    bounds = limits.on(trajectory.t)[int(above)]
+    bound = bounds[min(int(k), len(bounds) - 1), kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     unit = coordinates.coordinate_units[joint][kind]
     return (

@@ -52,12 +52,15 @@ class Limits:
         and [N m/s] (metres and newtons for sliding joints); or only the first four rows, (4, nv).
         Limits on the jerk and on d tau / dt need a Lagrangian of order 3.
     tolerance: share of its range by which a limit may be exceeded anywhere.
+    parts, ends: of a motion in segments, see `of_segments`.
     Raises InputError for NaN and for a range that is empty to rounding.
     """
 
     lower: Array
     upper: Array
     tolerance: float = TOLERANCE
+    parts: tuple[Limits, ...] = ()
+    ends: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         few = self.lower.shape[:1] == (FIRST_KINDS,)
@@ -72,6 +75,49 @@ class Limits:
             )
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(f"the tolerance of limits must be positive, got {self.tolerance}.")
+
+    @classmethod
+    def of_segments(cls, parts: Sequence[Limits], ends: Sequence[float]) -> Limits:
+        """Limits that differ between the segments of a motion.
+
+        lower, upper are then the loosest finite bounds of any segment, in whose ranges an excess is
+        measured, and the tolerance the smallest of any.
+        parts: of each segment. ends: times at which all but the last end, ascending, in [s].
+        Raises InputError for another number of ends, or limits of different sizes.
+        """
+        if len(parts) == 0 or len(ends) != len(parts) - 1:
+            raise InputError(
+                f"there must be limits, or None, for each of the {len(ends) + 1} segments, got "
+                f"{len(parts)}."
+            )
+        for each in parts:
+            require_shape("the limits of a segment", each.lower, *parts[0].lower.shape)
+        lower = np.stack([each.lower for each in parts])
+        upper = np.stack([each.upper for each in parts])
+        low = np.min(np.where(np.isfinite(lower), lower, np.inf), axis=0)
+        high = np.max(np.where(np.isfinite(upper), upper, -np.inf), axis=0)
+        high[np.isinf(high)] = np.inf
+        low[np.isinf(low) | (low >= high)] = -np.inf  # one-sided bounds of different segments
+        tolerance = min(each.tolerance for each in parts)
+        return cls(low, high, tolerance, tuple(parts), tuple(ends))
+
+    def on(self, nodes: Array) -> Range:
+        """Lower and upper bounds in each interval, (N or 1, kinds, nv): 1 without segments.
+
+        nodes: their times, shape (N + 1,), in [s].
+        """
+        if not self.parts:
+            return self.lower[None], self.upper[None]
+        require_shape("nodes", nodes, None)
+        middle = (nodes[1:] + nodes[:-1]) / 2
+        part = np.searchsorted(np.array(self.ends), middle)
+        lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))
+        return lower[part], upper[part]
+
+    @property
+    def at_ends(self) -> tuple[Limits, Limits]:
+        """The limits at the start and at the goal."""
+        return (self.parts[0], self.parts[-1]) if self.parts else (self, self)
 
     @property
     def _empty(self) -> npt.NDArray[np.bool_]:
@@ -92,6 +138,11 @@ class Limits:
         return bool(self.bounded[FIRST_KINDS:].any())
 
     @property
+    def on_torque_rate(self) -> bool:
+        """Whether there is a limit on d tau / dt."""
+        return self.on_rates and bool(self.bounded[KINDS.index("torque_rate")].any())
+
+    @property
     def first_kinds(self) -> Limits:
         """The limits on q, v, a and tau alone."""
         return Limits(self.lower[:FIRST_KINDS], self.upper[:FIRST_KINDS], self.tolerance)
@@ -110,7 +161,9 @@ class Limits:
         return np.where(np.isfinite(both), both, single)
 
     def to_dict(self) -> dict[str, Any]:
-        """The limits as JSON-able data; None for no bound."""
+        """The limits as JSON-able data; None for no bound. Raises InputError for segments."""
+        if self.parts:
+            raise InputError("limits of segments are written one by one: use those of its `parts`.")
         rows = {
             name: [[float(x) if np.isfinite(x) else None for x in row] for row in bound]
             for name, bound in (("lower", self.lower), ("upper", self.upper))
@@ -149,6 +202,8 @@ class Limits:
         if not (np.isfinite(margin) and 0 <= margin < 0.5):
             raise InputError(f"a margin must be a share of the range in [0, 0.5), got {margin}.")
         shift = margin * self.ranges
+        if self.parts:
+            return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
         return Limits(self.lower + shift, self.upper - shift, self.tolerance)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-from typing import Any
+from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -25,24 +26,26 @@ from hovi.discrete.guess import (
     path_on_grid,
     with_turns,
 )
-from hovi.discrete.state import State
+from hovi.discrete.state import Periodic, State
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, ModelError
+from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via, goal_state, via_conditions
 from hovi.planning.problem.hessian_structure import ActionStructure
-from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.planning.problem.torque_moments import TorqueMoments
-from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
+from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.jerk_lagrangian import JerkLagrangian
-from hovi.scene.scene import Scene, require_known_joints
+from hovi.scene.scene import Scene, require_plannable
+from hovi.scene.segment_scenes import SegmentScenes
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
 
 Array = npt.NDArray[np.float64]
@@ -65,7 +68,7 @@ class TrajectoryProblem:
     [ColomboFerraroMartin2016, section 3]
 
     ld: the discrete Lagrangian on a grid: of the effort of a scene, or any other.
-    start: state at t = 0. goal: state at t = T, or a task-space goal.
+    start: state at t = 0. goal: state at t = T, a task-space goal, or Periodic.
     limits: bounds along the motion; none if None.
     via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None.
@@ -81,7 +84,7 @@ class TrajectoryProblem:
 
     ld: DiscreteLagrangian
     start: State
-    goal: State | FrameGoal
+    goal: State | FrameGoal | Periodic
     limits: Limits | None = None
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
@@ -96,14 +99,21 @@ class TrajectoryProblem:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
         _require_supported(self)
-        object.__setattr__(self, "ld", _with_limited_outputs(self.ld, self.limits))
-        if self.about_robot:
-            require_plannable(self.scene)
+        of, limits = self.ld.lagrangian, self.limits
+        if limits is not None and limits.on_torque_rate and isinstance(of, JerkLagrangian):
+            object.__setattr__(self, "ld", DiscreteLagrangian(of.with_torque_rates(), self.grid))
+        for scene in self.scenes:
+            require_plannable(scene)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
             raise InputError("passive joints need a Lagrangian of torques: leave them out.")
-        coordinates, N = self.coordinates, self.grid.intervals
-        start = self.start.on(coordinates, "start")
-        end = goal_state(self.goal, "goal", coordinates, start[0], self.limits)
+        coordinates, N, k = self.coordinates, self.grid.intervals, self.ld.k
+        first, last = self.start, self.goal
+        if isinstance(last, Periodic):
+            timed = self.ld.lagrangian.timed
+            first, last = last.ends(self.start, coordinates, k, timed)
+        start = first.on(coordinates, "start")
+        last_limits = None if limits is None else limits.at_ends[1]
+        end = goal_state(last, "goal", coordinates, start[0], last_limits)
         goal = end.state.on(coordinates, "goal")
         conditions = [NodeCondition(N, condition) for condition in end.conditions]
         unreachable = end.reason
@@ -116,8 +126,7 @@ class TrajectoryProblem:
                 NodeCondition(node, each) for each in via_conditions(via, reached, coordinates)
             ]
             unreachable = unreachable or reached.reason
-        k = self.ld.k
-        named = (self.start, "start"), (end.state, "goal")
+        named = (first, "start"), (end.state, "goal")
         free = [state.free_on(coordinates, name, k) for state, name in named]
         for state, name in named:
             state.require_order(k, name)
@@ -127,7 +136,7 @@ class TrajectoryProblem:
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
-        if self.about_robot:
+        if self.about_robot and not self.periodic:
             unreachable = unreachable or free_fall_contradiction(
                 self.scene, self.boundary, self.free_ends, self.grid.duration
             )
@@ -137,11 +146,38 @@ class TrajectoryProblem:
         object.__setattr__(self, "turns", end.state.turns_on(coordinates, "goal"))
         _ = self.distances  # raises for missing collision shapes
 
+    @classmethod
+    def of_segments(
+        cls,
+        segments: Sequence[DiscreteLagrangian],
+        start: State,
+        goal: State | FrameGoal | Periodic,
+        limits: Sequence[Limits | None] | None = None,
+        via: tuple[Via, ...] = (),
+        clearance: Clearance | None = None,
+    ) -> Self:
+        """The problem of one motion in several segments, which share the nodes between them.
+
+        segments: two or more, each with its own Lagrangian and grid, one after the other in time;
+            a Lagrangian that depends on time sees the time from the start of the motion.
+        limits: of each segment; none if None. Other arguments as of the problem.
+        Raises InputError for segments of different orders or joints.
+        """
+        grid = Grid.joined([each.grid for each in segments])
+        nodes = np.cumsum([each.grid.intervals for each in segments])[:-1]
+        ends = tuple(float(t) for t in grid.t[nodes])
+        lagrangian = SegmentedLagrangian(tuple(each.lagrangian for each in segments), ends)
+        bounds = None
+        if limits is not None:
+            none = no_limits(lagrangian.coordinates)
+            bounds = Limits.of_segments([none if each is None else each for each in limits], ends)
+        return cls(DiscreteLagrangian(lagrangian, grid), start, goal, bounds, via, clearance)
+
     @cached_property
     def structure(self) -> ActionStructure:
         """Block structure of the action's Hessian on this grid."""
-        free = self.free_ends if self.free_ends.any() else None
-        return ActionStructure(self.grid, self.coordinates.nv, free)
+        free = self.free_ends if self.free_ends.any() or self.periodic else None
+        return ActionStructure(self.grid, self.coordinates.nv, free, self.periodic)
 
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
@@ -162,10 +198,11 @@ class TrajectoryProblem:
         """The same problem with more inner modes, for error estimates."""
         return self.on(self.grid.enriched(MORE_MODES))
 
-    def between(self, start: State, goal: State | FrameGoal) -> TrajectoryProblem:
+    def between(self, start: State, goal: State | FrameGoal | Periodic) -> TrajectoryProblem:
         """The same problem between other states, sharing what was built for this one."""
         problem = dataclasses.replace(self, start=start, goal=goal)
-        if np.array_equal(problem.free_ends, self.free_ends):
+        same_ends = np.array_equal(problem.free_ends, self.free_ends)
+        if same_ends and problem.periodic == self.periodic:
             object.__setattr__(problem, "structure", self.structure)
         return problem
 
@@ -195,7 +232,10 @@ class TrajectoryProblem:
 
     def _with_fixed(self, ends: Array) -> Array:
         """Ends (2, k, nv) with the problem's own in fixed components."""
-        return np.where(self.free_ends, ends, self.end_jets)
+        ends = np.where(self.free_ends, ends, self.end_jets)
+        if self.periodic:
+            ends[1] = ends[0] + self.end_jets[1] - self.end_jets[0]
+        return ends
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""
@@ -204,6 +244,9 @@ class TrajectoryProblem:
 
     def motion(self, path: DiscretePath, momenta: Array, metadata: dict[str, Any]) -> Trajectory:
         """A path on the grid as a trajectory; arguments as for Trajectory."""
+        if self.ld.segments is not None and self.about_robot:
+            segments = SegmentScenes(self.scenes, tuple(np.bincount(self.ld.segments).tolist()))
+            return Trajectory(self.grid, path, momenta, None, metadata, segments=segments)
         if self.about_robot:
             return Trajectory(self.grid, path, momenta, self.scene, metadata)
         metadata = {**metadata, "coordinates": list(self.coordinates.coordinate_names)}
@@ -225,6 +268,8 @@ class TrajectoryProblem:
             ]
         )
         v = np.where(free[:, 1], v[[0, -1]], np.stack([v0, v1]))
+        if self.periodic:
+            return q[0], v[0], q[0] + (q1 - q0), v[0]
         return q[0], v[0], q[1], v[1]
 
     @cached_property
@@ -256,7 +301,12 @@ class TrajectoryProblem:
     @property
     def plain(self) -> bool:
         """Whether both ends are fixed and there are no equality constraints."""
-        return not self.constrained and not self._has_free_ends
+        return not (self.constrained or self._has_free_ends or self.periodic)
+
+    @property
+    def periodic(self) -> bool:
+        """Whether the motion ends as it starts, up to a displacement."""
+        return isinstance(self.goal, Periodic)
 
     @cached_property
     def _has_free_ends(self) -> bool:
@@ -285,6 +335,14 @@ class TrajectoryProblem:
         scene = getattr(self.ld.lagrangian, "scene", None)
         return scene if isinstance(scene, Scene) else None
 
+    @cached_property
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scene of every segment, one where there is a single one; none without a robot."""
+        lagrangian = self.ld.lagrangian
+        if isinstance(lagrangian, SegmentedLagrangian):
+            return lagrangian.scenes
+        return () if self._scene is None else (self._scene,)
+
     @property
     def about_robot(self) -> bool:
         """Whether the Lagrangian belongs to a scene, and so to a robot."""
@@ -292,7 +350,10 @@ class TrajectoryProblem:
 
     @property
     def scene(self) -> Scene:
-        """The scene that the Lagrangian belongs to. Raises InputError if it is about no robot."""
+        """The scene that the Lagrangian, or that of the first segment, belongs to.
+
+        Raises InputError if it is about no robot.
+        """
         if self._scene is not None:
             return self._scene
         raise InputError(
@@ -311,21 +372,14 @@ class TrajectoryProblem:
         return self.scene.robot if self.about_robot else self.ld.lagrangian.coordinates
 
 
-def _with_limited_outputs(ld: DiscreteLagrangian, limits: Limits | None) -> DiscreteLagrangian:
-    """The discrete Lagrangian, with d tau / dt among its outputs if that is limited."""
-    of = ld.lagrangian
-    limited = limits is not None and limits.on_rates and limits.bounded[-1].any()
-    if not limited or not isinstance(of, JerkLagrangian) or of.torque_rates:
-        return ld
-    return DiscreteLagrangian(of.with_torque_rates(), ld.grid)
-
-
 def _require_supported(problem: TrajectoryProblem) -> None:
-    """Raise InputError for what is only there for Lagrangians of order 2."""
+    """Raise InputError for what is not there for this order, or for periodic motions."""
     k = problem.ld.k
-    limited = problem.limits is not None and bool(problem.limits.bounded.any())
+    if problem.periodic and (problem.via or len(problem.passive) > 0):
+        raise InputError("periodic motions have no via points and passive joints: leave them out.")
+    limits = problem.limits
     wanted = {
-        "limits": limited,
+        "limits": limits is not None and bool(limits.bounded.any()),
         "obstacles": problem.clearance is not None and problem.clearance.wanted,
         "via points": bool(problem.via),
         "goals of frames": isinstance(problem.goal, FrameGoal),
@@ -336,20 +390,8 @@ def _require_supported(problem: TrajectoryProblem) -> None:
             f"{' and '.join(named)} are there for Lagrangians of orders 2 and 3, and this one is "
             f"of order {k}: leave them out."
         )
-    if problem.limits is not None and problem.limits.on_rates and k != 3:
+    if limits is not None and limits.on_rates and k != 3:
         raise InputError(
             "limits on the jerk and on the torque rate need a Lagrangian of order 3: add the "
             "effect jerk_cost to the scene, plan with smooth=True, or leave them out."
         )
-
-
-@lru_cache(maxsize=64)
-def require_plannable(scene: Scene) -> None:
-    """Raise ModelError for a robot without moving joints or with an invalid mass matrix."""
-    robot = scene.robot
-    require_known_joints(robot)
-    if robot.nv == 0:
-        raise ModelError(
-            f"robot {robot.name!r} has no joint that moves; load it with fewer joints locked."
-        )
-    check_mass_matrix(scene.model)

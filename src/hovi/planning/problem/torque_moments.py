@@ -20,7 +20,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
+from hovi.discrete.contraction import Expansion
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import IntervalCharts
 

@@ -160,6 +160,8 @@ def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: Curve
 def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
     """Relative residual of the discrete Euler-Lagrange equations at the inner nodes.
 
+    Of a periodic motion at all nodes.
+
     The largest |F+ L_d - F- L_d| of p and of p~, each relative to the largest of its kind; rounding
     contributes like eps/h^3. Raises InputError if multipliers contribute to the equations.
     """
@@ -167,7 +169,8 @@ def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
         raise InputError("multipliers of limits or constraints contribute to it")
     D = problem.ld.derivatives(trajectory.path)
     k = problem.ld.k
-    jump = np.abs(D[:-1, k:] + D[1:, :k]).max(axis=(0, 2), initial=0.0)
+    ends = np.roll(D, 1, axis=0)[:, k:] + D[:, :k]  # that of the first node is of a cycle
+    jump = np.abs(ends[0 if problem.periodic else 1 :]).max(axis=(0, 2), initial=0.0)
     sizes = np.abs(D).reshape(len(D), 2, k, -1).max(axis=(0, 1, 3))
     return float(np.max(jump / np.maximum(sizes, np.finfo(float).tiny)))
 

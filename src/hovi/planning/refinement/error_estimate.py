@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.discrete.discrete_lagrangian import Expansion
+from hovi.discrete.contraction import Expansion
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
 from hovi.discrete.motion_error import MotionError, deviation, sample_points

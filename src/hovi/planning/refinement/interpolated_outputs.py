@@ -25,18 +25,17 @@ def interpolated_slopes(
 
     path: a solution on the grid of `ld`.
     """
-    lagrangian = ld.lagrangian
     N, Q = ld.grid.intervals, max(len(scheme.points) for scheme, _ in ld.grid.groups)
-    m = len(lagrangian.output_weight)
+    m = len(ld.lagrangian.output_weight)
     series = np.zeros((N, Q, m))
-    parts = zip(ld.jets(path), ld.point_times, ld.point_intervals, strict=True)
-    for jet, t, numbers in parts:
+    parts = zip(ld.lagrangians, ld.jets(path), ld.point_times, ld.point_intervals, strict=True)
+    for lagrangian, jet, t, numbers in parts:
         scheme = ld.grid.schemes[numbers[0]]
         points = len(scheme.points)
         y = lagrangian.output(*jet, t=t).reshape(len(t) // points, points, m)
         series[numbers[::points], :points] = scheme.series @ y
     nodes, slopes = ld.grid.t, []
-    for t in other.point_times:
+    for lagrangian, t in zip(other.lagrangians, other.point_times, strict=True):
         k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, N - 1)
         P = legendre(2 * (t - nodes[k]) / ld.grid.steps[k] - 1, Q - 1)  # (degrees, points)
         slopes.append(lagrangian.output_slope(np.einsum("jp,pjn->pn", P, series[k])))

@@ -51,6 +51,8 @@ def nodal_hamiltonian(problem: TrajectoryProblem, trajectory: Trajectory) -> Nod
         raise InputError("with limits a does not follow from p~ alone")
     if problem.constrained:
         raise InputError("with equality constraints a does not follow from p~ alone")
+    if problem.ld.segments is not None:
+        raise InputError("H changes where the Lagrangian does, from segment to segment")
     if problem.ld.lagrangian.timed:
         raise InputError("the cost or the torques depend on time, and so does H")
     lagrangian, p, path = problem.ld.lagrangian, trajectory.momenta, trajectory.path

@@ -133,7 +133,7 @@ def resolved(solution: Solution) -> Solution:
 
 def _checked(solution: Solution) -> tuple[Solution, str]:
     """The solution with an estimate, and why it is no minimum along its way, or ""."""
-    reason = _fault_on_curve(solution)
+    reason = _fault_of_period(solution) or _fault_on_curve(solution)
     if solution.status is Status.STATIONARY:
         return (solution, reason) if reason else _compared_with_stationary(solution)
     if not reason and solution.error_estimate is None and solution.accuracy is None:
@@ -195,6 +195,29 @@ def _fault_on_curve(solution: Solution) -> str:
     if not all(is_galerkin(scheme) for scheme, _ in problem.grid.groups):
         return ""
     return _fault_of_integral(solution, problem) or _fault_of_passive(problem, trajectory)
+
+
+def _fault_of_period(solution: Solution) -> str:
+    """Why a periodic motion is not one at the joints that are held; "" if it is.
+
+    Their p is the same at both ends if what is held is the phase, or along a symmetry, alone.
+    """
+    problem, p = solution.problem, solution.trajectory.momenta
+    assert problem is not None
+    if not problem.periodic:
+        return ""
+    jump = np.abs(p[-1, 0] - p[0, 0]) * ~problem.free_ends[0, 0]
+    powers = problem.grid.duration ** -np.arange(p.shape[1])
+    largest = float(np.max(np.abs(p) * powers[:, None]))
+    i = int(np.argmax(jump))
+    if jump[i] <= RESOLVED * largest:
+        return ""
+    held = problem.boundary[0][i]
+    return (
+        f"{problem.coordinates.coordinate_names[i]!r} is held at {held:.4g} by a force, since its "
+        f"momentum jumps from {p[-1, 0, i]:.4g} to {p[0, 0, i]:.4g} after a period, as at a point "
+        "that no periodic motion near the guess passes: hold another joint, or another position"
+    )
 
 
 def _fault_of_integral(solution: Solution, problem: TrajectoryProblem) -> str:

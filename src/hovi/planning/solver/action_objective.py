@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import without_checks
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian, Expansion
+from hovi.discrete.contraction import Expansion
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import with_ends_of_nodes
 from hovi.discrete.interval_batch import Coordinates, Jet
@@ -105,9 +106,8 @@ class ActionObjective(Objective[DiscretePath]):
     def outputs(self, x: DiscretePath) -> list[Array]:
         """The Lagrangian's outputs at the quadrature points, per batch; the last are cached."""
         if self._outputs is None or self._outputs[0] is not x:
-            output = self.lagrangian.output
-            pairs = zip(self.jets(x), self.ld.point_times, strict=True)
-            self._outputs = x, [output(*jet, t=t) for jet, t in pairs]
+            parts = zip(self.ld.lagrangians, self.jets(x), self.ld.point_times, strict=True)
+            self._outputs = x, [L.output(*jet, t=t) for L, jet, t in parts]
         return self._outputs[1]
 
     def _outside_chart(self, x: DiscretePath) -> bool:
@@ -122,7 +122,7 @@ class ActionObjective(Objective[DiscretePath]):
         for i, (jet, t, weights) in enumerate(
             zip(self.jets(x), self.ld.point_times, self.ld.point_weights, strict=True)
         ):
-            value += self.lagrangian.integral(outputs[i], jet, t, weights)
+            value += self.ld.lagrangians[i].integral(outputs[i], jet, t, weights)
             if self.multipliers is not None:
                 value += float(weights @ np.vecdot(self.multipliers.torque[i], outputs[i]))
                 if self.moments is not None:
@@ -137,7 +137,7 @@ class ActionObjective(Objective[DiscretePath]):
 
     def output_slope(self, outputs: Array, batch: int) -> Array:
         """d value / dy at the points of a batch: R y plus the multipliers."""
-        slope = self.lagrangian.output_slope(outputs)
+        slope = self.ld.lagrangians[batch].output_slope(outputs)
         return slope if self.multipliers is None else slope + self._force(outputs, batch)
 
     def _force(self, outputs: Array, batch: int) -> Array:

@@ -175,7 +175,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         if self._predicted is not None:
             return self._predicted[batch]
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
-        return self.action.output_slope(self.lagrangian.output(*jet, t=t), batch)
+        outputs = self.ld.lagrangians[batch].output(*jet, t=t)
+        return self.action.output_slope(outputs, batch)
 
     def _output_columns(self, bounded: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
         """The columns of (q, q', ..., q^(k), outputs) of entries of the limits.
@@ -212,13 +213,15 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return full
 
     def _bounds(self, margins: Array | None) -> Bounds:
-        lower = (self.limits.lower.ravel()[self._bounded] - self._origin) / self._ranges
-        upper = (self.limits.upper.ravel()[self._bounded] - self._origin) / self._ranges
         size = 0 if self.more is None else self.more.size
-        lower, upper = np.append(lower, np.zeros(size)), np.append(upper, np.full(size, np.inf))
         intervals = np.concatenate(self.ld.point_intervals)
         weights = np.concatenate(self.ld.point_weights)[:, None]
-        shape = (len(intervals), len(lower))
+        lower, upper = (self._rows_of(bound) for bound in self.limits.on(self.problem.grid.t))
+        lower = np.pad(lower, ((0, 0), (0, size)))
+        upper = np.pad(upper, ((0, 0), (0, size)), constant_values=np.inf)
+        if len(lower) > 1:  # they differ between segments
+            lower, upper = lower[intervals], upper[intervals]
+        shape = (len(intervals), lower.shape[1])
         if margins is None:
             return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
         tightening = margins.reshape(2, len(margins[0]), -1)
@@ -226,3 +229,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         chosen = np.append(self._bounded, np.arange(first, first + size))
         tightening = tightening[:, :, chosen][:, intervals]
         return Bounds(lower + tightening[0], upper - tightening[1], weights)
+
+    def _rows_of(self, bound: Array) -> Array:
+        """Bounds (N or 1, kinds, nv) in scaled outputs, shape (N or 1, K)."""
+        return (bound.reshape(len(bound), -1)[:, self._bounded] - self._origin) / self._ranges

@@ -35,10 +35,10 @@ def _at_nodes(problem: TrajectoryProblem, path: DiscretePath) -> str:
 
 def _at_points(problem: TrajectoryProblem, path: DiscretePath) -> str:
     jets = problem.ld.jets(path)
-    points = zip(jets, problem.ld.point_times, problem.ld.point_intervals, strict=True)
-    for jet, t, numbers in points:
+    ld = problem.ld
+    points = zip(ld.lagrangians, jets, ld.point_times, ld.point_intervals, strict=True)
+    for lagrangian, jet, t, numbers in points:
         quantities: list[tuple[str, Array]] = [("acceleration", jet[2])]
-        lagrangian = problem.ld.lagrangian
         quantities.append((lagrangian.output_name, lagrangian.output(*jet, t=t)))
         quantities.append(("cost", lagrangian.value(*jet, t=t)[:, None]))
         for term, values in quantities:

@@ -17,7 +17,7 @@ from hovi.discrete.guess import check_path, moved, stretched
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.node_continuity import require_continuous
-from hovi.discrete.state import State, as_state
+from hovi.discrete.state import Periodic, State, as_state
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.optimize.trust_region import Iteration, Options, Stop
@@ -102,7 +102,7 @@ class Solution:
     def replan(
         self,
         start: State | npt.ArrayLike | str | None = None,
-        goal: State | FrameGoal | npt.ArrayLike | str | None = None,
+        goal: State | FrameGoal | Periodic | npt.ArrayLike | str | None = None,
         guess: Solution | None = None,
         **options: Any,
     ) -> Solution:
@@ -112,7 +112,7 @@ class Solution:
         prediction of the motion, which counts as one step, corrected by a few gradient
         evaluations, which do not: see hovi.planning.solver.warm_start.
         start, goal: a State, a configuration at rest or the name of a pose; the goal may be a
-            FrameGoal; unchanged if None.
+            FrameGoal or Periodic; unchanged if None.
         guess: an earlier solution on the same grid; this one if None.
         options: as for `solve`.
         Raises InputError if this solution has no problem.
@@ -139,9 +139,9 @@ class Solution:
 
 
 def _as_goal(
-    goal: State | FrameGoal | npt.ArrayLike | str, coordinates: Coordinates
-) -> State | FrameGoal:
-    return goal if isinstance(goal, FrameGoal) else as_state(goal, coordinates)
+    goal: State | FrameGoal | Periodic | npt.ArrayLike | str, coordinates: Coordinates
+) -> State | FrameGoal | Periodic:
+    return goal if isinstance(goal, FrameGoal | Periodic) else as_state(goal, coordinates)
 
 
 @check_arguments
@@ -199,7 +199,11 @@ def _trajectory(result: MethodResult) -> Trajectory:
         "n_neg": result.n_neg,
     }
     if problem.limits is not None and problem.limited:
-        metadata["limits"] = problem.limits.to_dict()
+        parts = problem.limits.parts
+        if parts:  # under another name: who draws limits draws one for the whole motion
+            metadata["segment_limits"] = [each.to_dict() for each in parts]
+        else:
+            metadata["limits"] = problem.limits.to_dict()
     if problem.clearance is not None and problem.distances is not None:
         metadata["clearance"] = problem.clearance.to_dict()
     derivatives = problem.ld.derivatives(result.path, result.forces, result.jets)

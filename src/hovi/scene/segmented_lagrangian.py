@@ -1,0 +1,188 @@
+"""The Lagrangians of a motion's segments, such as those of one robot with and without a payload."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.checks.arguments import check_arguments
+from hovi.checks.shapes import require_shape
+from hovi.errors import InputError
+from hovi.robot.space.coordinates import Coordinates
+from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+NODE_TOLERANCE = 1e-9
+"""Distance of a node from the end of a segment, relative to the motion's duration."""
+
+
+@check_arguments
+@dataclass(frozen=True, eq=False)
+class SegmentedLagrangian(Lagrangian):
+    """L_s(q, v, a, ..., t) in segment s of a motion; t runs from the start of the motion.
+
+    On a grid every interval has the Lagrangian of its segment, and segments share the node between
+    them: q, ..., q^(k-1) are continuous there, and so are the momenta of a stationary motion, which
+    is the natural condition of the action's sum. q^(k) may jump.
+
+    lagrangians: one per segment, two or more, of one order and of the same coordinates.
+    ends: times at which the segments but the last end, ascending, in [s].
+    Raises InputError for segments that do not fit each other.
+    """
+
+    lagrangians: tuple[Lagrangian, ...]
+    ends: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.lagrangians) < 2 or len(self.ends) != len(self.lagrangians) - 1:
+            raise InputError(
+                "a motion in segments has two or more, with a time between each two, got "
+                f"{len(self.lagrangians)} segments and {len(self.ends)} times."
+            )
+        times = np.array([0.0, *self.ends])
+        if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
+            raise InputError(f"the segments must end at ascending times > 0, got {self.ends}.")
+        for each in self.lagrangians:
+            _require_fitting(self.lagrangians[0], each)
+
+    @property
+    def order(self) -> int:  # type: ignore[override]
+        """k, of all segments."""
+        return self.lagrangians[0].order
+
+    @property
+    def nq(self) -> int:
+        """Length of a configuration."""
+        return self.lagrangians[0].nq
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self.lagrangians[0].nv
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Those of the first segment; the others have the same."""
+        return self.lagrangians[0].coordinates
+
+    @property
+    def timed(self) -> bool:
+        """L depends on time: it changes where segments meet."""
+        return True
+
+    @cached_property
+    def scenes(self) -> tuple[Scene, ...]:
+        """The scene of every segment; empty if they are about no robot."""
+        scenes = (getattr(each, "scene", None) for each in self.lagrangians)
+        return tuple(scene for scene in scenes if isinstance(scene, Scene))
+
+    @property
+    def scene(self) -> Scene | None:
+        """The scene of the first segment, for its robot."""
+        return self.scenes[0] if self.scenes else None
+
+    @property
+    def output_weight(self) -> Array:
+        """R of the first segment; the others have as many outputs."""
+        return self.lagrangians[0].output_weight
+
+    @property
+    def output_name(self) -> str:
+        """Name of an output in messages."""
+        return self.lagrangians[0].output_name
+
+    def segments_at(self, t: Array) -> Index:
+        """The number of the segment at each time, (M,); where two meet, that of the later one."""
+        return np.searchsorted(np.array(self.ends), t, side="right")
+
+    def segments_of(self, nodes: Array) -> Index:
+        """The number of the segment of each interval, (N,). nodes: times, (N + 1,), in [s].
+
+        Raises InputError if no node is at the end of a segment, or the motion ends before the last.
+        """
+        require_shape("nodes", nodes, None)
+        if len(nodes) < 2 or not np.isfinite(nodes).all():
+            raise InputError(f"a grid has two or more nodes at finite times, got {len(nodes)}.")
+        for end in self.ends:
+            nearest = float(nodes[np.argmin(np.abs(nodes - end))])
+            if abs(nearest - end) > NODE_TOLERANCE * nodes[-1] or end >= nodes[-1]:
+                raise InputError(
+                    f"a segment ends at {end:g} s, where the grid needs an inner node; its nearest "
+                    f"node is at {nearest:g} s of {nodes[-1]:g} s."
+                )
+        return self.segments_at((nodes[1:] + nodes[:-1]) / 2)
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """L at P points of given times, shape (P,)."""
+        return self._by_segment(lambda L, x, s: (L.value(*x, t=s),), jet, t)[0]
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """Value, gradient and Hessian at points of given times: see Lagrangian.evaluate."""
+        value, g, H = self._by_segment(lambda L, x, s: L.evaluate(*x, t=s), jet, t)
+        return value, g, H
+
+    def output(self, *jet: Array, t: Array | None = None) -> Array:
+        """y at P points of given times, shape (P, m)."""
+        return self._by_segment(lambda L, x, s: (L.output(*x, t=s),), jet, t)[0]
+
+    def _by_segment(
+        self,
+        function: Callable[[Lagrangian, tuple[Array, ...], Array], tuple[Array, ...]],
+        jet: tuple[Array, ...],
+        t: Array | None,
+    ) -> tuple[Array, ...]:
+        """The results of a function of (L, jet, t) at the points of each segment, put together."""
+        if t is None:
+            raise InputError("the Lagrangian of a motion in segments needs t, one time per point.")
+        require_shape("t", t, None)
+        for x in jet:
+            require_shape("every derivative of the jet", x, len(t), None)
+        number = self.segments_at(t)
+        present = np.unique(number) if len(number) else np.array([0])
+        parts = []
+        for s in present:
+            here = number == s
+            parts.append(function(self.lagrangians[s], tuple(x[here] for x in jet), t[here]))
+        order = np.argsort(np.concatenate([np.flatnonzero(number == s) for s in present]))
+        return tuple(np.concatenate(arrays)[order] for arrays in zip(*parts, strict=True))
+
+
+def _require_fitting(first: Lagrangian, other: Lagrangian) -> None:
+    """Raise InputError unless two segments are of one order, on the same vector space."""
+    if isinstance(other, SegmentedLagrangian):
+        raise InputError("a segment of a motion has no segments of its own: list all of them.")
+    if other.space is not None:
+        raise InputError(
+            "segments need joints with nq = nv: lock the others with load_robot(..., locked=[...])."
+        )
+    if other.order != first.order:
+        raise InputError(
+            f"all segments must be of one order, got {first.order} and {other.order}: use "
+            "Lagrangians of the same order."
+        )
+    names = first.coordinates.coordinate_names, other.coordinates.coordinate_names
+    if names[0] != names[1]:
+        raise InputError(
+            "all segments must move the same joints, got "
+            f"{' and '.join(', '.join(each) for each in names)}: use scenes of one robot."
+        )
+    scenes = [isinstance(getattr(each, "scene", None), Scene) for each in (first, other)]
+    sizes = len(first.output_weight), len(other.output_weight)
+    if scenes[0] != scenes[1] or sizes[0] != sizes[1]:
+        raise InputError(
+            "all segments must be about a robot and have its torques as outputs, or none: use the "
+            "effort of scenes, or CasADi Lagrangians alone, all with a scene or all without."
+        )
+    scene = getattr(other, "scene", None)
+    if isinstance(scene, Scene) and scene.passive:
+        raise InputError(
+            f"passive joints are not there for motions in segments, and {scene.passive[0]!r} is "
+            "one: solve each segment as a problem of its own."
+        )
