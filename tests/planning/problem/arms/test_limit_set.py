@@ -17,6 +17,7 @@ from hovi.planning.problem.arms import limit_set as module
 from hovi.planning.problem.arms.limit_set import KIND_WORDS, NAMES, LimitSet, limit_set
 from hovi.planning.problem.limits import KINDS, as_limits, urdf_limits
 from hovi.robot.robot import Robot
+from samples.manifold_robots import chain
 
 SETS = hovi.limit_sets()
 DOCS = Path(__file__).resolve().parents[4] / "docs"
@@ -166,6 +167,15 @@ def test_continuous_joints_have_no_position_limits() -> None:
     assert set(bounds) == set(KIND_WORDS)
     free = [joint for joint, (low, high) in bounds["q"].items() if low == -high == -np.inf]
     assert free == [f"j2s6s200_joint_{i}" for i in (1, 4, 6)]
+
+
+def test_a_joint_that_is_continuous_in_the_urdf_has_none_either() -> None:
+    model = chain([pin.JointModelRX()] * 5 + [pin.JointModelRUBZ()])
+    for i, name in enumerate(SETS["ur5"].joints, start=1):
+        model.names[i] = name
+    limits = as_limits(hovi.load_robot(model), "ur5")
+    assert np.isinf(limits.upper[0]).tolist() == [False] * 5 + [True]
+    assert np.isfinite(limits.upper[1]).all()
 
 
 def test_a_robot_with_other_joints_is_refused_in_one_sentence(ur5: Robot) -> None:
