@@ -23,6 +23,7 @@ SCRIPTS = (
     "replanning",
     "dimensions",
     "peers",
+    "general_costs",
     "work_precision",
     "limits",
     "effects",

@@ -1,9 +1,10 @@
 """hovi's discrete problem as an efficient nonlinear program for Ipopt.
 
-The accelerations at the quadrature points are the controls; q and v there follow from them by the
-scheme's own table; two linear defects per joint connect an interval to the next node; the cost
-contains RNEA. The exact Hessian is generated and interpreted by CasADi, expanded to scalars, or
-assembled from a point kernel compiled by gcc.
+The highest derivatives at the quadrature points are the controls: accelerations, or jerks where the
+jerk costs something. All others there follow from them by the scheme's own table; k linear defects
+per joint connect an interval to the next node for order k; the cost contains RNEA. The exact
+Hessian is generated and interpreted by CasADi, expanded to scalars, or assembled from a point
+kernel compiled by gcc.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import scipy.sparse as sparse
 import hovi
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.planning.solver.solver import guess_path
+from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 
@@ -34,10 +36,10 @@ COMPILE = ("gcc", "-O2", "-march=native", "-shared", "-fPIC")
 
 
 class Transcription:
-    """A problem on a uniform grid over w = (q_0, v_0, a_01 .. a_0Q, q_1, v_1, ...).
+    """A problem on a uniform grid over w = (q_0, v_0, a_01 .. a_0Q, q_1, v_1, ...), for order 2.
 
-    points: (3 n P, W), q, v and a of every quadrature point. defects: (2 n N, W), zero on a motion.
-    weights: quadrature weight of each point, shape (P,).
+    points: ((k + 1) n P, W), q, v, ... of every quadrature point. defects: (k n N, W), zero on a
+    motion. weights: quadrature weight of each point, shape (P,).
     """
 
     def __init__(self, problem: hovi.TrajectoryProblem) -> None:
@@ -45,25 +47,27 @@ class Transcription:
         grid, n = problem.grid, problem.robot.nv
         scheme, h, N = grid.schemes[0], float(grid.steps[0]), grid.intervals
         Q = len(scheme.points)
-        self.n, self.stride = n, Q + 2
-        # as many accelerations as (Z0, Z1, c): these are free @ a
-        free = h**2 * np.linalg.inv(scheme.table[:, 2, 1:])
-        point = np.zeros((Q, 3, Q + 4))  # columns q0, v0, a_1 .. a_Q, q1, v1
+        k = grid.order
+        self.n, self.k, self.stride = n, k, Q + k
+        # as many controls as (Z, c): these are free @ controls
+        free = h**k * np.linalg.inv(scheme.table[:, k, k - 1 :])
+        powers = h ** np.arange(float(k))
+        point = np.zeros((Q, k + 1, Q + 2 * k))  # columns q0, v0, ..., controls, q1, v1, ...
         point[:, 0, 0] = 1.0
-        point[:, :, 1] = h * scheme.table[:, :, 0]
-        point[:, :, 2:-2] = scheme.table[:, :, 1:] @ free
-        point /= h ** np.arange(3.0)[:, None]
-        defect = np.zeros((2, Q + 4))
-        defect[:, 2:-2] = free[:2]
-        defect[0, [0, 1, -2]] = 1.0, h, -1.0  # Z0 = q1 - q0 - h v0
-        defect[1, [1, -1]] = h, -h  # Z1 = h v1 - h v0
+        point[:, :, 1:k] = scheme.table[:, :, : k - 1] * powers[1:]
+        point[:, :, k:-k] = scheme.table[:, :, k - 1 :] @ free
+        point /= h ** np.arange(k + 1.0)[:, None]
+        of_ends = regular_from_nodal(0, k)[k:]  # Z from (q0, h v0, ..., q1, h v1, ...)
+        defect = np.zeros((k, Q + 2 * k))
+        defect[:, k:-k] = free[:k]
+        defect[:, :k], defect[:, -k:] = -of_ends[:, :k] * powers, -of_ends[:, k:] * powers
         self.weights = np.tile(h * scheme.weights, N)
-        self.points = self._along_motion(point.reshape(3 * Q, -1), N)
+        self.points = self._along_motion(point.reshape((k + 1) * Q, -1), N)
         self.defects = self._along_motion(defect, N)
 
     def _along_motion(self, rows: Array, intervals: int) -> ca.DM:
         """The rows of one interval, repeated along the motion and for every joint."""
-        width = intervals * self.stride + 2
+        width = intervals * self.stride + self.k
         blocks = [
             sparse.hstack(
                 [
@@ -81,14 +85,15 @@ class Transcription:
 
     def arguments(self, guess: object) -> dict[str, object]:
         """Initial guess and bounds for the solver: both end states are fixed, all else is free."""
-        path, grid = guess_path(self.problem, guess), self.problem.grid
-        w = np.zeros((grid.intervals * self.stride + 2, self.n))
-        w[0 :: self.stride], w[1 :: self.stride] = path.q, path.v
+        path, grid, k = guess_path(self.problem, guess), self.problem.grid, self.k
+        w = np.zeros((grid.intervals * self.stride + k, self.n))
+        for j in range(k):
+            w[j :: self.stride] = path.nodes[:, j]
         modes = np.concatenate([path.z, path.inner], axis=1)
-        a = np.einsum("qj,kjn->kqn", grid.schemes[0].table[:, 2, 1:], modes)
-        w[:-2].reshape(grid.intervals, self.stride, self.n)[:, 2:] = a
+        controls = np.einsum("qj,kjn->kqn", grid.schemes[0].table[:, k, k - 1 :], modes)
+        w[:-k].reshape(grid.intervals, self.stride, self.n)[:, k:] = controls
         lower, upper = np.full_like(w, -np.inf), np.full_like(w, np.inf)
-        ends = [0, 1, -2, -1]
+        ends = [*range(k), *range(-k, 0)]
         lower[ends] = upper[ends] = w[ends]
         return {"x0": w.ravel(), "lbx": lower.ravel(), "ubx": upper.ravel(), "lbg": 0, "ubg": 0}
 
@@ -117,18 +122,22 @@ class Transcription:
 
     def _variables(self) -> tuple[ca.MX, ca.MX]:
         w = ca.MX.sym("w", self.points.shape[1])
-        return w, ca.reshape(ca.mtimes(self.points, w), 3 * self.n, len(self.weights))
+        jets = ca.mtimes(self.points, w)
+        return w, ca.reshape(jets, (self.k + 1) * self.n, len(self.weights))
 
     def _cost(self, L: ca.Function, p: ca.MX) -> ca.MX:
         return ca.dot(L.map(len(self.weights))(p).T, ca.DM(self.weights))
 
     def _point_functions(self) -> tuple[ca.Function, ca.Function, ca.Function]:
-        """L, (L, dL) and ddL at one point p = (q, v, a)."""
+        """L, (L, dL) and ddL at one point p = (q, v, a), and the jerk for order 3."""
         n = self.n
-        p = ca.SX.sym("p", 3 * n)
+        p = ca.SX.sym("p", (self.k + 1) * n)
         rnea = casadi_functions(self.problem.scene.model).inverse_dynamics
-        tau = ca.cse(rnea(p[:n], p[n : 2 * n], p[2 * n :]))
+        tau = ca.cse(rnea(p[:n], p[n : 2 * n], p[2 * n : 3 * n]))
         L = ca.dot(tau, tau) / 2
+        W = self.problem.scene.terms.jerk_weight
+        if W is not None:
+            L += ca.dot(ca.DM(W), p[3 * n :] ** 2) / 2
         H, g = ca.hessian(L, p)
         return (
             ca.Function("L", [p], [L]),
@@ -140,7 +149,7 @@ class Transcription:
         self, w: ca.MX, p: ca.MX, g: ca.MX, gradient: ca.Function, hessian: ca.Function
     ) -> dict[str, ca.Function]:
         """The derivative functions that nlpsol would otherwise generate."""
-        P, m = len(self.weights), 3 * self.n
+        P, m = len(self.weights), (self.k + 1) * self.n
         W = ca.DM(self.weights)
         nothing, lf, lg = ca.MX.sym("par", 0, 1), ca.MX.sym("lf"), ca.MX.sym("lg", g.shape[0])
         value, slope = gradient.map(P)(p)

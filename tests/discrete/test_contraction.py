@@ -11,26 +11,33 @@ from hovi.discrete.contraction import contract
 
 Array = npt.NDArray[np.float64]
 
-SHAPES = [(1, 1, 4, 1), (3, 4, 6, 6), (2, 2, 4, 7), (5, 3, 5, 2), (2, 5, 8, 13), (1, 4, 6, 31)]
-"""Intervals B, points Q, columns m, components n."""
+Shape = tuple[int, int, int, int, int]
+SHAPES: list[Shape] = [
+    *[(1, 1, 3, 4, 1), (3, 4, 3, 6, 6), (2, 2, 3, 4, 7), (5, 3, 3, 5, 2), (2, 5, 3, 8, 13)],
+    *[(1, 4, 3, 6, 31), (2, 3, 2, 4, 6), (3, 5, 4, 8, 7), (2, 6, 5, 10, 3), (1, 2, 4, 6, 31)],
+]
+"""Intervals B, points Q, rows R, columns m, components n."""
 
 
-def random_batch(B: int, Q: int, m: int, n: int) -> tuple[Array, Array, Array, Array, Array]:
+def random_batch(
+    B: int, Q: int, R: int, m: int, n: int
+) -> tuple[Array, Array, Array, Array, Array]:
     """A table, weights, unequal steps, and gradients and symmetric Hessians at the points."""
     random = np.random.default_rng(B + 10 * Q + 100 * m + 1000 * n)
-    H = random.normal(size=(B * Q, 3 * n, 3 * n))
-    table, weights = random.normal(size=(Q, 3, m)), random.uniform(size=Q)
+    H = random.normal(size=(B * Q, R * n, R * n))
+    table, weights = random.normal(size=(Q, R, m)), random.uniform(size=Q)
     steps = random.uniform(0.1, 2.0, B)
-    return table, weights, steps, random.normal(size=(B * Q, 3 * n)), H + H.transpose(0, 2, 1)
+    return table, weights, steps, random.normal(size=(B * Q, R * n)), H + H.transpose(0, 2, 1)
 
 
 def written_out(
     table: Array, weights: Array, steps: Array, gradient: Array, hessian: Array
 ) -> tuple[Array, Array]:
     """The sums of h w A^T g and h w A^T H A."""
-    B, Q, n = len(steps), len(weights), gradient.shape[1] // 3
-    A = table / steps[:, None, None, None] ** np.arange(3)[:, None]
-    g, H = gradient.reshape(B, Q, 3, n), hessian.reshape(B, Q, 3, n, 3, n)
+    B, Q, R = len(steps), len(weights), table.shape[1]
+    n = gradient.shape[1] // R
+    A = table / steps[:, None, None, None] ** np.arange(R)[:, None]
+    g, H = gradient.reshape(B, Q, R, n), hessian.reshape(B, Q, R, n, R, n)
     hw = steps[:, None] * weights
     return (
         np.einsum("bq,bqri,bqrx->bix", hw, A, g),
@@ -39,18 +46,14 @@ def written_out(
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_contracted_derivatives_equal_the_sums_over_points(
-    shape: tuple[int, int, int, int],
-) -> None:
+def test_contracted_derivatives_equal_the_sums_over_points(shape: Shape) -> None:
     batch = random_batch(*shape)
     for found, expected in zip(contract(*batch), written_out(*batch), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_hessians_are_bitwise_symmetric(
-    shape: tuple[int, int, int, int],
-) -> None:
+def test_hessians_are_bitwise_symmetric(shape: Shape) -> None:
     _, hessian = contract(*random_batch(*shape))
     m = hessian.shape[1]
     for i in range(m):
@@ -59,7 +62,7 @@ def test_hessians_are_bitwise_symmetric(
 
 
 def test_an_interval_has_the_same_bytes_in_every_batch() -> None:
-    table, weights, steps, gradient, hessian = random_batch(3, 4, 6, 6)
+    table, weights, steps, gradient, hessian = random_batch(3, 4, 3, 6, 6)
     together = contract(table, weights, steps, gradient, hessian)
     for k in range(3):
         points = slice(4 * k, 4 * k + 4)
@@ -69,7 +72,7 @@ def test_an_interval_has_the_same_bytes_in_every_batch() -> None:
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
-def test_all_kernels_agree(shape: tuple[int, int, int, int]) -> None:
+def test_all_kernels_agree(shape: Shape) -> None:
     batch = random_batch(*shape)
     fast = contract(*batch)
     slow = tuple(np.empty_like(array) for array in fast)

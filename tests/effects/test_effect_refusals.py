@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
 from hovi.effects import (
     Armature,
+    CasadiCost,
     Custom,
     Drag,
     DryFriction,
@@ -22,11 +24,12 @@ from hovi.effects import (
     Payload,
     PowerCost,
     ReferenceCost,
+    RunningCost,
     VelocityCost,
     ViscousFriction,
     Wrench,
 )
-from hovi.effects.expressions.formula import MAX_CHARACTERS
+from hovi.effects.expressions.formula import MAX_CHARACTERS, Number
 from hovi.errors import SceneError
 from hovi.planning.task_file.reading import load_task
 from hovi.robot.loading import load_robot
@@ -34,6 +37,13 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 TIP = "panda_hand_tcp"
+
+
+def matrix(changes: dict[tuple[int, int], Number]) -> tuple[tuple[Number, ...], ...]:
+    """The identity of the Panda's size with other entries."""
+    return tuple(tuple(changes.get((i, j), float(i == j)) for j in range(7)) for i in range(7))
+
+
 CASES: dict[str, tuple[Effect, str]] = {
     "no direction": (Gravity(9.8, (0.0, 0.0, 0.0)), "direction must be three finite numbers"),
     "gravity upwards": (
@@ -92,7 +102,63 @@ CASES: dict[str, tuple[Effect, str]] = {
     "negative area": (Drag(TIP, -1.0), "area must be finite and 0 or more"),
     "wind of joints": (Drag(TIP, wind=('q["x"]', 0.0, 0.0)), "brackets only after q, v and a"),
     "base on a joint": (MovingBase(("x", 0.0, 0.0)), "names 'x', which is unknown"),
-    "zero weight": (EffortWeight({"panda_joint1": 0.0}), "weight of joint 'panda_joint1' must be"),
+    "negative weight": (
+        EffortWeight({"panda_joint1": -1.0}),
+        "weight of joint 'panda_joint1' must be finite and 0 or more",
+    ),
+    "no effort weight": (EffortWeight(), "needs either weight or matrix; neither was given"),
+    "effort weights twice": (EffortWeight(1.0, ((1.0,),)), "weight or matrix; both were given"),
+    "flat matrix": (EffortWeight(matrix=((1.0, 0.0), (0.0, 1.0))), "needs 7 rows of 7, .* 2, 2"),
+    "no matrix": (EffortWeight(matrix=()), "needs 7 rows of 7, .* got rows of nothing"),
+    "a matrix of one sign": (EffortWeight(matrix=matrix({(1, 2): 0.5})), "symmetric.* 0.5 and 0"),
+    "a matrix of two formulas": (
+        EffortWeight(matrix=matrix({(1, 2): "sin(t)", (2, 1): "cos(t)"})),
+        "must be symmetric, but rows 2 and 3 have 'sin.t.' and 'cos.t.'",
+    ),
+    "an indefinite matrix": (
+        EffortWeight(matrix=matrix({(1, 2): 2.0, (2, 1): 2.0})),
+        "must be positive semidefinite, but has the eigenvalue -1",
+    ),
+    "a matrix of torques": (
+        EffortWeight(matrix=matrix({(0, 0): 'tau["panda_joint1"]'})),
+        "brackets only after q, v and a",
+    ),
+    "a column for a cost": (
+        RunningCost({"x": "tau*v"}),
+        "the term 'x': the formula .* is a column of 7 numbers where one is needed",
+    ),
+    "columns of two sizes": (
+        RunningCost({"x": "dot(tau, base_force)"}),
+        "combines columns of 3 and 7 numbers",
+    ),
+    "a frame's name": (
+        RunningCost({"x": 'velocity["hand", "x"]'}),
+        "names the frame 'hand', which is unknown: did you mean 'panda_hand'",
+    ),
+    "a frame's axis": (
+        RunningCost({"x": 'velocity["panda_hand", "w"]'}),
+        "the component 'w' of 'velocity'",
+    ),
+    "no frame": (RunningCost({"x": "velocity"}), "needs a frame after 'velocity'"),
+    "a joint's axis": (
+        RunningCost({"x": 'tau["panda_joint1", "x"]'}),
+        "the component 'x' of 'tau': give one name in brackets",
+    ),
+    "an unknown axis": (RunningCost({"x": 'base_force["w"]'}), "names the component 'w'"),
+    "a cost of nobody": (RunningCost({"x": 'tau["elbow"]'}), "names the joint 'elbow'"),
+    "an unbounded cost": (RunningCost({"x": np.inf}), "must be a finite number or a formula"),
+    "a cost that is a column": (
+        CasadiCost(lambda q, v, a, tau, t: tau),
+        r"one number as its result, got \(7, 1\)",
+    ),
+    "a cost of other arguments": (
+        CasadiCost(lambda q, v: 1.0),
+        "must map the SX symbols .* to one number, but it failed: .* 5 were given",
+    ),
+    "a cost of other symbols": (
+        CasadiCost(lambda q, v, a, tau, t: tau[0] * ca.SX.sym("gain")),
+        "the result contains gain, which is not among",
+    ),
     "negative cost": (VelocityCost(-1.0), "velocity_cost': weight of joint 'panda_joint1'"),
     "negative reference": (ReferenceCost({}, -1.0), "weight must be finite and 0 or more"),
     "reference of nobody": (ReferenceCost({"joint": 1.0}), "has no joint 'joint'"),

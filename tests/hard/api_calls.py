@@ -235,14 +235,18 @@ def _scenes() -> list[Call]:
             **{"coulomb": {"elbow": 1.0}, "static": {"elbow": 2.0}, "stribeck_velocity": 0.1},
             **{"width": 0.05, "from_urdf": False},
         ),
+        build(e.CasadiCost, cost=_squared_torque()),
         build(e.EffortWeight, weight={"elbow": 2.0}),
+        build(e.EffortWeight, matrix=[[2.0, "sin(t)"], ["sin(t)", 1.0]]),
         build(e.Gravity, acceleration=9.81, direction=(0.0, 0.0, -1.0)),
+        build(e.JerkCost, weight={"shoulder": 1.0, "elbow": 2.0}),
         build(e.JointLimitPotential, ranges={"elbow": (0, 1)}, slope=10.0, width=0.01, stops=False),
         build(e.JointSprings, stiffness={"elbow": 1.0}, rest=0.0),
         build(e.MovingBase, position=(0, 0, "t"), rotation=(0.0, 0.0, 0.0)),
         build(e.Payload, frame="tip", mass=1.0, center=(0, 0, 0), inertia=(1, 1, 1, 0, 0, 0)),
         build(e.PowerCost, weight={"elbow": 1.0}, width=0.1),
         build(e.ReferenceCost, reference={"elbow": "t"}, weight=1.0),
+        build(e.RunningCost, terms={"tip": 'acceleration["tip", "x"]**2', "drives": "dot(tau, v)"}),
         build(e.VelocityCost, weight={"elbow": 1.0}),
         build(e.ViscousFriction, coefficient={"elbow": 1.0}, from_urdf=False),
         build(e.Wrench, frame="tip", force=(1, 0, 0), moment=(0, 0, "t"), axes="world"),
@@ -250,12 +254,18 @@ def _scenes() -> list[Call]:
     return [
         *(call(_scene_with(each.function), **dict(each.keywords)) for each in effects),
         build(hovi.Scene, robot=robot(), effects=[], passive=("elbow",), compile=False),
-        own(scene(), "effort_lagrangian", weight=[1.0, 2.0]),
+        own(scene(), "effort_lagrangian", weight=[1.0, 2.0], regular=True),
         own(scene(), "inverse_dynamics", *[np.zeros((3, 2))] * 3, np.zeros(3)),
         own(scene(), "without", "gravity"),
         call(hovi.Scene.from_dict, scene().to_dict()),
         call(hovi.effects.register, hovi.effects.Gravity),
     ]
+
+
+def _squared_torque() -> ca.Function:
+    """(q, v, a, tau, t) -> tau_1^2 + tau_2^2."""
+    q, v, a, tau = (ca.SX.sym(name, 2) for name in "qvau")
+    return ca.Function("C", [q, v, a, tau, ca.SX.sym("t")], [ca.sumsqr(tau)])
 
 
 def _scene_with(effect: Callable[..., Any]) -> Callable[..., hovi.Scene]:
@@ -364,6 +374,7 @@ def _problems() -> list[Call]:
         call(hovi.Limits.from_dict, limits.to_dict()),
         own(limits, "with_margin", 0.1),
         own(limits, "excess", np.zeros((3, 4, 2))),
+        build(hovi.Limits, lower=-np.ones((6, 2)), upper=np.ones((6, 2)), tolerance=1e-6),
         build(
             hovi.FrameGoal,
             **{"frame": "tip", "position": [0.2, 0.0, 0.0], "rotation": np.eye(3)},
@@ -413,6 +424,7 @@ def _plans() -> list[Call]:
     return [
         call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
+        call(hovi.plan, scene(), *ends, 1.0, smooth=True, **quick),
         build(hovi.PlanOptions, **quick, **options),
         call(hovi.plan_task, _task(), progress=None, intervals=2),
         call(

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hard.mutated_bytes import mutated_bytes
 from hard.verdict import Mutant, Verdict
 from hovi._native import band, dynamics, groups, intervals
 from hovi.dynamics.extension import SymbolicModel, archive
@@ -357,12 +358,12 @@ ENTRIES: dict[str, Entry] = {
     "intervals.contract": Entry(
         intervals.contract,
         {
-            **{"table": _in("Q 3 m"), "weights": _in("Q"), "steps": _in("B")},
+            **{"table": _in("Q R m"), "weights": _in("Q"), "steps": _in("B")},
             **{"columns_gradient": _out("B m n"), "columns_hessian": _out("B m m n n")},
-            **{"gradient": _in("B*Q 3*n"), "hessian": _in("B*Q 3*n 3*n")},
+            **{"gradient": _in("B*Q R*n"), "hessian": _in("B*Q R*n R*n")},
         },
         _PORTABLE,
-        letters={"n": (0, 12), "m": (0, 6)},
+        letters={"n": (0, 12), "m": (0, 6), "R": (2, 5)},
     ),
     "intervals.interpolate": Entry(
         intervals.interpolate,
@@ -639,9 +640,24 @@ def changed(name: str, seed: int, changes: int) -> Arguments:
         key = keys[random.integers(len(keys))]
         if isinstance(arguments[key], np.ndarray):
             ARRAY_CHANGES[random.integers(len(ARRAY_CHANGES))](arguments, key, random)
+        elif arguments[key] == pendulum_archive() and random.integers(4):
+            arguments[key] = damaged(arguments[key], Random(int(random.integers(2**32))))
         elif key in ENTRIES[name].scalars:
             arguments[key] = SCALARS[random.integers(len(SCALARS))]
     return arguments
+
+
+_NUMBERS = (b" -1 ", b" 255 ", b" 4294967296 ", b" 18446744073709551615 ", b" nan ", b" ")
+"""What Boost's reader of archives would take for the size or the index of something."""
+
+
+def damaged(text: str, random: Random) -> str:
+    """The archive of a model with a few random changes; random text once in a while."""
+    if random.random() < 0.05:
+        return random.randbytes(random.randrange(2_000)).decode("latin-1")
+    while (changed := mutated_bytes(text.encode(), random, _NUMBERS)) == text.encode():
+        pass
+    return changed.decode("latin-1")
 
 
 # The fuzzer

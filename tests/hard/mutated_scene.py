@@ -58,6 +58,11 @@ UNUSUAL_VALUES = (
     *("1 h " * 5_000, ["1 s", "2 s"], ["1 s", 2.0], ["2 s", "1 s"], [1.0, "2 sec"]),
     *("galerkin-9", "galerkin-99999999", "mean-difference", "a" * 10_000, "a\nb", "\x9b", 0.3, 2.5),
 )
+FORMULA_PARTS = (
+    *("tau", "v", "a", "q", "t", "pi", "2", "1e308", "0", "+", "*", "-", "/", "**", "(", ")", ","),
+    *('tau["elbow"]', 'q["elbow"]', 'acceleration["tip", "x"]', 'position["tip"]', "[", "]", "."),
+    *("base_force", 'base_moment["z"]', "dot(", "sum(", "sqrt(", "log(", "abs(", "__class__", "'"),
+)
 
 Entry = tuple[dict[str, Any] | list[Any], Any]
 Change = Callable[[dict[str, Any], Random], None]
@@ -181,7 +186,22 @@ def _passed(scene: dict[str, Any], random: Random) -> None:
         scene["via"].pop()
 
 
-_CHANGES: tuple[Change, ...] = (_value, _value, _remove, _rename, _swap, _settings, _passed)
+def _cost(scene: dict[str, Any], random: Random) -> None:
+    """Random formulas and weights: few of them are valid."""
+    text = "".join(random.choice(FORMULA_PARTS) for _ in range(random.randint(1, 9)))
+    formula = random.choice((text, "dot(tau, tau)", f"dot({text}, tau)", f"sum({text})"))
+    effects = scene.setdefault("effects", {})
+    if isinstance(effects, dict):
+        effects["running_cost"] = {"terms": {"first": formula, "second": 1e-3}}
+        weight = random.choice((0.0, 1.0, 1e300, {"elbow": 0.0}, formula))
+        matrix = random.choice(([[1.0, 0.0], [0.0, 0.0]], [[formula, 0.0], [0.0, 1.0]], [[1.0]]))
+        effects["effort_weight"] = random.choice(({"weight": weight}, {"matrix": matrix}, {}))
+
+
+_CHANGES: tuple[Change, ...] = (
+    *(_value, _value, _remove, _rename, _swap, _settings, _passed),
+    _cost,
+)
 
 # Changes that make the file invalid; the docstring is the reason
 

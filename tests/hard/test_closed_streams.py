@@ -5,9 +5,13 @@ Real processes, which end with an exit code, at most one sentence, and the file 
 
 from __future__ import annotations
 
+import fcntl
 import os
+import resource
 import subprocess
 import sys
+import termios
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -130,3 +134,68 @@ def test_progress_raises_nothing_when_its_reader_has_gone(
                 report("later", share)
         monkeypatch.undo()
         os.dup2(os.open(os.devnull, os.O_WRONLY), writer)  # for the buffer that is left
+
+
+PAGE = 4096
+"""Size of the smallest pipe, in bytes."""
+
+
+def left_by_its_reader(
+    words: Sequence[str | Path], room: int, taken: int, largest_file: int | None = None
+) -> tuple[int, str]:
+    """Exit code and stderr of a command whose reader leaves in the middle, as `head` does.
+
+    room: bytes of output that the pipe takes before a write waits. taken: bytes that the command
+    has written when the reader leaves.
+    """
+
+    def limit() -> None:
+        if largest_file is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
+
+    reader, writer = os.pipe()
+    assert fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, PAGE) == PAGE
+    os.write(writer, bytes(PAGE - room))
+    command = [sys.executable, "-u", "-m", "hovi", *map(str, words)]
+    process = subprocess.Popen(
+        command, stdout=writer, stderr=subprocess.PIPE, text=True, preexec_fn=limit
+    )
+    os.close(writer)
+    waiting = bytearray(4)
+    end = time.monotonic() + 60
+    while int.from_bytes(waiting, sys.byteorder) < PAGE - room + taken and process.poll() is None:
+        if time.monotonic() > end:
+            raise TimeoutError("the command writes less than expected")
+        fcntl.ioctl(reader, termios.FIONREAD, waiting)
+        time.sleep(0.01)
+    os.close(reader)
+    _, told = process.communicate(timeout=120)
+    return process.returncode, told
+
+
+@pytest.mark.parametrize("starts", ["1", "3"])  # with worker processes, too
+@pytest.mark.parametrize("within", ["first line", "table"])
+def test_a_reader_that_leaves_ends_a_plan_quietly_and_loses_nothing(
+    within: str, starts: str, tmp_path: Path
+) -> None:
+    """As `hovi plan ... | head -1`. In a table rich ends the process, after replacing stdout."""
+    out = tmp_path / "motion.npz"
+    words = ("plan", "two_link_reach", "--starts", starts, "--out", out)
+    before = len(run(words, ()).stdout.partition("solving")[0]) if within == "table" else 0
+    out.unlink(missing_ok=True)
+    room = before + 100 if before else 5
+    assert left_by_its_reader(words, room, max(before - 40, 0)) == (1, "")
+    assert Trajectory.load(out).duration == 1.0
+
+
+@pytest.mark.parametrize("words", [("--help",), ("info", "panda"), ("simulate", "--help")])
+def test_a_reader_that_leaves_ends_other_commands_quietly(words: Sequence[str]) -> None:
+    assert left_by_its_reader(words, 5, 0) == (1, "")
+
+
+def test_a_plan_that_cannot_be_written_is_reported_though_nobody_reads_it(tmp_path: Path) -> None:
+    out = tmp_path / "motion.npz"
+    code, told = left_by_its_reader(("plan", "two_link_reach", "--out", out), 5, 0, 1000)
+    assert (code, told.count("\n")) == (2, 1)
+    assert str(out) in told
+    assert not out.exists()

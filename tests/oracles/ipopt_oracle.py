@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +15,20 @@ from hovi.planning.problem.problem import TrajectoryProblem
 Array = npt.NDArray[np.float64]
 
 
+Cost = Callable[[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
+"""C of the symbols (q, v, a, tau, t), a number."""
+
+
 def least_action(
-    problem: TrajectoryProblem, guess: DiscretePath, seed: int = 0, move: float = 1e-3
+    problem: TrajectoryProblem,
+    guess: DiscretePath,
+    seed: int = 0,
+    move: float = 1e-3,
+    cost: Cost | None = None,
 ) -> tuple[float, Array]:
     """The cost and the nodes (q, v), shape (N - 1, 2 n), that Ipopt finds near a path.
+
+    cost: instead of 1/2 |tau|^2 of the active joints.
 
     Each unknown of the guess is first moved at random, by `move` or so. The problem's limits hold
     at the quadrature points, and r + 2 moments of every passive joint's torque vanish per interval.
@@ -28,7 +40,8 @@ def least_action(
     ends = [np.concatenate(end)[:, None] for end in ((q0, v0), (q1, v1))]
     all_nodes = ca.horzcat(ends[0], nodes, ends[1])
     left, right = all_nodes[:, :-1], all_nodes[:, 1:]
-    actions, outputs, moments = _interval_action(problem).map(N)(left, right, modes)
+    times = ca.DM(grid.t[None, :-1])
+    actions, outputs, moments = _interval_action(problem, cost).map(N)(left, right, modes, times)
     action = ca.sum2(actions)
     x = ca.vertcat(ca.vec(nodes), ca.vec(modes))
     quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False, "ipopt.tol": 1e-8}
@@ -48,8 +61,8 @@ def least_action(
     return float(result["f"]), found.reshape(N - 1, 2 * n)
 
 
-def _interval_action(problem: TrajectoryProblem) -> ca.Function:
-    """L_d(q0 v0, q1 v1, c) of an interval: h sum_j w_j 1/2 |tau_j|^2 by the scheme's numbers.
+def _interval_action(problem: TrajectoryProblem, cost: Cost | None) -> ca.Function:
+    """L_d(q0 v0, q1 v1, c, t0) of an interval: h sum_j w_j C_j by the scheme's numbers.
 
     And (q, v, a, tau) at its quadrature points, one after the other, and the moments of the passive
     torques against P_0 .. P_{r+1}. Without passive joints there are no moments.
@@ -57,17 +70,21 @@ def _interval_action(problem: TrajectoryProblem) -> ca.Function:
     scheme, h, n = problem.grid.schemes[0], float(problem.grid.steps[0]), problem.robot.nv
     tau = casadi_functions(problem.scene.model).inverse_dynamics
     left, right = ca.SX.sym("left", 2 * n), ca.SX.sym("right", 2 * n)
-    c = ca.SX.sym("c", n, scheme.inner_modes)
+    c, t0 = ca.SX.sym("c", n, scheme.inner_modes), ca.SX.sym("t0")
     q0, v0, q1, v1 = left[:n], left[n:], right[:n], right[n:]
     columns = ca.horzcat(h * v0, q1 - q0 - h * v0, h * (v1 - v0), h**2 * c)
     passive = [int(i) for i in problem.passive]
     active = [i for i in range(n) if i not in passive]
     polynomials = np.polynomial.legendre.legvander(2 * scheme.points - 1, scheme.inner_modes + 1)
     action, outputs, moments = 0, [], 0
-    for weight, rows, P in zip(scheme.weights, scheme.table, polynomials, strict=True):
+    parts = zip(scheme.points, scheme.weights, scheme.table, polynomials, strict=True)
+    for s, weight, rows, P in parts:
         x, hv, hha = ca.horzsplit(columns @ rows.T)
         effort = tau(q0 + x, hv / h, hha / h**2)
-        action += h * weight * ca.sumsqr(effort[active]) / 2
+        if cost is None:
+            action += h * weight * ca.sumsqr(effort[active]) / 2
+        else:
+            action += h * weight * cost(q0 + x, hv / h, hha / h**2, effort, t0 + s * h)
         outputs += [q0 + x, hv / h, hha / h**2, effort]
         moments += weight * effort[passive] @ P[None]
-    return ca.Function("L_d", [left, right, c], [action, ca.vertcat(*outputs), ca.vec(moments)])
+    return ca.Function("L_d", [left, right, c, t0], [action, ca.vertcat(*outputs), ca.vec(moments)])

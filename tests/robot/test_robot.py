@@ -240,6 +240,35 @@ def test_a_mesh_outside_the_package_is_never_read(tmp_path: Path, mesh: str) -> 
     assert load_robot(urdf, package_dirs=[tmp_path / "outside"]).nv == 1
 
 
+@pytest.mark.parametrize("folder", ["/", "/usr/..", "/proc/self/root", "link", "~/.."])
+def test_a_folder_of_everything_is_no_package_folder(
+    tmp_path: Path, folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every file would be inside its package."""
+    monkeypatch.setenv("HOME", str(tmp_path / "home" / "user"))
+    (tmp_path / "home" / "user").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("/")
+    urdf = mesh_arm(tmp_path / "home", "rod.stl")
+    given = str(tmp_path / folder if folder == "link" else Path(folder).expanduser())
+    with pytest.raises(ModelError, match="holds the files of every user") as refused:
+        load_robot(urdf, package_dirs=[given])
+    assert str(refused.value).count("\n") == 0
+    with pytest.raises(ModelError, match="holds the files of every user"):
+        Robot.from_dict(load_robot(urdf).to_dict(), package_dirs=[given])
+    assert load_robot(urdf, package_dirs=[tmp_path / "home" / "user"]).nv == 1
+
+
+def test_a_urdf_among_the_files_of_every_user_shows_none_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "user"))
+    (tmp_path / "user").mkdir()
+    (tmp_path / "user" / "rod.stl").write_text(TRIANGLE)
+    robot = load_robot(mesh_arm(tmp_path, "user/rod.stl"))
+    assert robot.visual is None
+    assert "holds the files of every user" in robot.visual_problem
+
+
 @pytest.mark.parametrize("depth", [1, 2, 3])
 def test_a_folder_above_the_urdf_is_no_package_by_its_name_alone(
     depth: int, tmp_path: Path

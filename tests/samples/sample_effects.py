@@ -11,12 +11,14 @@ from hovi.effects import (
     Effect,
     EffortWeight,
     Gravity,
+    JerkCost,
     JointLimitPotential,
     JointSprings,
     MovingBase,
     Payload,
     PowerCost,
     ReferenceCost,
+    RunningCost,
     VelocityCost,
     ViscousFriction,
     Wrench,
@@ -44,14 +46,21 @@ def sample_effects(robot: Robot) -> dict[str, Effect]:
         EffortWeight({first: 2.0}),
         VelocityCost(0.7),
         AccelerationCost({last: 0.2}),
+        JerkCost(0.3),
         ReferenceCost({last: "0.3*t"}, 4.0),
         PowerCost(0.5, 0.4),
+        RunningCost(
+            {
+                "drives": f'0.3*dot(tau, tau) + exp(-t)*tau["{first}"]*v["{first}"]',
+                "tip": f'0.1*acceleration["{tip}", "z"]**2 + 0.2*a["{last}"]*tau["{first}"]',
+            }
+        ),
     ]
     return {effect.key: effect for effect in effects}
 
 
 def zero_strength_effects(robot: Robot) -> dict[str, Effect]:
-    """The same effects with zero strength, if they have one."""
+    """The same effects with zero strength, if they have one; a cost on the jerk needs a weight."""
     first, tip = robot.coordinate_names[0], robot.tip_frame
     effects: list[Effect] = [
         Gravity(0.0),
@@ -70,5 +79,6 @@ def zero_strength_effects(robot: Robot) -> dict[str, Effect]:
         AccelerationCost(0.0),
         ReferenceCost({first: 1.0}, 0.0),
         PowerCost(0.0),
+        RunningCost({"nothing": "0*dot(tau, v)"}),
     ]
     return {effect.key: effect for effect in effects}

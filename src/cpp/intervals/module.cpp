@@ -48,16 +48,19 @@ void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& st
   table.require_kind("table");
   steps.require_kind("steps");
   columns_gradient.require_kind("columns_gradient");
-  const std::size_t Q = table.shape(0), m = table.shape(2), B = steps.shape(0);
-  const std::size_t n = columns_gradient.shape(2);
-  table.require("table", {Q, 3, m});
+  const std::size_t Q = table.shape(0), R = table.shape(1), m = table.shape(2);
+  const std::size_t B = steps.shape(0), n = columns_gradient.shape(2);
+  using hovi::intervals::least_rows, hovi::intervals::most_rows;
+  if (R < least_rows || R > most_rows)
+    refuse("table must have " + std::to_string(least_rows) + " to " + std::to_string(most_rows) +
+           " rows at a point, got " + std::to_string(R) + ".");
   weights.require("weights", {Q});
-  gradient.require("gradient", {B * Q, 3 * n});
-  hessian.require("hessian", {B * Q, 3 * n, 3 * n});
+  gradient.require("gradient", {B * Q, R * n});
+  hessian.require("hessian", {B * Q, R * n, R * n});
   columns_gradient.require("columns_gradient", {B, m, n});
   columns_hessian.require("columns_hessian", {B, m, m, n, n});
   if (B == 0 || n == 0) return;
-  const hovi::intervals::Contraction shape{B,           Q, m, n, table.data(), weights.data(),
+  const hovi::intervals::Contraction shape{B, Q,           R, m, n, table.data(), weights.data(),
                                            steps.data()};
   const nb::gil_scoped_release released;
   const auto work = allocate(kernels(portable).workspace_size(shape));

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.guess import Curve, cubic, stretched, with_turns
+from hovi.discrete.guess import Curve, cubic, hermite, stretched, with_turns
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -27,29 +27,31 @@ NEARER_RESOLVED_SHARE = 0.99
 def guess_curve(
     name: str, problem: TrajectoryProblem, resolved: Trajectory, share: float = RESOLVED_SHARE
 ) -> Curve:
-    """The guess as a curve: times -> q, v and a.
+    """The guess as a curve: times -> q, v and a, and the jerk for order 3.
 
     name: "near" (nine tenths of the resolved motion and one tenth of the cubic between its ends, at
-        most MAX_DISTANCE away, so that all methods converge to the same minimum) or "cubic".
+        most MAX_DISTANCE away, so that all methods converge to the same minimum) or "cubic", which
+        is a quintic for order 3.
     resolved: the motion to be found. share: its fraction in the near guess.
     Raises InputError for an unknown name.
     """
     robot, T = problem.robot, problem.grid.duration
-    plain = cubic(robot, problem.boundary, T)
+    k = problem.ld.k
+    plain = cubic(robot, problem.boundary, T) if k == 2 else hermite(problem.end_jets, T)
     if name == "cubic":
         return with_turns(plain, robot, T, problem.turns) if problem.turns.any() else plain
     if name != "near":
         raise InputError(f"there is no guess {name!r}: {nearest(name, GUESSES)}")
-    motion = stretched(resolved, T)
+    motion = stretched(resolved, T, k)
     turns = _Apart(robot, plain, motion, T).turns
     base = with_turns(plain, robot, T, turns) if turns.any() else plain
     apart = _Apart(robot, base, motion, T)
     share = max(share, 1 - MAX_DISTANCE / max(apart.largest, MAX_DISTANCE))
 
-    def curve(t: Array) -> tuple[Array, Array, Array]:
-        (q0, v0, a0), (_, v1, a1) = base(t), motion(t)
-        q = robot.integrate(q0, share * apart(t))
-        return q, v0 + share * (v1 - v0), a0 + share * (a1 - a0)
+    def curve(t: Array) -> tuple[Array, ...]:
+        (q, *rates), (_, *others) = base(t), motion(t)
+        moved = robot.integrate(q, share * apart(t))
+        return moved, *(x + share * (y - x) for x, y in zip(rates, others, strict=True))
 
     return curve
 

@@ -130,8 +130,10 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
     """The motion that follows from that with heavy rotors, as they become lighter."""
     if isinstance(task.duration, tuple):
         raise UnmeasurableError("rotors need a fixed duration.")
-    grid = Grid.uniform(task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4))
-    options = task.options.on(task.scene.robot)
+    grid = Grid.uniform(
+        task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4, task.scene.order)
+    )
+    options = task.options.on(task.scene)
     job = split_for_charts(Job(task.scene, grid, task.start, task.goal, options), options.guess)
     guess: str | Trajectory = options.guess
     for stage in lighter_rotors(job):
@@ -153,7 +155,7 @@ ATTEMPTS: dict[str, Attempt] = {
 
 def _plan(task: Task, seconds: float, **changes: object) -> Solution:
     """A plan to the tolerance of the search within a time, in [s]."""
-    limits = as_limits(task.scene.robot, task.options.limits)
+    limits = as_limits(task.scene.robot, task.options.limits, task.scene.order)
     limited = bool(limits.bounded.any()) or task.options.clearance.wanted
     tolerance = LIMITED_TOLERANCE if limited else DEFAULT_TOLERANCE
     named = {"scheme": None, "tolerance": tolerance, "time_limit": max(seconds, 1e-3)}

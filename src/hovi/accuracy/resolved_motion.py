@@ -187,8 +187,8 @@ class _Halving:
     def _first_grid(self) -> Grid:
         grid = self.finest.trajectory.grid
         if not self._problem.limited:
-            intervals = _first_intervals(grid)
-            return Grid.uniform(self._problem.grid.duration, intervals, galerkin(INNER_MODES))
+            scheme = galerkin(INNER_MODES, grid.order)
+            return Grid.uniform(self._problem.grid.duration, _first_intervals(grid), scheme)
         fewer = LIMITED_MODES - grid.inner_modes
         return (grid.enriched(fewer) if fewer > 0 else grid).halved()
 

@@ -178,6 +178,7 @@ def default_choice(
     options: of the task. problem: on any grid; its ends and duration are those of the plan.
     """
     unnamed = options.with_changes(scheme=None, intervals=None, tolerance=None, time_weight=0.0)
+    unnamed = unnamed.with_changes(smooth=False)  # the problem has its cost on the jerk already
     first = _on_first_grid(problem, DEFAULT_INTERVALS)
     ends = problem.start, problem.goal, problem.grid.duration
 
@@ -195,5 +196,6 @@ def default_choice(
 
 def _on_first_grid(problem: TrajectoryProblem, intervals: int) -> TrajectoryProblem:
     """The problem on the first grid of a refinement."""
-    grid = first_grid(problem.grid.duration, intervals, smooth=not problem.limited)
+    T, k = problem.grid.duration, problem.ld.k
+    grid = first_grid(T, intervals, smooth=not problem.limited, order=k)
     return on_grid(problem, grid)

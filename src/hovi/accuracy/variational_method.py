@@ -15,7 +15,8 @@ from hovi.errors import ChartError, UnmeasurableError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.effort_lagrangian import EffortLagrangian
-from hovi.schemes import by_name
+from hovi.scene.jerk_lagrangian import JerkLagrangian
+from hovi.schemes import by_name, of_order
 
 SCHEMES = (
     "taylor-midpoint",
@@ -63,7 +64,9 @@ class VariationalMethod(Method):
     ) -> None:
         self._problem, self._guess, self._clock = problem, guess, clock
         self._longest = longest
-        self._scheme = by_name(scheme)
+        self._scheme = of_order(by_name(scheme), problem.ld.k)
+        if self._scheme.derivatives != problem.ld.k:
+            raise UnmeasurableError(f"{scheme} is no scheme for the jerk.")
         self.coarsest = COARSEST_WITHIN_LIMITS if problem.limited else Method.coarsest
         self.name, self.family, self.order = scheme, "hovi", self._scheme.order
 
@@ -103,7 +106,7 @@ def on_grid(problem: TrajectoryProblem, grid: Grid, rebuild: bool = False) -> Tr
     """
     lagrangian = problem.ld.lagrangian
     if rebuild:
-        assert isinstance(lagrangian, EffortLagrangian)
+        assert isinstance(lagrangian, EffortLagrangian | JerkLagrangian)
         scene = copy.copy(problem.scene)  # without the cached functions
         lagrangian = scene.effort_lagrangian(lagrangian.weight)
     return dataclasses.replace(problem, ld=DiscreteLagrangian(lagrangian, grid))

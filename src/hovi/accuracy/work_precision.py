@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 from hovi.accuracy.budget import Budget
@@ -160,17 +161,21 @@ def _methods(
 ) -> tuple[list[Method], list[str]]:
     """hovi's schemes and the reference tools that support the setting; why others do not."""
     longest = LIMITED_SOLVE_SHARE * setting.longest if setting.problem.limited else setting.longest
-    methods: list[Method] = [
-        VariationalMethod(setting.problem, setting.guess, name, setting.clock, longest)
-        for name in schemes
-    ]
+    own = [partial(_own_method, name=name, longest=longest) for name in schemes]
+    makers: list[Callable[[Setting], Method]] = [*own, *peers]
+    methods: list[Method] = []
     left_out = []
-    for peer in peers:
+    for make in makers:
         try:
-            methods.append(peer(setting))
+            methods.append(make(setting))
         except UnmeasurableError as error:
             left_out.append(str(error))
     return methods, list(dict.fromkeys(left_out))
+
+
+def _own_method(setting: Setting, name: str, longest: float | None) -> Method:
+    """A scheme of hovi. Raises UnmeasurableError for one of another order."""
+    return VariationalMethod(setting.problem, setting.guess, name, setting.clock, longest)
 
 
 def _attainable(enough: Thresholds, resolved: ResolvedMotion) -> Thresholds:

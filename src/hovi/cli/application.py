@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import select
 import sys
 import warnings
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from typing import Annotated, Any, TextIO
 
 import typer
@@ -80,12 +81,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    with _copied(sys.stdout) as output:
+        return _run_with(arguments, output)
+
+
+def _run_with(arguments: Sequence[str] | None, output: int | None) -> int:
+    """Run one command. output: a copy of stdout's descriptor, if it has one."""
     stdout, stderr = sys.stdout, sys.stderr
     try:
         code = app(args=arguments, prog_name="hovi", standalone_mode=False)
-    except SystemExit as error:  # how typer ends where a pipe is broken, whichever it is
+    except SystemExit as error:  # how typer and rich end where a pipe is broken, whichever it is
         sys.stdout, sys.stderr = stdout, stderr
-        if not isinstance(error.__context__, BrokenPipeError) or _has_no_reader(stdout):
+        if not isinstance(error.__context__, BrokenPipeError) or _has_no_reader(output):
             return OUTPUT_FAILED
         return _report_error(
             "the connection to another process broke; if it was a worker of several starts, memory "
@@ -119,13 +126,29 @@ def _with_own_warnings(others: Callable[..., None]) -> Any:
     return show
 
 
-def _has_no_reader(stream: TextIO) -> bool:
-    """Whether a stream is a pipe, socket or terminal whose other end is closed."""
-    poll = select.poll()
+@contextmanager
+def _copied(stream: TextIO) -> Iterator[int | None]:
+    """A copy of a stream's descriptor; None if it has none or the system refuses one more.
+
+    A copy, since rich redirects stdout itself to /dev/null when its reader has gone.
+    """
     try:
-        poll.register(stream.fileno(), 0)
-    except OSError:  # no file
+        copy = os.dup(stream.fileno())
+    except OSError:
+        copy = None
+    try:
+        yield copy
+    finally:
+        if copy is not None:
+            os.close(copy)
+
+
+def _has_no_reader(descriptor: int | None) -> bool:
+    """Whether a descriptor is a pipe, socket or terminal whose other end is closed."""
+    if descriptor is None:
         return False
+    poll = select.poll()
+    poll.register(descriptor, 0)
     return bool(poll.poll(0))
 
 

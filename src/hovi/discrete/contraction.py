@@ -15,21 +15,19 @@ def contract(
 ) -> tuple[Array, Array]:
     """Gradient and Hessian of sum_q h w_q L(A_q x) in the m columns x of every interval.
 
-    A_q = table_q / (1, h, h^2) maps the columns to (q, v, a) at a point, so these are the sums of
-    h w_q A_q^T g_q and h w_q A_q^T H_q A_q with the derivatives g_q, H_q of L there. Tables of
-    order k have k + 1 rows at each point.
+    A_q = table_q / (1, h, h^2, ...) maps the columns to (q, v, ...) at a point, so these are the
+    sums of h w_q A_q^T g_q and h w_q A_q^T H_q A_q with the derivatives g_q, H_q of L there. Tables
+    of order k have R = k + 1 rows at each point.
 
-    table: shape (Q, 3, m). weights: w, shape (Q,). steps: h of the intervals, shape (B,).
-    gradient: of L at the B Q points, 3 n entries each. hessian: symmetric, (3 n)^2 entries each.
+    table: shape (Q, R, m). weights: w, shape (Q,). steps: h of the intervals, shape (B,).
+    gradient: of L at the B Q points, R n entries each. hessian: symmetric, (R n)^2 entries each.
     Returns gradient (B, m, n) and hessian (B, m, m, n, n).
     """
     Q, rows, m = table.shape
-    if rows != 3:
-        return _contract_any(table, weights, steps, gradient, hessian)
     P = len(steps) * Q
     g = np.ascontiguousarray(gradient.reshape(P, -1))
-    n = g.shape[1] // 3
-    H = np.ascontiguousarray(hessian.reshape(P, 3 * n, 3 * n))
+    n = g.shape[1] // rows
+    H = np.ascontiguousarray(hessian.reshape(P, rows * n, rows * n))
     columns_gradient = np.empty((len(steps), m, n))
     columns_hessian = np.empty((len(steps), m, m, n, n))
     h = np.ascontiguousarray(steps)
@@ -37,21 +35,3 @@ def contract(
         np.ascontiguousarray(table), weights, h, g, H, columns_gradient, columns_hessian
     )
     return columns_gradient, columns_hessian
-
-
-def _contract_any(
-    table: Array, weights: Array, steps: Array, gradient: Array, hessian: Array
-) -> tuple[Array, Array]:
-    """As `contract`, for a table of any order k, of shape (Q, k + 1, m)."""
-    (Q, rows, m), B = table.shape, len(steps)
-    g = gradient.reshape(B, Q, rows, -1)
-    n = g.shape[3]
-    powers = steps[:, None] ** -np.arange(float(rows))  # (B, k + 1)
-    weighted = (steps[:, None] * weights)[:, :, None] * powers[:, None]  # (B, Q, k + 1)
-    columns = table.reshape(Q * rows, m).T
-    g = np.matmul(columns, (g * weighted[..., None]).reshape(B, Q * rows, n))
-    H = hessian.reshape(B, Q, rows, n, rows, n).transpose(0, 1, 2, 4, 3, 5)
-    H = H * (weighted[:, :, :, None] * powers[:, None, None, :])[..., None, None]
-    pairs = np.einsum("qri,qsj->ijqrs", table, table).reshape(m * m, -1)
-    H = np.matmul(pairs, H.reshape(B, Q * rows * rows, n * n))
-    return g, H.reshape(B, m, m, n, n)

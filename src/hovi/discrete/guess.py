@@ -116,7 +116,8 @@ def with_bump(base: Curve, coordinates: Coordinates, duration: float, seed: int)
     x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed,
     decreasing like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
 
-    base: the curve. duration: T, in [s]. seed: of the coefficients.
+    base: the curve, up to the jerk on vector spaces. duration: T, in [s]. seed: of the
+        coefficients.
     """
     random = np.random.default_rng(seed)
     j = np.arange(1, BUMP_MODES + 1)
@@ -124,14 +125,16 @@ def with_bump(base: Curve, coordinates: Coordinates, duration: float, seed: int)
     c = amplitude * random.standard_normal((BUMP_MODES, coordinates.nv)) / np.sqrt(j)[:, None]
     w = np.pi / duration
 
-    def curve(t: Array) -> tuple[Array, Array, Array]:
-        q, v, a = base(t)
+    def curve(t: Array) -> tuple[Array, ...]:
+        q, v, a, *jerk = base(t)
         # sin(s) sin(j s) = (cos((j-1) s) - cos((j+1) s)) / 2
         low, high = np.outer(t, j - 1) * w, np.outer(t, j + 1) * w
         x = (np.cos(low) - np.cos(high)) / 2
         dx = (-(j - 1) * np.sin(low) + (j + 1) * np.sin(high)) * w / 2
         ddx = (-((j - 1) ** 2) * np.cos(low) + (j + 1) ** 2 * np.cos(high)) * w**2 / 2
-        return coordinates.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
+        moved = coordinates.chart.composed((q, v, a), x @ c, dx @ c, ddx @ c)
+        dddx = ((j - 1) ** 3 * np.sin(low) - (j + 1) ** 3 * np.sin(high)) * w**3 / 2
+        return (*moved, *(each + dddx @ c for each in jerk))
 
     return curve
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
@@ -9,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.errors import InputError, nearest
+from hovi.errors import HoviWarning, InputError, nearest
+from hovi.robot.robot import Robot
+from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
@@ -190,3 +193,14 @@ def as_state(state: State | npt.ArrayLike | str, coordinates: Coordinates) -> St
     if isinstance(state, str):
         return State(coordinates.pose(state))
     return state if isinstance(state, State) else State(state)
+
+
+def warn_of_degrees(robot: Robot, configurations: Sequence[Array]) -> None:
+    """Warn if angles of successive configurations (nq,) of a motion look like degrees."""
+    index, coordinates = robot.space.plain
+    q = np.stack(configurations)[:, index]
+    names = [robot.coordinate_names[i] for i in coordinates]
+    angles = ~robot.sliding[coordinates]
+    note = angles_in_degrees(names, angles, q, robot.lower[index], robot.upper[index])
+    if note:
+        warnings.warn(f"{note}; configurations are in radians.", HoviWarning, stacklevel=4)

@@ -37,6 +37,8 @@ Index = npt.NDArray[np.intp]
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
 _PATH = ("q", "v", "z", "inner", "higher")
 _TORQUE, _HIGHER = "tau", "higher"
+FEW_SAMPLES = 64
+"""Number of samples up to which repeated positions are not looked for."""
 
 
 class Sample(NamedTuple):
@@ -138,7 +140,7 @@ class Trajectory:
     def jet(self, t: npt.ArrayLike, order: int = 2) -> tuple[Array, ...]:
         """(q, v, a) of `sample`, without computing torques.
 
-        order: the highest derivative, up to that of the Lagrangian if it is above 2: 3 for jerk.
+        order: the highest derivative: 3 for the jerk, or that of the Lagrangian; up to 2 on groups.
         """
         return self._interpolate(*self._locate(t), order)
 
@@ -193,9 +195,10 @@ class Trajectory:
 
     def _interpolate(self, k: Index, s: Array, order: int) -> tuple[Array, ...]:
         """(q, v, ..., q^(order)), each (M, n): rows(s) @ (h v0, Z, c) in the interval's chart."""
-        top = max(2, self.grid.order)
-        if not 0 <= order <= top:
-            raise InputError(f"this motion has derivatives up to {top}, not {order}.")
+        most = max(2 if self.space is not None else 3, self.grid.order)
+        if not 0 <= order <= most:
+            raise InputError(f"this motion has derivatives up to {most}, not {order}.")
+        top = max(2, self.grid.order, order)
         h, path = self.grid.steps[k][:, None], self.path
         scaled = np.empty((len(k), top + 1, path.v.shape[1]))
         for scheme, members in self.grid.groups:
@@ -318,7 +321,14 @@ def _check_shapes(trajectory: Trajectory) -> None:
 
 
 def _rows(scheme: Scheme, s: Array, top: int) -> Array:
-    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r)."""
+    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r).
+
+    Samples of many intervals mostly have the same positions s, of which each is evaluated once.
+    """
+    if len(s) > FEW_SAMPLES:
+        known, index = np.unique(s, return_inverse=True)
+        if len(known) < len(s) / 2:
+            return _rows(scheme, known, top)[index]
     if scheme.derivatives >= top:
         return scheme.rows(s)
     return jet_rows(s, scheme.derivatives, scheme.inner_modes, top)

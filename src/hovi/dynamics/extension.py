@@ -6,6 +6,7 @@ are found by name once they are loaded.
 
 from __future__ import annotations
 
+import zlib
 from importlib.metadata import version
 
 import casadi  # noqa: F401  (loads libcasadi)
@@ -30,13 +31,15 @@ __all__ = ["BuildMismatchError", "SymbolicModel", "archive"]
 
 
 def archive(model: pin.Model) -> str:
-    """Pinocchio's text archive of a model, which only the same version of Pinocchio can read.
+    """Pinocchio's text archive of a model, after its CRC-32 in hexadecimal and a space.
+
+    Only the same version of Pinocchio can read it, and it trusts every number in it.
 
     Raises BuildMismatchError if the extension was compiled with another version.
     """
     check_version(pin.__version__, pinocchio_version)
     text: str = model.saveToString()
-    return text
+    return f"{zlib.crc32(text.encode()):08x} {text}"
 
 
 def check_version(installed: str, compiled: str) -> None:

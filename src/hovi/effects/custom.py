@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, ClassVar
 import casadi as ca
 
 from hovi.effects.effect import Effect, Touch
-from hovi.effects.expressions.formula import Number, Symbols, expression
-from hovi.effects.expressions.joint_positions import positioned, positions
+from hovi.effects.expressions.formula import Number, expression
+from hovi.effects.expressions.formula_symbols import joint_symbols
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 
@@ -50,12 +50,12 @@ class Custom(Effect):
                     f"{nearest(joint, names)}"
                 )
             what = f"effect 'custom': torque_of joint {joint!r}"
-            rows[names.index(joint)] = expression(what, given, _by_joint(robot, symbols))
+            rows[names.index(joint)] = expression(what, given, joint_symbols(robot, symbols))
         return ca.vertcat(*rows) if self.torque_of else None
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
         """The formula for the cost."""
-        cost = expression("effect 'custom': cost", self.cost, _by_joint(robot, symbols))
+        cost = expression("effect 'custom': cost", self.cost, joint_symbols(robot, symbols))
         return None if cost.is_zero() else cost
 
     def describe(self) -> str:
@@ -63,11 +63,3 @@ class Custom(Effect):
         parts = [f"tau of {joint} += {given}" for joint, given in self.torque_of.items()]
         parts += [] if self.cost == 0 else [f"cost += {self.cost}"]
         return "custom: " + ("; ".join(parts) or "nothing")
-
-
-def _by_joint(robot: Robot, symbols: SceneSymbols) -> Symbols:
-    """q, v and a by coordinate name, and t."""
-    names, q = robot.coordinate_names, positions(robot, symbols.q)
-    by_name = (dict(zip(names, ca.vertsplit(x), strict=True)) for x in (symbols.v, symbols.a))
-    v, a = by_name
-    return {"t": symbols.t, "q": {names[i]: q[i] for i in positioned(robot)}, "v": v, "a": a}

@@ -43,6 +43,8 @@ class Effect(ABC):
     """Name of the effect's table in a scene file."""
     touches: ClassVar[tuple[Touch, ...]] = (Touch.TORQUE,)
     """What it modifies; a scene refuses an effect that modifies anything else."""
+    storable: ClassVar[bool] = True
+    """Whether its fields are data that files contain."""
 
     def __post_init__(self) -> None:
         """Convert lists to tuples, so that effects read from a file equal those written.
@@ -68,15 +70,23 @@ class Effect(ABC):
         return None
 
     def potential(self, robot: Robot, symbols: SceneSymbols) -> ca.SX | None:
-        """Its term V in the cost L~ = 1/2 tau^T R tau + V, a scalar; or None."""
+        """Its term V(q, v, a, t) in the cost L~ = 1/2 tau^T R tau + V + C, a scalar; or None."""
         return None
 
-    def effort_cost(self, robot: Robot, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """Its term phi(tau, v) in the cost, a scalar; or None."""
+    def running_cost(self, robot: Robot, symbols: SceneSymbols, tau: ca.SX) -> ca.SX | None:
+        """Its term C(q, v, a, tau, t) in the cost, a scalar; or None.
+
+        tau: the joint torques as symbols of their own, (nv,) in [N m] or [N]. A cost that does not
+        depend on them is better a potential, which is evaluated without their derivatives.
+        """
         return None
 
     def effort_weight(self, robot: Robot) -> Array | None:
         """R of the cost 1/2 tau^T diag(R) tau, shape (nv,); or None."""
+        return None
+
+    def jerk_weight(self, robot: Robot) -> Array | None:
+        """W of the cost 1/2 j^T diag(W) j on the jerk, shape (nv,), positive; or None."""
         return None
 
     @abstractmethod

@@ -10,6 +10,7 @@ import numpy as np
 
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
+from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
 
 if TYPE_CHECKING:
@@ -38,10 +39,10 @@ class PowerCost(Effect):
                 f"effect 'power_cost': width must be positive and finite, got {self.width} W."
             )
 
-    def effort_cost(self, robot: Robot, tau: ca.SX, v: ca.SX) -> ca.SX:
+    def running_cost(self, robot: Robot, symbols: SceneSymbols, tau: ca.SX) -> ca.SX:
         """The weighted smoothed power."""
         weight = joint_values(robot, "effect 'power_cost': weight", self.weight, 0)
-        power = ca.sqrt((tau * v) ** 2 + self.width**2) - self.width
+        power = ca.sqrt((tau * symbols.v) ** 2 + self.width**2) - self.width
         return ca.dot(ca.DM(weight), power)
 
     def describe(self) -> str:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import MAX_INTERVALS, DiscretePath, Grid
 from hovi.discrete.guess import regularized
-from hovi.discrete.state import State, as_state
+from hovi.discrete.state import State, as_state, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.flows.group_lagrangian import ChartedLagrangian
@@ -147,6 +147,7 @@ def simulate(
     else:
         ld = ChartedLagrangian(forced, free.space, table, h)
     q, v = as_state(start, scene.robot).on(scene.robot, "start")
+    warn_of_degrees(scene.robot, [q])
     x, p = legendre(free, q, v)
     return Simulation(scene, free, flow(ld, x, p, intervals, force=True))
 

@@ -170,6 +170,16 @@ def minimize_bounded(
     return outcome
 
 
+def _until_falling(decrease: Callable[[float], float], shares: Array) -> list[float]:
+    """The decreases of descending shares, up to the second in a row that is smaller."""
+    known: list[float] = []
+    for share in shares:
+        known.append(decrease(float(share)))
+        if len(known) > 2 and known[-1] < known[-2] < known[-3]:
+            break
+    return known
+
+
 class _Iteration(Generic[X]):
     """The main loop: solve a subproblem, accept or reject its step, reduce mu when converged."""
 
@@ -244,7 +254,7 @@ class _Iteration(Generic[X]):
             return before - after - smooth
 
         shares = barrier.max_share(np.where(matched, ds, 0.0)) * STEP_FRACTIONS
-        decreases = np.array([decrease(share) for share in shares])
+        decreases = np.array(_until_falling(decrease, shares))
         # the largest share whose decrease equals the best up to rounding
         noise = 1e-13 * self._scale()
         best = int(np.argmax(decreases >= np.max(decreases) - noise))

@@ -19,7 +19,7 @@ import pinocchio as pin
 from hovi.errors import ModelError
 from hovi.robot.example_robots import example_robot
 from hovi.robot.model import build_full_model, couplings_in, locked_and_coupled
-from hovi.robot.source import RobotSource
+from hovi.robot.source import RobotSource, holds_all_files
 from hovi.robot.urdf.check import checked_urdf
 from hovi.robot.urdf.mesh_contents import (
     one_line,
@@ -75,6 +75,11 @@ def find_mesh(filename: str, source: RobotSource, drawn: bool = False) -> Path:
     try:
         candidates = list(_candidates(filename, source))
         for root, path in candidates:
+            if holds_all_files(root):
+                raise ModelError(
+                    f"mesh {_short(filename)} is looked for in {str(root)!r}, which holds the "
+                    "files of every user: put the URDF and its meshes into a folder of their own."
+                )
             if not is_inside(path, root):
                 raise ModelError(
                     f"mesh {_short(filename)} lies outside {str(root)!r}: mesh names must stay "

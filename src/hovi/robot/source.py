@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from hovi.errors import ModelError
@@ -21,13 +24,15 @@ class RobotSource:
     reference: the name of the file, the example or the model; never a path.
     urdf: the text of the URDF; None for kind "model".
     sha256: of that text in UTF-8, in hexadecimal.
-    package_dirs: folders in which `package://` meshes are looked up.
+    package_dirs: folders in which `package://` meshes are looked up, none of which holds the files
+        of every user.
     locked: joints fixed at the neutral configuration, which are not part of the model.
     free_flyer: whether the base floats.
     folder: folder of the URDF file, for its meshes; "" if unknown.
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
     srdf: the text of the SRDF, or None.
     mimic: whether joints with a <mimic> tag follow their leaders.
+    Raises ModelError for such a folder.
     """
 
     kind: SourceKind
@@ -41,6 +46,14 @@ class RobotSource:
     armature: tuple[tuple[str, float], ...] = ()
     srdf: str | None = field(default=None, repr=False)
     mimic: bool = False
+
+    def __post_init__(self) -> None:
+        for folder in self.package_dirs:
+            if holds_all_files(folder):
+                raise ModelError(
+                    f"package_dirs names {folder!r}, which holds the files of every user, so that "
+                    "meshes could be read from anywhere: name the folder of the packages."
+                )
 
     def to_dict(self) -> dict[str, Any]:
         """A JSON-compatible dictionary without local paths."""
@@ -82,6 +95,24 @@ class RobotSource:
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
             mimic="mimic" in data and _entry(data, "mimic", bool),
         )
+
+
+def holds_all_files(folder: str | Path) -> bool:
+    """Whether a folder is the root of the file system or another one above the home folder.
+
+    Links are followed, and bind mounts are noticed.
+    """
+    above = {Path(os.sep)}
+    with suppress(RuntimeError, OSError):  # a user without a home
+        above |= set(Path.home().resolve().parents)
+    return any(_is_same(Path(folder), each) for each in above)
+
+
+def _is_same(folder: Path, other: Path) -> bool:
+    try:
+        return folder.samefile(other)
+    except (OSError, ValueError):  # no folder at all, or a NUL in its name
+        return False
 
 
 def text_hash(text: str) -> str:

@@ -12,7 +12,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.dynamics.torque_model import TorqueModel
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
+from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
 from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms, add_weights
 from hovi.scene.squared_effort import expand_squares, predict, weighted_square
 from hovi.scene.terms import SceneTerms
@@ -34,22 +34,22 @@ class EffortScene(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class EffortLagrangian(Lagrangian):
-    """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v): the cost of control as a Lagrangian on T^(2)Q.
+    """L~ = 1/2 tau^T diag(R) tau + V + C: the cost of control as a Lagrangian on T^(2)Q.
 
     [ColomboFerraroMartin2016, section 5]
 
     torques: tau(q, v, a, t).
     scene: the scene that defines it.
-    potential: V with gradient (3 nv) and Hessian (3 nv, 3 nv), or None if V = 0.
-    weight: R, shape (nv,).
-    torque_velocity_cost: phi, or None if it is zero.
+    weight: R, shape (nv,), 0 or more.
+    potential: V(q, v, a, t), or None if it is zero.
+    running_cost: C(q, v, a, tau, t), or None if it is zero.
     """
 
     torques: TorqueModel
     scene: EffortScene
     weight: Array
     potential: PotentialTerm | None = None
-    torque_velocity_cost: TorqueVelocityCost | None = None
+    running_cost: RunningCostTerm | None = None
     order: int = 2
 
     @property
@@ -111,13 +111,13 @@ class EffortLagrangian(Lagrangian):
         return self.torques.expand(q, v, a, t, R, curvature)[2]
 
     def value(self, *jet: Array, t: Array | None = None) -> Array:
-        """1/2 tau^T diag(R) tau + V + phi, shape (P,)."""
+        """1/2 tau^T diag(R) tau + V + C, shape (P,)."""
         tau = self.output(*jet, t=t)
         value = 0.5 * np.vecdot(tau, self.weight * tau)
         if self.potential is not None:
             value = value + self.potential.value(*jet, t=t)
-        if self.torque_velocity_cost is not None:
-            value = value + self.torque_velocity_cost.value(tau, jet[1])
+        if self.running_cost is not None:
+            value = value + self.running_cost.value(*jet, tau=tau, t=t)
         return np.asarray(value)
 
     def integral(
@@ -127,14 +127,14 @@ class EffortLagrangian(Lagrangian):
         total = weighted_square(outputs, self.weight, weights)
         if self.potential is not None:
             total += float(weights @ self.potential.value(*jet, t=t))
-        if self.torque_velocity_cost is not None:
-            total += float(weights @ self.torque_velocity_cost.value(outputs, jet[1]))
+        if self.running_cost is not None:
+            total += float(weights @ self.running_cost.value(*jet, tau=outputs, t=t))
         return total
 
     def gradient(
         self, *jet: Array, t: Array | None = None, terms: PointTerms | None = None
     ) -> Array:
-        """The gradient J^T R tau + dV + dphi, shape (P, 3, nv).
+        """The gradient J^T R tau + dV + dC, shape (P, 3, nv).
 
         terms: contributions of limits and multipliers.
         """
@@ -142,8 +142,9 @@ class EffortLagrangian(Lagrangian):
         tau, J = self.torques.linearize(q, v, a, t)
         force = None if terms is None else terms.output_gradient
         _, gradient = expand_squares(tau, self.weight, J, force)
-        if self.torque_velocity_cost is not None:
-            gradient = gradient + self.torque_velocity_cost.expand(tau, v, J)[1]
+        if self.running_cost is not None:
+            at = self.running_cost.derivatives(q, v, a, tau=tau, t=t)
+            gradient = gradient + self.running_cost.gradient(at, J)
         if terms is not None:
             gradient += terms.jet_gradient
         if self.potential is not None:
@@ -171,10 +172,11 @@ class EffortLagrangian(Lagrangian):
         """
         q, v, a = jet
         R = self.weight if terms is None else self.weight + terms.output_weight
-        if self.torque_velocity_cost is not None:
+        at = None
+        if self.running_cost is not None:
             tau = self.torques.torque(q, v, a, t)
-            given = self.weight * tau if multiplier is None else multiplier
-            multiplier = given + self.torque_velocity_cost.slope(tau, v)
+            at = self.running_cost.derivatives(q, v, a, tau=tau, t=t)
+            multiplier = at.torque + (self.weight * tau if multiplier is None else multiplier)
         tau, J, hessian = self.torques.expand(q, v, a, t, R, multiplier)
         force = None if terms is None else terms.output_gradient
         value, gradient = expand_squares(tau, self.weight, J, force)
@@ -184,7 +186,7 @@ class EffortLagrangian(Lagrangian):
         if self.potential is not None:
             V, dV, ddV = self.potential.expand(q, v, a, t=t)
             value, gradient, hessian = value + V, gradient + dV, hessian + ddV
-        if self.torque_velocity_cost is not None:
-            phi, dphi, ddphi = self.torque_velocity_cost.expand(tau, v, J)
-            value, gradient, hessian = value + phi, gradient + dphi, hessian + ddphi
+        if self.running_cost is not None and at is not None:
+            value, gradient = value + at.value, gradient + self.running_cost.gradient(at, J)
+            hessian = hessian + self.running_cost.hessian(at, J)
         return PointExpansion(value, gradient, hessian, tau, J)

@@ -17,13 +17,15 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
-from hovi.effects import REGISTRY, Effect
+from hovi.effects import REGISTRY, Effect, EffortWeight
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.robot.mimic_model import PortableModel, check_coupling
 from hovi.robot.robot import Robot
-from hovi.scene.cost_terms import PotentialTerm, TorqueVelocityCost
+from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.evaluation_cost import SceneAccount, account
+from hovi.scene.jerk_lagrangian import JerkLagrangian
+from hovi.scene.regular_cost import require_regular
 from hovi.scene.terms import SceneTerms
 
 Array = npt.NDArray[np.float64]
@@ -91,7 +93,7 @@ class Scene:
     @cached_property
     def terms(self) -> SceneTerms:
         """The terms that effects add to RNEA and to the cost, as expressions."""
-        return SceneTerms(self.robot, self.effects)
+        return SceneTerms(self.robot, self.effects, self.model)
 
     @cached_property
     def passive_coordinates(self) -> npt.NDArray[np.intp]:
@@ -101,27 +103,55 @@ class Scene:
         return np.sort(np.concatenate([np.zeros(0, dtype=np.intp), *indices]))
 
     @property
+    def order(self) -> int:
+        """The order of its effort Lagrangian: 2, or 3 with a cost on the jerk."""
+        return 2 if self.terms.jerk_weight is None else 3
+
+    @property
     def analytic(self) -> bool:
         """Whether the derivatives of RNEA are analytic."""
         return not self._without_kernel
 
-    def effort_lagrangian(self, weight: npt.ArrayLike | None = None) -> EffortLagrangian:
-        """L~ = 1/2 tau^T diag(R) tau + V + phi(tau, v) on T^(2)Q.
+    def effort_lagrangian(
+        self, weight: npt.ArrayLike | None = None, *, regular: bool = True
+    ) -> EffortLagrangian | JerkLagrangian:
+        """L~ = 1/2 tau^T diag(R) tau + V(q, v, a, t) + C(q, v, a, tau, t) on T^(2)Q.
 
-        weight: R, shape (nv,); by default that of the effect `effort_weight`, or ones. Weights of
-            passive joints are set to zero, since their torque vanishes.
+        With the effect `jerk_cost` it is L~ + 1/2 j^T diag(W) j on T^(3)Q.
+
+        weight: R, shape (nv,), 0 or more; by default that of the effect `effort_weight`, or ones.
+            Weights of passive joints are set to zero, since their torque vanishes.
             [ColomboFerraroMartin2016, section 5]
-        Raises ModelError for joints of an unsupported kind.
+        regular: refuse a cost that is singular in a. A cost with a jerk need not be regular in a.
+        Raises SceneError for invalid weights and singular costs, ModelError for joints of an
+        unsupported kind.
         """
         require_known_joints(self.robot)
-        R = self.terms.effort_weight if weight is None else np.asarray(weight, dtype=np.float64)
-        passive = self._is_passive
-        if R.shape != passive.shape or not (np.isfinite(R).all() and (R[~passive] > 0).all()):
+        active = ~self._is_passive
+        R = np.where(active, self._effort_weight(weight), 0.0)
+        found = EffortLagrangian(self.torques, self, R, self._potential, self._running_cost)
+        W = self.terms.jerk_weight
+        if W is not None:
+            return JerkLagrangian(found, W)
+        if regular and (self._running_cost is not None or not R[active].all()):
+            require_regular(found, self.robot, active)
+        return found
+
+    def _effort_weight(self, given: npt.ArrayLike | None) -> Array:
+        """R, or the one of the effects."""
+        R = self.terms.effort_weight if given is None else np.asarray(given, dtype=np.float64)
+        if R.shape != (self.robot.nv,) or not (np.isfinite(R).all() and (R >= 0).all()):
             raise SceneError(
-                f"weight needs {self.robot.nv} positive numbers, one per joint coordinate, got {R}."
+                f"weight needs {self.robot.nv} numbers of 0 or more, one per joint coordinate, "
+                f"got {R}."
             )
-        R = np.where(passive, 0.0, R)
-        return EffortLagrangian(self.torques, self, R, self._potential, self._torque_velocity_cost)
+        full = any(isinstance(each, EffortWeight) and each.matrix for each in self.effects)
+        if full and given is not None:
+            raise SceneError(
+                "weight cannot replace the matrix of the scene's effect 'effort_weight': leave out "
+                "one of them."
+            )
+        return R
 
     def inverse_dynamics(
         self, q: npt.ArrayLike, v: npt.ArrayLike, a: npt.ArrayLike, t: npt.ArrayLike | None = None
@@ -139,20 +169,21 @@ class Scene:
         return dataclasses.replace(self, effects=kept)
 
     def graph(self) -> ca.Function:
-        """(q, v, a, t) -> (tau, L~), as one expression graph."""
+        """(q, v, a, t) -> (tau, L~), as one expression graph, without a cost on the jerk."""
         symbols, added = self.terms.symbols, self.terms.torque
         tau = inverse_dynamics(self.model, symbols.base, *symbols.columns())
         tau = tau if added is None else tau + added
         weight = np.where(self._is_passive, 0.0, self.terms.effort_weight)
         cost = ca.dot(ca.DM(weight), tau**2) / 2
-        for more in (self.terms.potential, self._drive_cost(tau, symbols.v)):
+        for more in (self.terms.potential, self._cost_of(tau)):
             cost = cost if more is None else cost + more
         return ca.Function("scene", [*symbols.columns()], [tau, cost])
 
     def evaluation(self) -> Callable[..., Any]:
         """(q, v, a, t) -> L~ with its derivatives at a batch of points, as in an optimiser step."""
-        lagrangian = self.effort_lagrangian()
-        return lambda q, v, a, t: lagrangian.expand(q, v, a, t=t)
+        lagrangian = self.effort_lagrangian(regular=False)
+        more = lagrangian.order - 2
+        return lambda q, v, a, t: lagrangian.expand(q, v, a, *[np.zeros_like(a)] * more, t=t)
 
     def account(self) -> SceneAccount:
         """The cost of each effect in instructions and in measured time."""
@@ -174,6 +205,12 @@ class Scene:
     def to_dict(self) -> dict[str, Any]:
         """The scene as JSON-compatible data, including the text of the URDF."""
         for effect in self.effects:
+            if not effect.storable:
+                raise SceneError(
+                    f"effect {effect.key!r} holds a function, which files do not contain: write it "
+                    "as formulas of hovi.effects.RunningCost, or as an effect of your own with "
+                    "@hovi.effects.register."
+                )
             if REGISTRY.get(effect.key) is not type(effect):
                 raise SceneError(
                     f"effect {effect.key!r} is not registered, so it cannot be stored: put "
@@ -214,14 +251,14 @@ class Scene:
         )
 
     @cached_property
-    def _torque_velocity_cost(self) -> TorqueVelocityCost | None:
-        tau, v = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.v
-        phi = self._drive_cost(tau, v)
-        return None if phi is None else TorqueVelocityCost(tau, v, phi, self.compile)
+    def _running_cost(self) -> RunningCostTerm | None:
+        tau, columns = ca.SX.sym("tau", self.robot.nv), self.terms.symbols.columns()
+        C, space = self._cost_of(tau), self.robot.curved_space
+        return None if C is None else RunningCostTerm(columns, tau, C, self.compile, space)
 
-    def _drive_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """phi(tau, v) of the drives: what is left of a passive joint's torque costs nothing."""
-        return self.terms.effort_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau, v)
+    def _cost_of(self, tau: ca.SX) -> ca.SX | None:
+        """C(q, v, a, tau, t): what is left of a passive joint's torque costs nothing."""
+        return self.terms.running_cost(ca.DM(np.where(self._is_passive, 0.0, 1.0)) * tau)
 
     def _derivatives(self) -> str:
         if self.analytic:

@@ -11,6 +11,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
+import pinocchio as pin
 
 from hovi.effects import Effect, SceneSymbols, Touch
 from hovi.errors import SceneError
@@ -23,17 +24,18 @@ Array = npt.NDArray[np.float64]
 class SceneTerms:
     """The sums of the terms that effects add to RNEA and to the cost.
 
-    robot: of the scene. effects: its effects.
+    robot: of the scene. effects: its effects. model: its own, with gravity, armature and payload.
     Properties raise SceneError for an effect that modifies more than its `touches`.
     """
 
     robot: Robot
     effects: Sequence[Effect]
+    model: pin.Model
 
     @cached_property
     def symbols(self) -> SceneSymbols:
         """The symbols of the expressions, with the motion of the base."""
-        symbols = SceneSymbols.of(self.robot)
+        symbols = SceneSymbols.of(self.robot, self.model)
         motions = [effect.base(self.robot, symbols) for effect in self.effects]
         named = [motion for motion in motions if motion is not None]
         return dataclasses.replace(symbols, base=named[0]) if named else symbols
@@ -48,9 +50,9 @@ class SceneTerms:
         """V of the effects, a scalar; or None."""
         return self._sum(Touch.COST, "potential", self.symbols)
 
-    def effort_cost(self, tau: ca.SX, v: ca.SX) -> ca.SX | None:
-        """phi(tau, v) of the effects, a scalar; or None."""
-        return self._sum(Touch.COST, "effort_cost", tau, v)
+    def running_cost(self, tau: ca.SX) -> ca.SX | None:
+        """C(q, v, a, tau, t) of the effects, a scalar; or None. tau: shape (nv,)."""
+        return self._sum(Touch.COST, "running_cost", self.symbols, tau)
 
     @cached_property
     def effort_weight(self) -> Array:
@@ -60,14 +62,22 @@ class SceneTerms:
         return named[0] if named else np.ones(self.robot.nv)
 
     @cached_property
+    def jerk_weight(self) -> Array | None:
+        """W of the effect that defines it, shape (nv,); None without a cost on the jerk."""
+        weights = [effect.jerk_weight(self.robot) for effect in self.effects]
+        return next((weight for weight in weights if weight is not None), None)
+
+    @cached_property
     def timed(self) -> tuple[str, ...]:
         """Keys of the effects whose torque, cost or base motion depends on time."""
         resting, robot = dataclasses.replace(self.symbols, base=None), self.robot
+        tau = ca.SX.sym("tau", robot.nv)
         timed = []
         for effect in self.effects:
             terms = (
                 effect.torque(robot, resting),
                 effect.potential(robot, resting),
+                effect.running_cost(robot, resting, tau),
                 effect.base(robot, resting),
             )
             if any(term is not None and ca.depends_on(term, resting.t) for term in terms):

@@ -18,7 +18,7 @@ from hovi.schemes.classic import (
     taylor_trapezoid,
     trapezoid_difference,
 )
-from hovi.schemes.galerkin_table import galerkin, is_galerkin
+from hovi.schemes.galerkin_table import galerkin, is_galerkin, of_order
 from hovi.schemes.interval_curve import end_basis, gamma, inverse_gamma
 from hovi.schemes.regularity import is_regular, regularity_matrix, require_regular
 from hovi.schemes.scheme import Scheme
@@ -68,6 +68,7 @@ __all__ = [
     "is_galerkin",
     "is_regular",
     "mean_difference",
+    "of_order",
     "regularity_matrix",
     "require_regular",
     "taylor_midpoint",

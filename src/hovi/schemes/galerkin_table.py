@@ -70,3 +70,15 @@ def is_galerkin(scheme: Scheme) -> bool:
     r, k, points = scheme.inner_modes, scheme.derivatives, len(scheme.points)
     known = 0 <= r <= MAX_INNER_MODES and k <= MAX_DERIVATIVES and r + k <= points <= MAX_POINTS
     return known and scheme.key == _table(r, k, points).key
+
+
+def of_order(scheme: Scheme, k: int) -> Scheme:
+    """The member of the family with as many inner modes for Lagrangians of order k.
+
+    With as many quadrature points, if it has other ones than r + k. Other schemes are unchanged.
+    """
+    r, points = scheme.inner_modes, len(scheme.points)
+    if scheme.derivatives == k or not is_galerkin(scheme):
+        return scheme
+    own = points == r + scheme.derivatives
+    return galerkin(r, k, None if own else max(points, r + k))

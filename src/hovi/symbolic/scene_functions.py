@@ -23,9 +23,16 @@ def torques(scene: Scene) -> ca.Function:
 def lagrangian(scene: Scene) -> ca.Function:
     """L~ of a scene, 1/2 |tau|^2 and the costs that its effects add: (q, v, a, t) -> L~.
 
+    With the effect `jerk_cost` it is (q, v, a, j, t) -> L.
     Raises ModelError for joints of an unsupported kind.
     """
-    return _graph(scene, 1, "L")
+    effort, W = _graph(scene, 1, "L"), scene.terms.jerk_weight
+    if W is None:
+        return effort
+    q, v, a, t = (ca.SX.sym(each, *effort.size_in(i)) for i, each in enumerate(ARGUMENTS))
+    j = ca.SX.sym("j", *a.shape)
+    cost = effort(q, v, a, t) + ca.dot(ca.DM(W), j**2) / 2
+    return ca.Function("L", [q, v, a, j, t], [cost], ["q", "v", "a", "j", "t"], ["L"])
 
 
 def _graph(scene: Scene, index: int, name: str) -> ca.Function:

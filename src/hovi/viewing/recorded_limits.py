@@ -26,8 +26,8 @@ def imposed_limits(trajectory: Trajectory) -> Limits | None:
         limits = Limits.from_dict(data)
     except (InputError, KeyError, TypeError, ValueError):
         return None
-    shape = (4, trajectory.v.shape[1])
-    fits = limits.lower.shape == limits.upper.shape == shape
+    fits = limits.lower.shape[1] == trajectory.v.shape[1]
+    fits = fits and not (limits.on_rates and trajectory.grid.order < 3)
     return limits if fits and limits.bounded.any() else None
 
 

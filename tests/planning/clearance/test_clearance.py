@@ -14,6 +14,7 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Obstacle, Sphere
+from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -157,3 +158,14 @@ def test_the_shipped_scene_keeps_its_margin_at_ten_thousand_samples(ur5: hovi.Ro
     assert solution.success, solution.message
     assert solution.n_neg == 0
     assert least_distance(solution.trajectory, ur5, kept) >= kept.margin
+
+
+@pytest.mark.parametrize(("missing", "is_infeasible"), [(5e-10, False), (5e-9, True)])
+def test_an_end_may_miss_the_margin_by_a_nanometre(
+    arm_scene: hovi.Scene, missing: float, is_infeasible: bool
+) -> None:
+    """The ball at the tip hangs 2.5 m below the base, straight above the obstacle."""
+    height = 2.5 + 0.06 + 0.05 + 0.05 - missing
+    given = problem(arm_scene, Sphere([0.0, 0.0, -height], 0.05))
+    words = contradiction(given, as_limits(arm_scene.robot, "none"))
+    assert bool(words) == is_infeasible

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -164,3 +166,38 @@ def test_a_flat_mesh_is_refused_by_name() -> None:
     robot = load_robot(model, collision=geometry)
     with pytest.raises(ModelError, match=r"'sheet'.*no convex hull"):
         convex_geometry(robot)
+
+
+class Counting(Distances):
+    """Counts the pairs whose nearest points are looked at for a derivative."""
+
+    counted = 0
+
+    def _record(self, contacts: Any, p: int, pairs: npt.NDArray[np.intp]) -> None:
+        self.counted += len(pairs)
+        super()._record(contacts, p, pairs)
+
+
+def test_pairs_30_cm_beyond_the_margin_need_no_derivative(two_link: Robot) -> None:
+    margin = 0.1
+    distances = Counting(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2)))
+    q = np.linspace([0.0, 0.0], [0.6, 0.6], 50)
+    d = distances.values(q)
+    near = int(np.sum(d < margin + 0.3))
+    assert 0 < near < d.size
+    ClearanceOutputs(distances, margin).expand(q, np.zeros(d.shape))
+    assert distances.counted == near
+
+
+def test_only_pairs_with_a_force_bend_the_motion(two_link: Robot) -> None:
+    """Forces below a hundredth of the largest count as none."""
+    outputs = ClearanceOutputs(Distances(two_link, Clearance(Sphere([1.9, 0.0, 0.4], 0.2))), 0.3)
+    q = around([0.1, 0.3], width=0.05)
+    y = outputs.values(q)
+    assert (y < 1.0).all()  # in reach, and not levelling off
+    force = np.zeros(y.shape)
+    force[:, tip_column(outputs.distances)] = 1.0
+    alone = outputs.expand(q, force)[1]
+    for small, counts in ((9e-3, False), (2e-2, True)):
+        more = np.where(force > 0, force, small)
+        assert np.array_equal(outputs.expand(q, more)[1], alone) != counts

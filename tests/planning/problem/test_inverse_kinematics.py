@@ -59,3 +59,13 @@ def test_every_pose_that_is_reached_within_limits_is_found(ur5: Robot) -> None:
         found = inverse_kinematics(ur5, goal, near, -bound, bound)
         assert found.reason == ""
         assert (np.abs(found.q) <= bound).all()
+
+
+@pytest.mark.parametrize(("beyond", "is_met"), [(-1e-3, True), (0.0, True), (4e-6, False)])
+def test_a_goal_a_few_micrometres_beyond_the_reach_is_not_met(
+    two_link: Robot, beyond: float, is_met: bool
+) -> None:
+    """The arm reaches 2.5 m, the sum of its links."""
+    goal = hovi.FrameGoal("tip", position=[0.0, 0.0, -2.5 - beyond])
+    found = inverse_kinematics(two_link, goal, np.array([-1.2, 0.3]))
+    assert (found.reason == "") == is_met

@@ -14,7 +14,7 @@ from hovi.effects import Gravity
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy, Round, Tolerance
-from hovi.planning.refinement.adaptive import refine_to_tolerance, solve_to_tolerance
+from hovi.planning.refinement.adaptive import first_grid, refine_to_tolerance, solve_to_tolerance
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
 from hovi.planning.search.planner import plan
@@ -306,3 +306,14 @@ def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scen
     assert ended.cost == best.cost
     assert accuracy_of(ended).error >= best.error
     assert accuracy_of(ended).error < 0.5 * finished[0].error
+
+
+def test_the_first_grids_are_those_that_the_page_on_tolerances_states() -> None:
+    """docs/tolerance.md: of 16 intervals 10, and 40 at most; 60 at most where kinks are."""
+    for intervals, number in ((1, 1), (2, 1), (16, 10), (60, 40), (1000, 40)):
+        for more_points, name in ((False, "galerkin-4"), (True, "galerkin-4x10")):
+            grid = first_grid(1.5, intervals, more_points=more_points)
+            assert (grid.intervals, grid.schemes[0].name) == (number, name)
+    for intervals, number in ((1, 1), (16, 16), (60, 60), (1000, 60)):
+        grid = first_grid(1.5, intervals, smooth=False)
+        assert (grid.intervals, grid.schemes[0].name) == (number, "galerkin-2x8")

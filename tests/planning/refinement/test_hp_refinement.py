@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from hovi.discrete.grid import DiscretePath, Grid
@@ -15,6 +16,8 @@ from hovi.planning.refinement.hp_refinement import (
 )
 from hovi.schemes import galerkin
 from hovi.schemes.polynomials import interval_rows
+
+Array = npt.NDArray[np.float64]
 
 
 def projected(grid: Grid, singularity: float) -> DiscretePath:
@@ -156,3 +159,62 @@ def test_an_interval_without_decay_is_split_into_four() -> None:
     demand = Demand(np.array([1.0, 1e-12, 1.0]), 2)
     finer = refined(grid, np.array([0.1, 0.97, 0.1]), [demand])
     np.testing.assert_allclose(finer.steps, [1 / 3, *[1 / 12] * 4, 1 / 3])
+
+
+def least_work(grid: Grid, rho: Array, demand: Demand, joints: int) -> float:
+    """The work of the cheapest grid, from all pairs of numbers of modes, counted out.
+
+    An interval with r modes has r + 2 points, and its Hessian r + 4 columns, those of the scheme
+    with more modes where there are two.
+    """
+    choices: list[list[tuple[int, int] | None]] = []
+    for modes in (2, 3, 4, 5, 6, 8, 10, 12):
+        row: list[tuple[int, int] | None] = []
+        for i, scheme in enumerate(grid.schemes):
+            r = max(modes, scheme.inner_modes)
+            y = (1 / rho[i] - rho[i]) / 2
+            met = [
+                s
+                for s in (1, 2, 3, 4)
+                if 2 * ((r + 2) * np.log(np.sqrt(1 + (s * y) ** 2) - s * y))
+                - 2 * (scheme.inner_modes + 2) * np.log(rho[i])
+                <= np.log(min(demand.factor[i], 1.0)) + 1e-12
+            ]
+            row.append((met[0], r) if met else None)
+        choices.append(row)
+    works = []
+    for k, low in enumerate(choices):
+        for high in choices[k:]:
+            if any(a is None and b is None for a, b in zip(low, high, strict=True)):
+                continue
+            best = [
+                min((c for c in pair if c is not None), key=lambda c: c[0] * (c[1] + 2))
+                for pair in zip(low, high, strict=True)
+            ]
+            largest = max(c[1] for c in high if c is not None)
+            works.append(work_of(best, largest, high is not low, joints))
+    return min(works)
+
+
+def work_of(intervals: list[tuple[int, int]], largest: int, two: bool, joints: int) -> float:
+    """The work of intervals, each as (pieces, modes). two: whether there are two schemes."""
+    points = sum(s * (r + 2) for s, r in intervals)
+    hessians = 0.05 * sum(s for s, _ in intervals) * (largest + 4) ** 2
+    is_split = any(s > 1 for s, _ in intervals)
+    return points + hessians + (900 * two + 900 * is_split) / joints**2
+
+
+def test_no_grid_that_meets_the_demands_takes_less_work() -> None:
+    rng = np.random.default_rng(3)
+    for joints in (1, 4, 12, 60):
+        for _ in range(60):
+            N = int(rng.integers(1, 30))
+            grid = Grid.uniform(1.0, N, galerkin(2))
+            rho, demand = rng.uniform(0.05, 0.6, N), Demand(10 ** rng.uniform(-5, 0, N), 2)
+            found = refined(grid, rho, [demand], joints)
+            cut = np.rint(grid.steps[0] / found.steps).astype(int)
+            starts = np.flatnonzero(np.isin(np.round(found.t[:-1] * N, 9), np.arange(N)))
+            intervals = [(int(cut[i]), found.schemes[i].inner_modes) for i in starts]
+            modes = {r for _, r in intervals}
+            work = work_of(intervals, max(modes), len(modes) > 1, joints)
+            assert work <= least_work(grid, rho, demand, joints) * (1 + 1e-12)

@@ -260,3 +260,19 @@ def test_the_change_that_is_told_is_that_on_the_finer_grid(arm_scene: Scene) -> 
         assert f"a finer grid changes its cost by {told:.2g} %" in found.message
         times += 1
     assert times >= 2
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-3, 1.0, 1e6])
+def test_what_is_resolved_does_not_depend_on_the_unit_of_mass(
+    two_link: Robot, scale: float
+) -> None:
+    """Stiff springs against which a small motion oscillates, and the same with other masses."""
+    model = two_link.model.copy()
+    for i in range(1, model.njoints):
+        body = model.inertias[i]
+        model.inertias[i] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
+    scene = Scene(hovi.load_robot(model), [hovi.effects.JointSprings(1e3 * scale)])
+    grid = Grid.uniform(2.0, 4, by_name("galerkin-2x8"))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    ends = hovi.State([0.0, 0.0]), hovi.State([1e-7, -1e-7])
+    assert hovi.solve(hovi.TrajectoryProblem(ld, *ends)).status is Status.UNRESOLVED

@@ -274,3 +274,20 @@ def test_a_time_limit_is_told_wherever_it_ends_the_search(
     assert "time limit" in found.message
     assert "a minimum of cost" not in found.message
     assert f"{found.trajectory.duration:.10g} s" in found.message
+
+
+def test_each_other_duration_is_tried_from_one_start(two_link: hovi.Robot) -> None:
+    """However many starts the plan has: they follow for the one where a motion was found."""
+    said: list[str] = []
+
+    def progress(text: str, fraction: float) -> None:
+        said.append(text)
+
+    options = {"progress": progress, "continuation": False, "processes": 1, "starts": 3}
+    found = raised(two_link, (0.3, 3.0), time_weight=30.0, **options)
+    assert found.success
+    probes = [i for i, text in enumerate(said) if text.startswith("no minimum for")]
+    assert probes
+    between = said[probes[0] : probes[-1] + 1]
+    assert not any("starts" in text for text in between), said
+    assert "3 of 3 starts" in " ".join(said)

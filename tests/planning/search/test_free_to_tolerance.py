@@ -175,3 +175,26 @@ def test_limits_hold_in_the_best_duration(arm_scene: Scene) -> None:
     assert accuracy_of(found).reached
     t = np.linspace(0.0, found.trajectory.duration, 1001)
     assert np.abs(found.trajectory.sample(t).v).max() <= 4.0 * (1 + 1e-5)
+
+
+def test_a_tolerance_that_is_not_reached_ends_the_search(task: Task) -> None:
+    """No further grid is tried, and no motion refined twice."""
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), Grid.uniform(1.0, 12, galerkin(2)))
+    first = solve_on_grid(TrajectoryProblem(ld, task.start, task.goal))
+    refined: list[Solution] = []
+
+    def refine(solution: Solution) -> Solution:
+        refined.append(in_vain(solution))
+        return refined[-1]
+
+    def on_grid(grid: Grid) -> SolveFor:
+        def solve_for(T: float, guess: Trajectory) -> Solution:
+            ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid.stretched(T))
+            return solve_on_grid(TrajectoryProblem(ld, task.start, task.goal), guess)
+
+        return solve_for
+
+    found = free_to_tolerance(FreeDuration(0.9, 1.1, WEIGHT), on_grid, refine, first)
+    assert len(refined) == 1
+    assert not accuracy_of(found).reached
+    assert accuracy_of(found).rounds == accuracy_of(refined[0]).rounds

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.cli.application import main
 from hovi.errors import InputError
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.tolerance import Tolerance
@@ -70,6 +71,32 @@ def test_a_scheme_is_a_name_or_a_table() -> None:
         PlanOptions(scheme=2)  # type: ignore[arg-type]
 
 
+def test_a_tolerance_and_a_scheme_are_refused_together_as_by_the_command(
+    arm_scene: Scene, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rivals: dict[str, Any] = {"tolerance": 1e-6, "scheme": "galerkin-1"}
+    task = hovi.Task(arm_scene, hovi.State(HANG), hovi.State(REACH_Q), 1.0)
+    for take in (
+        lambda: hovi.plan(arm_scene, HANG, REACH_Q, 1.0, **rivals),
+        lambda: hovi.plan_task(task, **rivals),
+        lambda: PlanOptions(**rivals),
+    ):
+        with pytest.raises(InputError) as refused:
+            take()
+        words = ["--tolerance", "1e-6", "--scheme", "galerkin-1"]
+        assert main(["plan", "two_link_reach", *words]) == 2
+        assert capsys.readouterr().err == f"error: --{refused.value}\n"
+
+
+def test_a_tolerance_replaces_a_scheme_named_before_and_a_scheme_a_tolerance() -> None:
+    by_scheme = PlanOptions(scheme="galerkin-1", intervals=5)
+    by_tolerance = by_scheme.with_changes(tolerance="0.1 mm")
+    assert (by_tolerance.scheme, by_tolerance.effective_tolerance) == (None, "0.1 mm")
+    again = by_tolerance.with_changes(scheme="galerkin-3")
+    assert (again.scheme, again.effective_tolerance, again.intervals) == ("galerkin-3", None, 5)
+    assert again.with_changes(tolerance=None, starts=2).scheme == "galerkin-3"
+
+
 def test_times_may_be_texts(arm_scene: Scene) -> None:
     fixed = {"limits": "none", "time_limit": "1.5 min"}
     one = hovi.plan(arm_scene, HANG, REACH_Q, "500 ms", **fixed)
@@ -88,14 +115,14 @@ def test_distances_of_a_clearance_are_built_once_whatever_else_changes() -> None
     assert options.with_changes(margin=0.1).clearance.margin == 0.1
 
 
-def test_options_are_resolved_for_a_robot(
+def test_options_are_resolved_for_a_scene(
     arm_scene: Scene,
 ) -> None:
-    options = PlanOptions(tolerance="0.1 mm").on(arm_scene.robot)
+    options = PlanOptions(tolerance="0.1 mm").on(arm_scene)
     assert isinstance(options.tolerance, Tolerance)
     assert isinstance(options.limits, hovi.Limits)
     with pytest.raises(InputError, match="no such frame"):
-        PlanOptions(tolerance="1 mm at foot").on(arm_scene.robot)
+        PlanOptions(tolerance="1 mm at foot").on(arm_scene)
 
 
 def test_a_job_is_pickled_without_its_guess(arm_scene: Scene) -> None:

@@ -367,7 +367,7 @@ def test_after_an_interrupt_no_other_minimum_is_compared_with_a_finer_grid(
         ({"time_limit": 0.0}, InputError, "time_limit must be positive, in seconds, got 0"),
         ({"time_limit": -5}, InputError, "time_limit must be positive, in seconds, got -5"),
         ({"time_limit": np.nan}, InputError, "time_limit must be positive, in seconds, got nan"),
-        ({"weight": [1.0]}, SceneError, "weight needs 2 positive numbers"),
+        ({"weight": [1.0]}, SceneError, "weight needs 2 numbers of 0 or more"),
         ({"seed": -1, "starts": 2}, InputError, "seed"),
         ({"seed": 1.5, "starts": 2}, InputError, "seed"),
     ],

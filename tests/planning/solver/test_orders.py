@@ -206,7 +206,7 @@ def test_the_gradient_and_hessian_of_the_action_are_its_derivatives(k: int) -> N
         (2, State([1.0], a=[0.0]), "goal has a or free_acceleration, but motions of order 2"),
         (3, State([1.0], jerk=[0.0]), "values of q, v, a only: leave them out"),
         (3, State([1.0], a=[np.nan]), r"goal.a is nan at joint 'q\[0\]'"),
-        (3, hovi.FrameGoal("tool", position=[0, 0, 1]), "goals of frames are there for .* order 2"),
+        (4, hovi.FrameGoal("tool", position=[0, 0, 1]), "goals of frames .* for .* orders 2 and 3"),
     ],
 )
 def test_ends_of_another_order_are_refused_by_name(k: int, goal: Any, sentence: str) -> None:
@@ -227,6 +227,9 @@ def test_a_third_positional_argument_of_a_state_is_no_acceleration() -> None:
 
 
 def test_limits_of_other_orders_are_refused_by_name() -> None:
-    limits = as_limits(hovi.spline(1, 3).coordinates, {"base": "none", "v": 1.0})
-    with pytest.raises(InputError, match="limits are there for Lagrangians of order 2"):
-        problem_of(hovi.spline(1, 3), 1.0, State([0.0]), State([1.0]), limits=limits)
+    limits = as_limits(hovi.spline(1, 4).coordinates, {"base": "none", "v": 1.0})
+    with pytest.raises(InputError, match="limits are there for Lagrangians of orders 2 and 3"):
+        problem_of(hovi.spline(1, 4), 1.0, State([0.0]), State([1.0]), limits=limits)
+    limits = as_limits(hovi.spline(1, 2).coordinates, {"base": "none", "jerk": 1.0})
+    with pytest.raises(InputError, match=r"the jerk and on the torque rate need .* of order 3"):
+        problem_of(hovi.spline(1, 2), 1.0, State([0.0]), State([1.0]), limits=limits)

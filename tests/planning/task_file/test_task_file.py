@@ -139,6 +139,7 @@ def test_options_without_a_key_are_refused_on_saving(folder: Path) -> None:
 
 def test_scheme_and_tolerance_objects_survive_a_file(folder: Path) -> None:
     task = load_task(write(folder, REACH)).with_options(scheme=galerkin(3))
+    assert load_task(save_task(task, folder / "again.toml")).options.scheme == "galerkin-3"
     tolerances = [
         Tolerance(1e-5),
         Tolerance(1e-4 / 3, Quantity.FRAME, "tip"),
@@ -149,7 +150,15 @@ def test_scheme_and_tolerance_objects_survive_a_file(folder: Path) -> None:
         path = save_task(task.with_options(tolerance=tolerance), folder / "again.toml")
         options = load_task(path).options
         assert Tolerance.of(options.tolerance, task.scene.robot) == tolerance
-        assert options.scheme == "galerkin-3"
+        assert options.scheme is None
+
+
+def test_a_file_names_a_scheme_or_a_tolerance(folder: Path) -> None:
+    line = REACH.splitlines().index("duration = 1.0        # s") + 1
+    sentence = refusal(folder, REACH.replace("duration", "tolerance = 1e-6\nduration", 1))
+    assert f"line {line}: tolerance chooses the scheme and the intervals" in sentence
+    without = REACH.replace('name = "galerkin-2"', "")
+    assert load_task(write(folder, "tolerance = 1e-6\n" + without)).options.tolerance == 1e-6
 
 
 MISTAKES = {

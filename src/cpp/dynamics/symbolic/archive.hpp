@@ -1,7 +1,9 @@
-// Pinocchio's text archive of a model, as `model.saveToString()` writes it in Python.
+// Pinocchio's text archive of a model, after a checksum: what `hovi.dynamics.extension.archive` writes.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <cstdio>
 #include <exception>
 #include <stdexcept>
 #include <string>
@@ -48,11 +50,31 @@ inline bool consistent(const pinocchio::Model& model) {
   return holds && model.nq == nq && model.nv == nv;
 }
 
+// The CRC-32 of zlib, as eight hexadecimal digits.
+inline std::string checksum(const std::string& text, std::size_t from) {
+  std::uint32_t crc = ~std::uint32_t(0);
+  for (std::size_t i = from; i < text.size(); ++i) {
+    crc ^= static_cast<unsigned char>(text[i]);
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ (0xedb88320u & -(crc & 1u));
+  }
+  char digits[9];
+  std::snprintf(digits, sizeof digits, "%08x", unsigned(~crc));
+  return digits;
+}
+
 // Takes a compiler 13 s: for one unit of a module alone. Throws ValueError for any other text.
+//
+// The checksum comes first, since Boost's reader of archives trusts the numbers in them: one changed
+// character may write out of bounds.
 inline pinocchio::Model read_archive(const std::string& archive) {
+  constexpr std::size_t begin = 9;
+  if (archive.size() < begin || archive[begin - 1] != ' ' ||
+      archive.compare(0, begin - 1, checksum(archive, begin)) != 0)
+    throw std::invalid_argument(
+        "archive is damaged, as its checksum shows, or not one of hovi.dynamics.extension.archive.");
   pinocchio::Model model;
   try {
-    model.loadFromString(archive);
+    model.loadFromString(archive.substr(begin));
   } catch (const std::exception& error) {
     throw std::invalid_argument(std::string("archive is not that of a model: ") + error.what());
   }

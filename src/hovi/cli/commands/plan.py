@@ -101,11 +101,12 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
 def _tolerance_override(given: dict[str, Any]) -> dict[str, Any]:
     """A grid given as flags overrides the scene's tolerance. Raises InputError for both."""
     from hovi.errors import InputError
+    from hovi.planning.search.options import TOLERANCE_AND_SCHEME
 
     if "scheme" not in given and "intervals" not in given:
         return {}
     if "tolerance" in given:
-        raise InputError("--tolerance chooses the scheme and the intervals; leave them out.")
+        raise InputError(f"--{TOLERANCE_AND_SCHEME}")
     return {"tolerance": None}
 
 
@@ -154,12 +155,14 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     with progress(quiet=json) as report:
         certificate = _certificate(solution, deadline, report) if certified else None
         margins = _margins(solution, deadline, report)
-    if json:
-        print(as_json(solution, task, written, margins, certificate))
-    else:
-        print_report(solution, task, written, margins, certificate)
-    if save_error is not None:
-        raise save_error
+    try:
+        if json:
+            print(as_json(solution, task, written, margins, certificate))
+        else:
+            print_report(solution, task, written, margins, certificate)
+    finally:  # also where nobody reads the report
+        if save_error is not None:
+            raise save_error
     return 0 if solution.success else 1
 
 

@@ -26,8 +26,8 @@ class LimitMargins:
     """The smallest margin to the limits, per kind and velocity coordinate.
 
     names: of the coordinates.
-    margin: distance to the nearest bound as a fraction of the range, shape (4, nv); negative beyond
-        the bound, infinite where there is none.
+    margin: distance to the nearest bound as a fraction of the range, shape (kinds, nv); negative
+        beyond the bound, infinite where there is none.
     limits: of the plan.
     """
 
@@ -47,7 +47,7 @@ class LimitMargins:
 
     def is_limited(self, kind: str) -> bool:
         """Whether any joint has a limit of this kind."""
-        return bool(self.limits.bounded[KINDS.index(kind)].any())
+        return kind in self.limits.kinds and bool(self.limits.bounded[KINDS.index(kind)].any())
 
     def text(self, kind: str, joint: int) -> str:
         """The margin in percent of the range, marked with * at a limit and ! beyond it."""
@@ -62,7 +62,7 @@ class LimitMargins:
         """The margins, by kind and joint."""
         return {
             kind: dict(zip(self.names, row.tolist(), strict=True))
-            for kind, row in zip(KINDS, self.margin, strict=True)
+            for kind, row in zip(self.limits.kinds, self.margin, strict=True)
         }
 
 

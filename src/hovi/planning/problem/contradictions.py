@@ -30,10 +30,11 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
+    more: Array = problem.end_jets[:, 2:3] if problem.ld.k > 2 else np.zeros((2, 0, len(v0)))
     for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
-        for row in (0, 1):
+        for row, values in enumerate((*state, *more[i])):
             held = ~problem.free_ends[i, row]
-            sentence = _outside(problem.coordinates, end, row, state[row], limits, held)
+            sentence = _outside(problem.coordinates, end, row, values, limits, held)
             if sentence:
                 return sentence
     return (

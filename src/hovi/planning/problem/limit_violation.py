@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Sample, Trajectory
-from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
+from hovi.dynamics.torque_rate import TorqueRate
+from hovi.planning.problem.limits import FIRST_KINDS, KIND_NAMES, KINDS, Limits
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates
@@ -36,8 +37,8 @@ AT_LIMIT = 1e-3
 class Excess:
     """Largest excess over each bound in each interval, as a share of its range; negative inside.
 
-    lower, upper: shape (N, 4, nv). at_lower, at_upper: relative position in the interval of that
-        excess, in [0, 1].
+    lower, upper: shape (N, kinds, nv). at_lower, at_upper: relative position in the interval of
+        that excess, in [0, 1].
     """
 
     lower: Array
@@ -57,16 +58,16 @@ class Excess:
 
 
 def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
-    """The extremes of q, v, a and tau along the interpolant, compared with the limits.
+    """The extremes of the limited quantities along the interpolant, compared with the limits.
 
     Every interval is sampled, and again more densely around all extremes that are near a bound, and
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
     several extremes, and the largest one is not always next to the largest sample.
     """
     raise_if_late()
-    N, nv = trajectory.grid.intervals, trajectory.v.shape[1]
-    outputs = _outputs(trajectory, np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N))
-    outputs = outputs.reshape(N, SAMPLES, 4, nv)
+    N, shape = trajectory.grid.intervals, limits.lower.shape
+    k, s = np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N)
+    outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *shape)
     lower, at_lower = _Side(trajectory, limits, -1.0, limits.lower).extremes(outputs)
     upper, at_upper = _Side(trajectory, limits, 1.0, limits.upper).extremes(outputs)
     return Excess(lower, upper, at_lower, at_upper)
@@ -76,7 +77,7 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
 class _Side:
     """The lower or the upper bounds of a motion's outputs.
 
-    sign: -1 for lower bounds, 1 for upper ones. bound: shape (4, nv).
+    sign: -1 for lower bounds, 1 for upper ones. bound: shape (kinds, nv).
     """
 
     trajectory: Trajectory
@@ -85,9 +86,9 @@ class _Side:
     bound: Array
 
     def extremes(self, outputs: Array) -> tuple[Array, Array]:
-        """The largest excess in each interval, and its relative position, (N, 4, nv) each.
+        """The largest excess in each interval, and its relative position, (N, kinds, nv) each.
 
-        outputs: of all samples, shape (N, SAMPLES, 4, nv).
+        outputs: of all samples, shape (N, SAMPLES, kinds, nv).
         """
         raise_if_late()
         excess = self.sign * (outputs - self.bound) / self.limits.ranges
@@ -117,8 +118,10 @@ class _Side:
         for _ in range(3):
             step = (end - begin) / (REFINED_SAMPLES - 1)
             around = np.minimum(begin[:, None] + step[:, None] * np.arange(REFINED_SAMPLES), 1.0)
-            outputs = _outputs(self.trajectory, np.repeat(k, REFINED_SAMPLES), around.ravel())
-            values = outputs.reshape(len(k), REFINED_SAMPLES, 4, -1)[rows, :, kind, joint]
+            every = np.repeat(k, REFINED_SAMPLES)
+            outputs = _outputs(self.trajectory, every, around.ravel(), self.limits)
+            shape = len(k), REFINED_SAMPLES, *self.bound.shape
+            values = outputs.reshape(shape)[rows, :, kind, joint]
             excess = self.sign * (values - self.bound[kind, joint][:, None])
             excess /= self.limits.ranges[kind, joint][:, None]
             best = np.argmax(excess, axis=1)
@@ -127,9 +130,18 @@ class _Side:
         return excess[rows, best], at
 
 
-def _outputs(trajectory: Trajectory, k: Index, s: Array) -> Array:
-    """(q, v, a, tau) at relative positions s in intervals k, shape (M, 4, nv)."""
-    return _stacked(trajectory.sample_intervals(k, s), trajectory.space)
+def _outputs(trajectory: Trajectory, k: Index, s: Array, limits: Limits) -> Array:
+    """The limited kinds at relative positions s in intervals k, shape (M, kinds, nv)."""
+    if len(limits.kinds) == FIRST_KINDS:
+        return _stacked(trajectory.sample_intervals(k, s), trajectory.space)
+    q, v, a, j = trajectory.jet_intervals(k, s, 3)
+    tau = rate = np.zeros_like(v)
+    if trajectory.scene is not None:
+        t = trajectory.t[k] + s * trajectory.grid.steps[k]
+        tau = trajectory.scene.inverse_dynamics(q, v, a, t)
+        if limits.bounded[KINDS.index("torque_rate")].any():
+            rate = TorqueRate(trajectory.scene.torques, q, v, a, j).value()
+    return np.stack([q, v, a, tau, j, rate], axis=1)
 
 
 def _stacked(motion: Sample, space: ConfigurationSpace | None) -> Array:
@@ -142,7 +154,8 @@ def _stacked(motion: Sample, space: ConfigurationSpace | None) -> Array:
 def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
     """Samples that are local extremes, and are the largest of their output or next to its bound.
 
-    excess: of the samples, shape (N, SAMPLES, 4, nv). largest: of each interval, (N, 4, nv).
+    excess: of the samples, shape (N, SAMPLES, kinds, nv). largest: of each interval, shape
+        (N, kinds, nv).
     """
     padded = np.pad(excess, ((0, 0), (1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
     with np.errstate(invalid="ignore"):
@@ -154,7 +167,7 @@ def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
 def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
     """Samples next to which a parabola through three of them may exceed a bound.
 
-    excess: of the samples, shape (N, SAMPLES, 4, nv). tolerance: of an excess.
+    excess: of the samples, shape (N, SAMPLES, kinds, nv). tolerance: of an excess.
     """
     with np.errstate(invalid="ignore"):
         bend = np.abs(np.diff(excess, 2, axis=1))
@@ -170,7 +183,7 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
     position = excess.at_upper if above else excess.at_lower
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
     s = float(position[k, kind, joint])
-    value = _outputs(trajectory, np.array([k]), np.array([s]))[0, kind, joint]
+    value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
     bound = (limits.upper if above else limits.lower)[kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     unit = coordinates.coordinate_units[joint][kind]
@@ -181,9 +194,9 @@ def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordina
 
 
 def closeness(trajectory: Trajectory, limits: Limits) -> Array:
-    """Smallest distance of each output from its bounds, as a share of its range, (4, nv).
+    """Smallest distance of each output from its bounds, as a share of its range, (kinds, nv).
 
-    Negative where a limit is exceeded, infinite where there is none. Rows as in limits.KINDS.
+    Negative where a limit is exceeded, infinite where there is none. Rows as in limits.kinds.
     """
     excess = excess_along(trajectory, limits)
     return np.asarray(-np.maximum(excess.lower.max(axis=0), excess.upper.max(axis=0)))
@@ -192,4 +205,4 @@ def closeness(trajectory: Trajectory, limits: Limits) -> Array:
 def at_limit(limits: Limits, motion: Sample, robot: Robot | None) -> npt.NDArray[np.bool_]:
     """Which of q, v, a and tau are at a bound, shape (M, 4, nv)."""
     outputs = _stacked(motion, None if robot is None else robot.curved_space)
-    return np.asarray(limits.excess(outputs) >= -AT_LIMIT)
+    return np.asarray(limits.first_kinds.excess(outputs) >= -AT_LIMIT)

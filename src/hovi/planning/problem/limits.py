@@ -1,10 +1,11 @@
-"""Limits: bounds on q, v, a and tau of every joint coordinate."""
+"""Limits: bounds on q, v, a and tau, on the jerk and on d tau / dt of every joint coordinate."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,18 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
 
-KINDS = ("q", "v", "a", "tau")
-"""The limited quantities, in the order in which outputs are stacked."""
-KIND_NAMES = {"q": "position", "v": "velocity", "a": "acceleration", "tau": "torque"}
+KINDS = ("q", "v", "a", "tau", "jerk", "torque_rate")
+"""The limited quantities, in the order of the rows of Limits."""
+FIRST_KINDS = 4
+"""Number of those that motions of every order have; the others need order 3."""
+KIND_NAMES = {
+    "q": "position",
+    "v": "velocity",
+    "a": "acceleration",
+    "tau": "torque",
+    "jerk": "jerk",
+    "torque_rate": "torque rate",
+}
 UNBOUNDED = 1e15
 """Absolute value above which a bound counts as no bound."""
 MIN_RANGE = 1e-12
@@ -36,10 +46,11 @@ TOLERANCE = 1e-6
 @check_arguments
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """lower <= (q, v, a, tau) <= upper along a motion; infinite where there is no limit.
+    """lower <= (q, v, a, tau, jerk, d tau / dt) <= upper; infinite where there is no limit.
 
-    lower, upper: shape (4, nv), one row per kind, in [rad], [rad/s], [rad/s^2] and [N m] (metres
-        and newtons for sliding joints).
+    lower, upper: shape (6, nv), one row per kind, in [rad], [rad/s], [rad/s^2], [N m], [rad/s^3]
+        and [N m/s] (metres and newtons for sliding joints); or only the first four rows, (4, nv).
+        Limits on the jerk and on d tau / dt need a Lagrangian of order 3.
     tolerance: share of its range by which a limit may be exceeded anywhere.
     Raises InputError for NaN and for a range that is empty to rounding.
     """
@@ -49,7 +60,8 @@ class Limits:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        require_shape("lower", self.lower, len(KINDS), None)
+        few = self.lower.shape[:1] == (FIRST_KINDS,)
+        require_shape("lower", self.lower, FIRST_KINDS if few else len(KINDS), None)
         require_shape("upper", self.upper, *self.lower.shape)
         if np.isnan(self.lower).any() or np.isnan(self.upper).any():
             raise InputError("a limit is not a number; use -inf or inf for no bound.")
@@ -63,20 +75,35 @@ class Limits:
 
     @property
     def _empty(self) -> npt.NDArray[np.bool_]:
-        """Where a range is empty to rounding, or beyond UNBOUNDED altogether, shape (4, nv)."""
+        """Where a range is empty to rounding, or beyond UNBOUNDED altogether, (kinds, nv)."""
         size = np.maximum(1.0, np.minimum(np.abs(self.lower), np.abs(self.upper)))
         size[np.isinf(size)] = 1.0
         beyond = (self.lower > UNBOUNDED) | (self.upper < -UNBOUNDED)
         return np.asarray((self.lower + MIN_RANGE * size >= self.upper) | beyond)
 
     @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of the rows: the first four, or all of KINDS."""
+        return KINDS[: len(self.lower)]
+
+    @cached_property
+    def on_rates(self) -> bool:
+        """Whether there is a limit on the jerk or on d tau / dt, of which order 2 knows nothing."""
+        return bool(self.bounded[FIRST_KINDS:].any())
+
+    @property
+    def first_kinds(self) -> Limits:
+        """The limits on q, v, a and tau alone."""
+        return Limits(self.lower[:FIRST_KINDS], self.upper[:FIRST_KINDS], self.tolerance)
+
+    @property
     def bounded(self) -> npt.NDArray[np.bool_]:
-        """Which outputs have at least one bound, shape (4, nv)."""
+        """Which outputs have at least one bound, shape (kinds, nv)."""
         return np.isfinite(self.lower) | np.isfinite(self.upper)
 
     @property
     def ranges(self) -> Array:
-        """Scale of each output: its range, or the size of its only bound, shape (4, nv)."""
+        """Scale of each output: its range, or the size of its only bound, (kinds, nv)."""
         both = self.upper - self.lower
         one = np.where(np.isfinite(self.lower), self.lower, self.upper)
         single = np.maximum(1.0, np.abs(np.where(np.isfinite(one), one, 1.0)))
@@ -107,11 +134,11 @@ class Limits:
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a share of the range; negative inside.
 
-        outputs: (q, v, a, tau) stacked, shape (..., 4, nv).
+        outputs: in the order of `kinds`, shape (..., kinds, nv).
         """
         if outputs.ndim < 2 or outputs.shape[-2:] != self.lower.shape:
             raise InputError(
-                f"outputs must have shape (..., {len(KINDS)}, {self.lower.shape[1]}), got "
+                f"outputs must have shape (..., {', '.join(map(str, self.lower.shape))}), got "
                 f"{outputs.shape}."
             )
         outside = np.maximum(self.lower - outputs, outputs - self.upper)
@@ -127,13 +154,14 @@ class Limits:
 
 def no_limits(coordinates: Coordinates) -> Limits:
     """Limits without any bound."""
-    shape = (4, coordinates.nv)
+    shape = (FIRST_KINDS, coordinates.nv)
     return Limits(np.full(shape, -np.inf), np.full(shape, np.inf))
 
 
 def urdf_limits(robot: Robot) -> Limits:
     """Position, velocity and effort limits of the URDF; 0 or a missing value means no limit."""
-    lower, upper = np.full((4, robot.nv), -np.inf), np.full((4, robot.nv), np.inf)
+    shape = (FIRST_KINDS, robot.nv)
+    lower, upper = np.full(shape, -np.inf), np.full(shape, np.inf)
     if not robot.unplanned_joints:
         iq, iv = robot.space.plain
         lower[0, iv], upper[0, iv] = robot.lower[iq], robot.upper[iq]
@@ -144,25 +172,31 @@ def urdf_limits(robot: Robot) -> Limits:
     return Limits(lower, upper)
 
 
-def as_limits(coordinates: Coordinates, limits: str | Limits | Mapping[str, Any]) -> Limits:
+def as_limits(
+    coordinates: Coordinates, limits: str | Limits | Mapping[str, Any], order: int = 2
+) -> Limits:
     """Limits from a name or a mapping, as `plan` and scene files accept them.
 
     limits: "urdf" (of a robot), "none", the name of an arm of `hovi.limit_sets`, a Limits, or a
         mapping with any of `base` (one of these names, "urdf" by default), `q`, `v`, `a`, `tau`,
-        `margin` and `tolerance`. A kind is a number or a list of numbers x for -x and x, a list of
-        pairs (lower, upper), or a mapping from joint names to either.
+        `jerk`, `torque_rate`, `margin` and `tolerance`. A kind is a number or a list of numbers x
+        for -x and x, a list of pairs (lower, upper), or a mapping from joint names to either.
+    order: of the motion's Lagrangian. What an arm's set says of the jerk and the torque rate
+        applies from order 3 on.
     Raises InputError for unknown keys or joints and for bounds that do not fit the
     coordinates. Warns of ranges of angles that look like degrees.
     """
     if isinstance(limits, Limits):
         return limits
     if not isinstance(limits, Mapping):
-        return _warned_of_degrees(coordinates, _by_name(coordinates, limits))
+        return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
             raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
-    base = _by_name(coordinates, limits.get("base", "urdf"))
+    base = _by_name(coordinates, limits.get("base", "urdf"), order)
+    if not limits.keys().isdisjoint(KINDS[FIRST_KINDS:]):
+        base = _with_all_kinds(base)
     lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):
         for i, (low, high) in _entries(coordinates, kind, limits.get(kind, {})).items():
@@ -188,11 +222,11 @@ def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
     return float(value)
 
 
-def _by_name(coordinates: Coordinates, name: Any) -> Limits:
+def _by_name(coordinates: Coordinates, name: Any, order: int) -> Limits:
     if name == "none":
         return no_limits(coordinates)
     if is_limit_set(name):
-        return _of_arm(coordinates, name)
+        return _of_arm(coordinates, name, order)
     if name != "urdf":
         hint = f": {nearest(name, ('urdf', 'none', *ARMS))}" if isinstance(name, str) else "."
         raise InputError(
@@ -203,16 +237,24 @@ def _by_name(coordinates: Coordinates, name: Any) -> Limits:
     return urdf_limits(coordinates)
 
 
-def _of_arm(coordinates: Coordinates, name: str) -> Limits:
+def _of_arm(coordinates: Coordinates, name: str, order: int) -> Limits:
     """Those of a limit set; joints that its arm does not have keep the limits of the URDF."""
     base = urdf_limits(coordinates) if isinstance(coordinates, Robot) else no_limits(coordinates)
+    base = base if order < 3 else _with_all_kinds(base)
     lower, upper = base.lower.copy(), base.upper.copy()
     bounds = limit_set(name).on(coordinates)
-    for row, kind in enumerate(KINDS[: len(lower)]):
+    for row, kind in enumerate(base.kinds):
         for joint, pair in bounds[kind].items():
             i = coordinates.coordinate_names.index(joint)
             lower[row, i], upper[row, i] = pair
     return Limits(lower, upper)
+
+
+def _with_all_kinds(limits: Limits) -> Limits:
+    """The limits with rows for the jerk and the torque rate, without bounds if they had none."""
+    more = np.full((len(KINDS) - len(limits.kinds), limits.lower.shape[1]), np.inf)
+    lower, upper = np.concatenate([limits.lower, -more]), np.concatenate([limits.upper, more])
+    return Limits(lower, upper, limits.tolerance)
 
 
 def _entries(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[float, float]]:

@@ -41,12 +41,15 @@ from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.robot.mass_matrix import MassMatrix, check_mass_matrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
+from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.scene import Scene, require_known_joints
 from hovi.schemes import require_regular
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+LIMITED_ORDERS = 2, 3
+"""Orders of the Lagrangians whose problems may have limits, obstacles, via points and frames."""
 MORE_MODES = 2
 """Additional inner modes of the problem for error estimates. With one more, both costs may have
 nearly the same error, which their difference would not show."""
@@ -93,6 +96,7 @@ class TrajectoryProblem:
         for scheme, _ in self.grid.groups:
             require_regular(scheme)
         _require_supported(self)
+        object.__setattr__(self, "ld", _with_limited_outputs(self.ld, self.limits))
         if self.about_robot:
             require_plannable(self.scene)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
@@ -307,6 +311,15 @@ class TrajectoryProblem:
         return self.scene.robot if self.about_robot else self.ld.lagrangian.coordinates
 
 
+def _with_limited_outputs(ld: DiscreteLagrangian, limits: Limits | None) -> DiscreteLagrangian:
+    """The discrete Lagrangian, with d tau / dt among its outputs if that is limited."""
+    of = ld.lagrangian
+    limited = limits is not None and limits.on_rates and limits.bounded[-1].any()
+    if not limited or not isinstance(of, JerkLagrangian) or of.torque_rates:
+        return ld
+    return DiscreteLagrangian(of.with_torque_rates(), ld.grid)
+
+
 def _require_supported(problem: TrajectoryProblem) -> None:
     """Raise InputError for what is only there for Lagrangians of order 2."""
     k = problem.ld.k
@@ -318,10 +331,15 @@ def _require_supported(problem: TrajectoryProblem) -> None:
         "goals of frames": isinstance(problem.goal, FrameGoal),
     }
     named = [what for what, is_wanted in wanted.items() if is_wanted]
-    if k != 2 and named:
+    if k not in LIMITED_ORDERS and named:
         raise InputError(
-            f"{' and '.join(named)} are there for Lagrangians of order 2, and this one is of order "
-            f"{k}: leave them out."
+            f"{' and '.join(named)} are there for Lagrangians of orders 2 and 3, and this one is "
+            f"of order {k}: leave them out."
+        )
+    if problem.limits is not None and problem.limits.on_rates and k != 3:
+        raise InputError(
+            "limits on the jerk and on the torque rate need a Lagrangian of order 3: add the "
+            "effect jerk_cost to the scene, plan with smooth=True, or leave them out."
         )
 
 

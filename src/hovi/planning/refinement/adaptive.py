@@ -55,7 +55,7 @@ MAX_POINTS = 400_000
 
 
 def first_grid(
-    duration: float, intervals: int, smooth: bool = True, more_points: bool = True
+    duration: float, intervals: int, smooth: bool = True, more_points: bool = True, order: int = 2
 ) -> Grid:
     """The first grid: galerkin-2x8 on the intervals, or galerkin-4x10 on two thirds of them.
 
@@ -63,13 +63,13 @@ def first_grid(
     motions are smaller, and the decay of the modes can be estimated.
     duration: T, in [s]. intervals: at most MAX_FIRST_INTERVALS are used. smooth: whether the
         motion has no kinks, which limits and via points cause. more_points: False for galerkin-4,
-        which suffices for a smooth motion that the grid resolves.
+        which suffices for a smooth motion that the grid resolves. order: k of the Lagrangian.
     Raises InputError as Grid.uniform does.
     """
     number = min(intervals, MAX_FIRST_INTERVALS)
     if not smooth:
-        return Grid.uniform(duration, number, galerkin_with_more_points(2))
-    scheme = galerkin_with_more_points(4) if more_points else galerkin(4)
+        return Grid.uniform(duration, number, galerkin_with_more_points(2, order))
+    scheme = galerkin_with_more_points(4, order) if more_points else galerkin(4, order)
     return Grid.uniform(duration, max(2 * number // 3, 1), scheme)
 
 

@@ -126,7 +126,7 @@ def finer_solution(
     """
     if problem.limited:
         halves = problem.on(problem.grid.halved())
-        curve = stretched(problem.trajectory(path), problem.grid.duration)
+        curve = stretched(problem.trajectory(path), problem.grid.duration, problem.ld.k)
         return _solved(halves, halves.path(curve), problem, path, time_limit)
     fine = problem.finer
     start = prolonged(path, fine.grid)

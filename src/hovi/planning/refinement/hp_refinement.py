@@ -1,20 +1,23 @@
 """hp refinement: more inner modes where the motion is smooth, shorter intervals elsewhere.
 
-The choice depends on the decay of the Legendre coefficients of an interval's acceleration: they
-decrease like rho^j, with 1/rho the size of the ellipse of analyticity around the interval. More
-modes reduce the error by a factor of rho per mode; splitting the interval reduces rho itself.
+The choice depends on the decay of the Legendre coefficients of q^(k), with k the order of the
+Lagrangian, in an interval: they decrease like rho^j, with 1/rho the size of the ellipse of
+analyticity around the interval. More modes reduce the error by a factor of rho per mode; splitting
+the interval reduces rho itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.schemes import Scheme, galerkin
+from hovi.schemes.interval_curve import end_degrees, inverse_gamma
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -35,7 +38,7 @@ The cost of a point grows like the square of the number of joints; this one is c
 UNRESOLVED_MODES = 6
 """Largest number of inner modes while the motion is not resolved: its decay is not yet known."""
 MORE_POINTS = 4
-"""Quadrature points of an interval beyond r + 2 while the motion is not resolved, so that the
+"""Quadrature points of an interval beyond r + k while the motion is not resolved, so that the
 torque cannot vanish at the points alone."""
 INFEASIBLE_PIECES = 1000
 """Number of pieces that marks a number of modes with which the demands cannot be met."""
@@ -66,22 +69,27 @@ class Demand:
 
 
 def decay(grid: Grid, path: DiscretePath) -> Array:
-    """rho of each interval, from the last four Legendre coefficients of a, shape (N,).
+    """rho of each interval, from the last four Legendre coefficients of q^(k), shape (N,).
 
     Coefficients are taken in pairs of an even and an odd degree, over all joints.
     """
-    z0, z1 = path.z[:, 0], path.z[:, 1]
-    ends = np.stack([z1, 2 * np.sqrt(3) * (z0 - z1 / 2)], axis=1)
-    sizes = np.linalg.norm(np.concatenate([ends, path.inner], axis=1), axis=2)  # (N, 2 + r)
+    ends = np.matmul(first_coefficients(grid.order), path.z)
+    sizes = np.linalg.norm(np.concatenate([ends, path.inner], axis=1), axis=2)  # (N, k + r)
     rho = np.empty(grid.intervals)
     for scheme, index in grid.groups:
-        last = sizes[index, : 2 + scheme.inner_modes][:, -4:]
+        last = sizes[index, : grid.order + scheme.inner_modes][:, -4:]
         if last.shape[1] < 4:
             rho[index] = DECAY_RANGE[1]
             continue
         low, high = np.hypot(last[:, 0], last[:, 1]), np.hypot(last[:, 2], last[:, 3])
         rho[index] = np.sqrt(high / np.maximum(low, np.finfo(float).tiny))
     return np.clip(rho, *DECAY_RANGE)
+
+
+@cache
+def first_coefficients(k: int) -> Array:
+    """From z of an interval to the first k Legendre coefficients of q^(k), up to signs, (k, k)."""
+    return np.asarray(inverse_gamma(k)[np.argsort(end_degrees(k))])
 
 
 def refined(
@@ -96,35 +104,35 @@ def refined(
 
     rho: decay of each interval, shape (N,). joints: degrees of freedom of the robot.
     decay_known: whether that is the decay of the motion; else modes are at most UNRESOLVED_MODES.
-    few_points: whether an interval has r + 2 quadrature points, else MORE_POINTS more.
+    few_points: whether an interval has r + k quadrature points, else MORE_POINTS more.
     An interval whose demands no choice meets is split into four.
     """
     current = np.array([scheme.inner_modes for scheme in grid.schemes])
     allowed = MODES if decay_known else MODES[MODES <= UNRESOLVED_MODES]
     more = np.maximum(allowed, current[:, None])  # (N, D)
-    pieces = _pieces(current, more, rho, demands)
-    low, high = _cheapest(more, pieces, 1.0 / joints**2)
+    pieces = _pieces(current, more, rho, demands, grid.order)
+    low, high = _cheapest(more, pieces, 1.0 / joints**2, grid.order)
     kept, N = np.array([low, high]), np.arange(grid.intervals)
-    choice = kept[np.argmin((pieces * (more + 2))[:, kept], axis=1)]
+    choice = kept[np.argmin((pieces * (more + grid.order))[:, kept], axis=1)]
     cut, modes = pieces[N, choice], more[N, choice]
     steps = np.repeat(grid.steps / cut, cut)
     table = galerkin if few_points else galerkin_with_more_points
-    tables = {int(r): table(int(r)) for r in set(modes)}
+    tables = {int(r): table(int(r), grid.order) for r in set(modes)}
     return Grid(steps, tuple(tables[int(r)] for r in np.repeat(modes, cut)))
 
 
-def galerkin_with_more_points(inner_modes: int) -> Scheme:
-    """The Galerkin scheme for motions that are not resolved yet: MORE_POINTS beyond r + 2."""
-    return galerkin(inner_modes, points=inner_modes + 2 + MORE_POINTS)
+def galerkin_with_more_points(inner_modes: int, k: int = 2) -> Scheme:
+    """The Galerkin scheme for motions that are not resolved yet: MORE_POINTS beyond r + k."""
+    return galerkin(inner_modes, derivatives=k, points=inner_modes + k + MORE_POINTS)
 
 
-def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand]) -> Index:
+def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand], k: int) -> Index:
     """Pieces into which each interval is split with each number of modes, shape (N, D).
 
     INFEASIBLE_PIECES where no number of pieces meets the demands but another number of modes does.
     """
-    after = (more[:, :, None] + 2) * np.log(_decay_of_pieces(rho))[:, None]  # (N, D, S)
-    change = after - ((current + 2) * np.log(rho))[:, None, None]
+    after = (more[:, :, None] + k) * np.log(_decay_of_pieces(rho))[:, None]  # (N, D, S)
+    change = after - ((current + k) * np.log(rho))[:, None, None]
     meets: Mask = np.ones(change.shape, dtype=bool)
     for demand in demands:
         wanted = np.log(np.minimum(demand.factor, 1.0))
@@ -136,16 +144,16 @@ def _pieces(current: Index, more: Index, rho: Array, demands: Sequence[Demand]) 
     return pieces
 
 
-def _cheapest(more: Index, pieces: Index, share: float) -> tuple[int, int]:
+def _cheapest(more: Index, pieces: Index, share: float, k: int) -> tuple[int, int]:
     """Indices in MODES of the cheapest pair of numbers of modes, which may be equal.
 
     share: fixed costs for this number of joints, relative to those for one joint.
     """
     low, high = np.triu_indices(more.shape[1])
-    points = pieces * (more + 2)
+    points = pieces * (more + k)
     count = np.where(points[:, low] <= points[:, high], pieces[:, low], pieces[:, high])
     work = np.minimum(points[:, low], points[:, high]).sum(axis=0)
-    work = work + HESSIAN_COST * count.sum(axis=0) * (more.max(axis=0)[high] + 4) ** 2
+    work = work + HESSIAN_COST * count.sum(axis=0) * (more.max(axis=0)[high] + 2 * k) ** 2
     work += share * (SCHEME_COST * (low != high) + SPLIT_COST * (count > 1).any(axis=0))
     best = int(np.argmin(work))
     return int(low[best]), int(high[best])

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
-from hovi.planning.problem.limits import TOLERANCE
+from hovi.planning.problem.limits import KINDS, TOLERANCE
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
@@ -38,13 +38,15 @@ def cost_of_tolerance(solution: Solution) -> float:
 
 
 def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:
-    """Ranges of (q, v, a), shape (3 nv,), and of the outputs; 0 where there is no limit."""
+    """Ranges of the jet, ((k + 1) nv,), and of the outputs; 0 where there is no limit."""
     outputs = len(problem.ld.lagrangian.output_weight)
     limits, nv = problem.limits, problem.coordinates.nv
-    ranges = np.zeros((4, nv))
+    ranges = np.zeros((len(KINDS), nv))
     if limits is not None:
-        ranges[limits.bounded] = limits.ranges[limits.bounded]
+        ranges[: len(limits.kinds)][limits.bounded] = limits.ranges[limits.bounded]
     if problem.distances is not None:
         ranges[0] = np.maximum(ranges[0], DISTANCE_SCALE)
     ranges[3, problem.passive] = 0.0  # whose multipliers are those of an equation
-    return ranges[:3].ravel(), ranges[3, :outputs]
+    q, v, a, tau, jerk, rate = ranges
+    jet = np.concatenate([q, v, a, jerk, np.zeros(max(problem.ld.k - 3, 0) * nv)])
+    return jet, np.concatenate([tau, rate])[:outputs]

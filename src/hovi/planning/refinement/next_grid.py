@@ -63,8 +63,8 @@ def interpolated_to(finer: FinerSolution, problem: TrajectoryProblem) -> Discret
         for scheme, index in grid.groups:
             r = min(scheme.inner_modes, path.inner.shape[1])
             inner[index, :r] = path.inner[index, :r]
-        return DiscretePath(path.q, path.v, path.z, inner)
-    curve = stretched(finer.trajectory, grid.duration)
+        return DiscretePath(path.q, path.v, path.z, inner, path.higher)
+    curve = stretched(finer.trajectory, grid.duration, problem.ld.k)
     return problem.path(curve)
 
 

@@ -183,14 +183,14 @@ def ended_early(best: Solution, status: Status, why: str) -> Solution:
 def has_few_points(job: Job) -> bool:
     """Whether a refinement to a tolerance begins with as many points as a smooth motion needs."""
     scheme = job.grid.schemes[0]
-    few = is_galerkin(scheme) and len(scheme.points) == scheme.inner_modes + 2
+    few = is_galerkin(scheme) and len(scheme.points) == scheme.inner_modes + scheme.derivatives
     kept = job.problem().limited or job.options.guess not in NAMED_GUESSES
     return job.tolerance is not None and few and not kept
 
 
 def with_more_points(job: Job) -> Job:
     """The job on the first grid with more quadrature points."""
-    grid = first_grid(job.grid.duration, job.options.interval_count)
+    grid = first_grid(job.grid.duration, job.options.interval_count, order=job.grid.order)
     return split_for_charts(job.on(grid), job.options.guess)
 
 

@@ -110,7 +110,7 @@ def finer_grids(job: Job) -> list[Stage]:
     stages = []
     while N >= 2 * MIN_INTERVALS:
         N = (N + 1) // 2
-        grid = Grid.uniform(job.grid.duration, N, galerkin(2))
+        grid = Grid.uniform(job.grid.duration, N, galerkin(2, job.grid.order))
         if job.via:
             try:
                 grid = grid.with_nodes([via.time for via in job.via])

@@ -182,7 +182,7 @@ def _round(
         bases = [solution.trajectory for solution in found[:PERTURBED_MINIMA]] + [origin]
     guesses = []
     for i in range(done, min(done + STARTS_PER_ROUND, starts)):
-        base = stretched(bases[i % len(bases)], T)
+        base = stretched(bases[i % len(bases)], T, problem.ld.k)
         curve = with_bump(base, robot, T, seed=seed * 100_003 + i)
         if robot.space.angles:
             curve = with_turns(curve, robot, T, _random_turns(robot, seed * 100_003 + i))

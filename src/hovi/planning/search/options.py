@@ -27,7 +27,7 @@ from hovi.planning.search.option_fields import (
     require_known,
     whole_number,
 )
-from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
 
 DEFAULT_TOLERANCE = 1e-3
@@ -36,6 +36,8 @@ DEFAULT_SCHEME = "galerkin-2"
 """Scheme if only the intervals are named."""
 DEFAULT_INTERVALS = 16
 """Number of intervals if only the scheme is named, and of the first grid of a refinement."""
+TOLERANCE_AND_SCHEME = "tolerance chooses the scheme and the intervals; leave them out."
+"""The message where a tolerance and a scheme are given together."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CHECKED_HERE = (
@@ -43,6 +45,7 @@ _CHECKED_HERE = (
     *("max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
+_RIVALS = "scheme", "tolerance"
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
@@ -130,6 +133,12 @@ class PlanOptions:
     weight: npt.ArrayLike | None = option(
         None, "weight of each joint's torque in the cost, shape (nv,)."
     )
+    smooth: bool = option(
+        False,
+        "whether the jerk costs something too, with a weight that follows from the inertia and the "
+        "duration: accelerations are zero at both ends, or as given, and torques are continuous.",
+        SceneKey("true or false"),
+    )
     max_iterations: int = whole_number(
         500,
         "maximum number of steps of a solve; with limits, of each of its rounds.",
@@ -157,6 +166,8 @@ class PlanOptions:
         object.__setattr__(self, "via", tuple(via))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
         expect(self.table, Scheme, "a name such as 'galerkin-2' as the scheme")
+        if self.tolerance is not None and self.scheme is not None:
+            raise InputError(TOLERANCE_AND_SCHEME)
 
     @property
     def time_limit_seconds(self) -> float | None:
@@ -201,25 +212,32 @@ class PlanOptions:
         return Clearance(self.obstacles, self.margin, self.self_collision)
 
     def with_changes(self, **changes: Any) -> Self:
-        """These options with some of them changed.
+        """These options with some of them changed; a tolerance replaces a scheme, and vice versa.
 
         Raises InputError for unknown options and invalid values.
         """
         require_known(type(self), changes)
-        options = dataclasses.replace(self, **changes)
+        options = dataclasses.replace(self, **_without_rival(changes), **changes)
         if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
         return options
 
-    def on(self, robot: Robot) -> Self:
-        """These options with limits and tolerance resolved for a robot, defaults included.
+    def on(self, scene: Scene) -> Self:
+        """These options with limits and tolerance resolved for a scene's robot, with defaults.
 
         Raises InputError for values that do not fit the robot.
         """
-        tolerance = self.effective_tolerance
+        tolerance, robot = self.effective_tolerance, scene.robot
         if tolerance is not None:
             tolerance = Tolerance.of(tolerance, robot)
-        return self.with_changes(limits=as_limits(robot, self.limits), tolerance=tolerance)
+        limits = as_limits(robot, self.limits, 3 if self.smooth else scene.order)
+        return self.with_changes(limits=limits, tolerance=tolerance)
+
+
+def _without_rival(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """What is withdrawn by changes that name a tolerance but no scheme, or the reverse."""
+    named = [name for name in _RIVALS if changes.get(name) is not None]
+    return {rival: None for rival in _RIVALS if named and rival not in changes}
 
 
 explain(PlanOptions, PlanOptions)

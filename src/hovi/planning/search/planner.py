@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
-from hovi.discrete.state import State, as_state
+from hovi.discrete.state import State, as_state, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
@@ -24,10 +24,11 @@ from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
+from hovi.planning.search.smoothing import smoothed
 from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
-from hovi.schemes import is_galerkin
+from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
@@ -101,11 +102,12 @@ def plan(
         )
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
-    chosen = options.with_changes(**changes).on(scene.robot)
+    chosen = options.with_changes(**changes).on(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
-    grid = _grid(T, chosen, scene.robot, free is not None)
     ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
+    scene = smoothed(scene, *ends, T) if chosen.smooth else scene
+    grid = _grid(T, chosen, scene, free is not None)
     with deadline.in_force():
         scene.effort_lagrangian(chosen.weight)  # its functions may have to be compiled
     job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
@@ -113,6 +115,7 @@ def plan(
         grid.stretched(bound)  # raises for steps that are too short or too long
     search = Search(job, deadline, progress or _silent, free)
     problem = job.problem()  # raises for invalid input before the search
+    _warn_of_degrees(scene.robot, *ends, chosen)
     started = time.perf_counter()
     with deadline.in_force():
         best, minima = search.run()
@@ -147,7 +150,7 @@ def _time(
     return free, free.first
 
 
-def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
+def _grid(T: float, options: PlanOptions, scene: Scene, free: bool) -> Grid:
     """The requested grid, or the first grid of the refinement to a tolerance.
 
     The latter is the guess's own grid if that is a finer one, so that the guess is not coarsened.
@@ -155,24 +158,25 @@ def _grid(T: float, options: PlanOptions, robot: Robot, free: bool) -> Grid:
     """
     guess = options.guess
     if options.tolerance is None:
-        grid = Grid.uniform(T, options.interval_count, options.table)
-    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options):
+        grid = Grid.uniform(T, options.interval_count, of_order(options.table, scene.order))
+    elif isinstance(guess, Trajectory) and _is_first_grid(guess.grid, options, scene.order):
         grid = guess.grid.stretched(T)
     else:
-        limited = as_limits(robot, options.limits).bounded.any()
+        limited = as_limits(scene.robot, options.limits).bounded.any()
         kinks = limited or options.clearance.wanted or options.via
         few = options.starts == 1 and not free and not isinstance(guess, Trajectory)
-        grid = first_grid(T, options.interval_count, not kinks, more_points=not few)
+        number, order = options.interval_count, scene.order
+        grid = first_grid(T, number, not kinks, more_points=not few, order=order)
     return grid.with_nodes(sorted(each.time for each in options.via)) if options.via else grid
 
 
-def _is_first_grid(grid: Grid, options: PlanOptions) -> bool:
+def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
     """Whether a refinement begins on the grid of its guess.
 
     The grid has Galerkin tables only, and more intervals than the first grid would have, up to
-    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others.
+    MAX_GUESS_INTERVALS; neither intervals nor via points ask for others. order: of the Lagrangian.
     """
-    if options.intervals is not None or options.via:
+    if options.intervals is not None or options.via or grid.order != order:
         return False
     refinable = all(is_galerkin(scheme) for scheme, _ in grid.groups)
     return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
@@ -186,6 +190,16 @@ def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:
         return goal
     state = as_state(goal, robot)
     return state if options.turns is None else dataclasses.replace(state, turns=options.turns)
+
+
+def _warn_of_degrees(
+    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions
+) -> None:
+    """Warn if the given configurations, in order of time, look like degrees."""
+    stops = sorted(options.via, key=lambda via: via.time)
+    given = [start, *(via.goal for via in stops), goal]
+    states = [each for each in given if isinstance(each, State)]
+    warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
 
 
 def _silent(text: str, fraction: float) -> None:

@@ -133,7 +133,9 @@ class Search:
         continued = isinstance(options.guess, Trajectory) and options.starts == 1
         if grid.intervals <= 2 * COARSE_INTERVALS or continued:
             return self.fine
-        coarse = Grid.uniform(grid.duration, COARSE_INTERVALS, galerkin_with_more_points(2))
+        coarse = Grid.uniform(
+            grid.duration, COARSE_INTERVALS, galerkin_with_more_points(2, grid.order)
+        )
         if self.fine.via:
             try:
                 coarse = coarse.with_nodes([each.time for each in self.fine.via])

@@ -122,6 +122,7 @@ def minimize_constrained(
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
     """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
     weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
+    weights = weights[weights > 0]
     weight = float(weights.mean()) if len(weights) > 0 else 1.0
     cost = max(abs(problem.ld.action(path)), 1e-6)
     zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)

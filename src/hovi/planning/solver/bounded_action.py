@@ -25,14 +25,14 @@ Array = npt.NDArray[np.float64]
 
 
 class BoundedAction(BoundedObjective[DiscretePath]):
-    """The discrete action, with (q, v, a, tau) bounded at the quadrature points.
+    """The discrete action, with (q, v, a, tau), or more, bounded at the quadrature points.
 
     Further outputs y(q) >= 0, such as distances to obstacles, follow in the last columns.
 
     problem: the trajectory problem.
     limits: the bounds.
     margins: share of its range by which each lower and upper bound is tightened in each interval,
-        shape (2, N, 4 nv + more); none if None.
+        shape (2, N, kinds nv + more); none if None.
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
     """
@@ -51,9 +51,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self.action = ActionObjective(problem, algebra, problem.structure, multipliers)
         self.ld = self.action.ld
         self.lagrangian = self.action.lagrangian
-        self.columns = np.flatnonzero(limits.bounded.ravel())
         self._jet_size = (self.lagrangian.order + 1) * self.lagrangian.nv
         self._size = self._jet_size + len(self.lagrangian.output_weight)
+        self._bounded = np.flatnonzero(limits.bounded.ravel())
+        self.columns = self._output_columns(self._bounded)
         if self.columns.max(initial=0) >= self._size:
             raise InputError(
                 "limits on tau need a Lagrangian whose outputs are torques; leave them out."
@@ -71,8 +72,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         pairs = zip(self.action.jets(x), outputs, strict=True)
         space = self.lagrangian.space
         rows = [
-            np.concatenate([q if space is None else space.coordinates(q), v, a, tau], axis=1)
-            for (q, v, a), tau in pairs
+            np.concatenate([q if space is None else space.coordinates(q), *rates, tau], axis=1)
+            for (q, *rates), tau in pairs
         ]
         y = self._scaled(np.concatenate(rows))
         if self.more is not None:
@@ -88,7 +89,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         weight = self._unscaled(sigma, 2)
         force = self._unscaled(multipliers, 1)
         terms, curvatures = [], []
-        k = self._jet_size  # (q, v, a) first, then tau
+        k = self._jet_size  # (q, v, a, ...) first, then tau
         for i, part in enumerate(self._parts):
             slope, curve = gradient[part], weight[part]
             terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
@@ -176,9 +177,18 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
         return self.action.output_slope(self.lagrangian.output(*jet, t=t), batch)
 
+    def _output_columns(self, bounded: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """The columns of (q, q', ..., q^(k), outputs) of entries of the limits.
+
+        Jerk is the fourth of the jet, torques are the first outputs, and their rates the next.
+        """
+        n, jet = self.lagrangian.nv, self.lagrangian.order + 1
+        blocks = np.array([0, 1, 2, jet, 3, jet + 1])
+        return blocks[bounded // n] * n + bounded % n
+
     @cached_property
     def _ranges(self) -> Array:
-        return np.asarray(self.limits.ranges.ravel()[self.columns])
+        return np.asarray(self.limits.ranges.ravel()[self._bounded])
 
     @cached_property
     def _parts(self) -> list[slice]:
@@ -190,20 +200,20 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _origin(self) -> Array:
         """Origin of each scaled output: its lower bound, or its only one."""
         lower, upper = self.limits.lower.ravel(), self.limits.upper.ravel()
-        return np.where(np.isfinite(lower), lower, upper)[self.columns]
+        return np.where(np.isfinite(lower), lower, upper)[self._bounded]
 
     def _scaled(self, rows: Array) -> Array:
         return (rows[:, self.columns] - self._origin) / self._ranges
 
     def _unscaled(self, y: Array, power: int) -> Array:
-        """Derivatives in scaled outputs as derivatives in (q, v, a, tau), shape (P, 4 nv)."""
+        """Derivatives in scaled outputs as derivatives in (q, ..., q^(k), outputs), (P, size)."""
         full = np.zeros((len(y), self._size))
         full[:, self.columns] = y[:, : len(self.columns)] / self._ranges**power
         return full
 
     def _bounds(self, margins: Array | None) -> Bounds:
-        lower = (self.limits.lower.ravel()[self.columns] - self._origin) / self._ranges
-        upper = (self.limits.upper.ravel()[self.columns] - self._origin) / self._ranges
+        lower = (self.limits.lower.ravel()[self._bounded] - self._origin) / self._ranges
+        upper = (self.limits.upper.ravel()[self._bounded] - self._origin) / self._ranges
         size = 0 if self.more is None else self.more.size
         lower, upper = np.append(lower, np.zeros(size)), np.append(upper, np.full(size, np.inf))
         intervals = np.concatenate(self.ld.point_intervals)
@@ -213,6 +223,6 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
         tightening = margins.reshape(2, len(margins[0]), -1)
         first = self.limits.lower.size
-        chosen = np.append(self.columns, np.arange(first, first + size))
+        chosen = np.append(self._bounded, np.arange(first, first + size))
         tightening = tightening[:, :, chosen][:, intervals]
         return Bounds(lower + tightening[0], upper - tightening[1], weights)

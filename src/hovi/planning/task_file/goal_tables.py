@@ -12,12 +12,13 @@ from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.units import seconds
-from hovi.planning.task_file.joint_tables import read_configuration, read_velocity
+from hovi.planning.task_file.joint_tables import read_configuration, read_rates
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, GoalTable, ViaTable
 from hovi.robot.robot import Robot
 
 _OF_FRAMES = ("position", "rpy", "axis")
+_FREE = ("free", "free_velocity", "free_acceleration")
 
 
 def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
@@ -27,7 +28,7 @@ def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> Stat
             if getattr(goal, key) is not None:
                 raise toml.error((*keys, key), f"`{key}` needs a `frame`")
         return read_state(goal, keys, robot, toml)
-    for key in ("q", "v", "free", "turns"):
+    for key in ("q", "v", "a", "free", "free_acceleration", "turns"):
         if getattr(goal, key):
             raise toml.error((*keys, key), f"a goal of a `frame` takes no `{key}`: leave it out")
     rotation = None if goal.rpy is None else pin.rpy.rpyToMatrix(np.array(goal.rpy))
@@ -49,14 +50,18 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
     if end.q is None:
         raise toml.error(keys, f"`{name}` needs q, or a frame and its target")
     q = read_configuration(end.q, keys, robot, toml)
-    v = end.v if not isinstance(end.v, dict) else read_velocity(end.v, keys, robot, toml)
-    free, free_velocity = getattr(end, "free", []), getattr(end, "free_velocity", [])
+    v, a = (
+        read_rates(x, (*keys, key), robot, toml) if isinstance(x, dict) else x
+        for key, x in (("v", end.v), ("a", end.a))
+    )
+    free = {key: tuple(getattr(end, key, ())) for key in _FREE}
     turns: dict[str, Any] = dict(getattr(end, "turns", {}))
-    state = State(q, v, free=tuple(free), free_velocity=tuple(free_velocity), turns=turns)
+    state = State(q, v, a=a, turns=turns, **free)
     for key, check in (
         ("q", lambda: robot.check_configuration(q, f"{name}.q")),
         ("v", lambda: robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")),
-        ("free", lambda: state.free_on(robot, name)),
+        ("a", lambda: robot.check_velocity(np.zeros(robot.nv) if a is None else a, f"{name}.a")),
+        ("free", lambda: state.free_on(robot, name, 3)),
         ("turns", lambda: state.turns_on(robot, name)),
     ):
         try:
@@ -76,6 +81,9 @@ def read_via(
         if time >= longest:
             sentence = f"the via point at {time:g} s is not inside the motion of {longest:g} s"
             raise toml.error(("via", i, "time"), sentence)
+        for key in ("a", "free_acceleration"):
+            if getattr(table, key):
+                raise toml.error(("via", i, key), f"a via point takes no `{key}`: leave it out")
         goal = read_goal(table, ("via", i), robot, toml)
         try:
             points.append(Via(time, goal))
@@ -116,12 +124,14 @@ def via_table(via: Via, robot: Robot) -> dict[str, Any]:
 
 
 def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
-    """The table of a state; a velocity of zero is left out."""
+    """The table of a state; a velocity and an acceleration of zero are left out."""
     q, v = state.on(robot, name)
     table: dict[str, Any] = {"q": _floats(q)}
     if np.any(v):
         table["v"] = _floats(v)
-    for key in ("free", "free_velocity"):
+    if state.a is not None and np.any(state.a):
+        table["a"] = _floats(state.a)
+    for key in _FREE:
         if getattr(state, key):
             table[key] = list(getattr(state, key))
     if state.turns:

@@ -44,13 +44,13 @@ def _by_joint(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText)
     return q
 
 
-def read_velocity(by_joint: dict[str, Any], end: Keys, robot: Robot, toml: TomlText) -> list[float]:
-    """A velocity (nv,) from a table of joints; joints that are left out have velocity zero."""
-    _check_joints(by_joint, (*end, "v"), robot, toml)
+def read_rates(by_joint: dict[str, Any], keys: Keys, robot: Robot, toml: TomlText) -> list[float]:
+    """A velocity or acceleration (nv,) from a table of joints; of those left out it is zero."""
+    _check_joints(by_joint, keys, robot, toml)
     v: list[float] = []
     for joint in robot.joint_names:
         size = robot.model.joints[robot.model.getJointId(joint)].nv
-        v += _numbers(by_joint.get(joint, [0.0] * size), size, (*end, "v", joint), toml)
+        v += _numbers(by_joint.get(joint, [0.0] * size), size, (*keys, joint), toml)
     return v
 
 

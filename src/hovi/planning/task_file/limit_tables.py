@@ -45,7 +45,7 @@ def limits_value(limits: str | Limits | Mapping[str, Any], robot: Robot) -> str 
     if not isinstance(limits, Limits):
         return {str(key): plain(each) for key, each in limits.items()}
     table: dict[str, Any] = {"base": "none", "tolerance": limits.tolerance}
-    for row, kind in enumerate(KINDS):
+    for row, kind in enumerate(limits.kinds):
         bounded = np.flatnonzero(limits.bounded[row])
         pairs = {
             robot.coordinate_names[i]: [float(limits.lower[row, i]), float(limits.upper[row, i])]

@@ -14,7 +14,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
-from hovi.planning.search.options import PlanOptions
+from hovi.planning.search.options import TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via
 from hovi.planning.task_file.limit_tables import read_limits
@@ -61,13 +61,16 @@ def _options(
 ) -> PlanOptions:
     """The options of a file: single values unchanged, the others from their tables."""
     options = PlanOptions(**{name: getattr(table, name) for name in PLAIN})
+    tolerance = _read_tolerance(table.tolerance, robot, toml)
+    if tolerance is not None and table.scheme.name is not None:
+        raise toml.error(("tolerance",), TOLERANCE_AND_SCHEME.removesuffix("."))
     return options.with_changes(
         via=read_via(table.via, duration, robot, toml),
         scheme=table.scheme.name,
         intervals=table.scheme.intervals,
         limits=read_limits(table.limits, robot, toml),
         obstacles=read_obstacles(table.obstacles, options.clearance, robot, toml),
-        tolerance=_read_tolerance(table.tolerance, robot, toml),
+        tolerance=tolerance,
     )
 
 

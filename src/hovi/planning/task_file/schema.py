@@ -73,6 +73,13 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
+_JOINTS = 'a list of joint names, or ["all"]'
+_ACCELERATION = (
+    "for a motion with a cost on the jerk: a list of finite numbers, one per velocity, or a table "
+    "of joint names"
+)
+
+
 class EndTable(Table):
     """[start] or [goal]."""
 
@@ -84,9 +91,8 @@ class EndTable(Table):
         default=None,
         description="a list of finite numbers, one per velocity, or a table of joint names",
     )
-
-
-_JOINTS = 'a list of joint names, or ["all"]'
+    a: Coordinates | None = Field(default=None, description=_ACCELERATION)
+    free_acceleration: list[str] = Field(default=[], description=_JOINTS)
 
 
 class StartTable(EndTable):
@@ -118,6 +124,8 @@ class GoalTable(Table):
         default=None,
         description="a list of finite numbers, one per velocity, or a table of joint names",
     )
+    a: Coordinates | None = Field(default=None, description=_ACCELERATION)
+    free_acceleration: list[str] = Field(default=[], description=_JOINTS)
     free: list[str] = Field(default=[], description=_JOINTS)
     free_velocity: list[str] = Field(default=[], description=_JOINTS)
     turns: ByJoint = Field(
@@ -167,6 +175,8 @@ class LimitsTable(Table):
     v: Bounds | None = Field(default=None, description=_BOUNDS)
     a: Bounds | None = Field(default=None, description=_BOUNDS)
     tau: Bounds | None = Field(default=None, description=_BOUNDS)
+    jerk: Bounds | None = Field(default=None, description=_BOUNDS)
+    torque_rate: Bounds | None = Field(default=None, description=_BOUNDS)
     margin: FiniteFloat = Field(
         default=0.0, ge=0, lt=0.5, description="a share of the range, from 0 to below 0.5"
     )

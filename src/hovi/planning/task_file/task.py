@@ -46,7 +46,7 @@ class Task:
             raise InputError(
                 f"the duration must be a positive number of seconds, got {self.duration}."
             )
-        self.options.on(self.scene.robot)
+        self.options.on(self.scene)
 
     def __getattr__(self, name: str) -> Any:
         """An option by its own name, as tasks had it before: deprecated, use task.options."""

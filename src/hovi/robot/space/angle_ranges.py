@@ -1,4 +1,4 @@
-"""Ranges of angles that were probably meant in degrees."""
+"""Angles and ranges of angles that were probably meant in degrees."""
 
 from __future__ import annotations
 
@@ -32,4 +32,33 @@ def ranges_in_degrees(
         f"the position range of {names[i]}{more}, {lower[i]:g} to {upper[i]:g} rad, looks like "
         f"degrees: {lower[i]:g} to {upper[i]:g} degrees are {np.radians(lower[i]):.4g} to "
         f"{np.radians(upper[i]):.4g} rad"
+    )
+
+
+def angles_in_degrees(
+    names: Sequence[str], angles: npt.NDArray[np.bool_], q: Array, lower: Array, upper: Array
+) -> str:
+    """The coordinates that look like degrees, as a clause; "" if none does.
+
+    Those which are more than a turn beyond a range that they would meet in degrees, and those which
+    move by a suspicious angle: joints without a range may be wound up, but few move by four turns.
+
+    names: of the coordinates, (nv,). angles: which are angles, (nv,).
+    q: successive configurations, shape (M, nv). lower, upper: position ranges. All in [rad].
+    """
+    degrees = np.radians(q)
+    bounded = (lower < upper) & (np.maximum(np.abs(lower), np.abs(upper)) <= MAX_SUSPICIOUS)
+    beyond = (q > upper + 2 * np.pi) | (q < lower - 2 * np.pi)
+    beyond &= bounded & (degrees >= lower) & (degrees <= upper)
+    moved = np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) > MIN_SUSPICIOUS
+    possible = angles & (np.abs(q) <= MAX_SUSPICIOUS).all(axis=0)
+    found = np.flatnonzero(possible & (beyond.any(axis=0) | moved))
+    if not len(found):
+        return ""
+    i = int(found[0])
+    largest = float(q[np.argmax(np.abs(q[:, i])), i])
+    more = f", as {len(found) - 1} more are" if len(found) > 1 else ""
+    return (
+        f"{names[i]} is {largest:g} rad in a given configuration{more}, which looks like degrees: "
+        f"{largest:g} degrees are {np.radians(largest):.4g} rad"
     )

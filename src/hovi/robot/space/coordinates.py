@@ -19,7 +19,7 @@ from hovi.robot.space.pinocchio_configurations import UNIT_TOLERANCE, check_vect
 
 Array = npt.NDArray[np.float64]
 
-NO_UNITS = Units("", "1/s", "1/s^2", "")
+NO_UNITS = Units("", "1/s", "1/s^2", "", "1/s^3", "1/s")
 """Units of coordinates that are nobody's joints."""
 
 
@@ -44,7 +44,7 @@ class Coordinates(ABC):
     @property
     @abstractmethod
     def coordinate_units(self) -> tuple[Units, ...]:
-        """Units of q, v, a and tau at each coordinate, (nv,)."""
+        """Units of q, v, a, tau, the jerk and d tau / dt at each coordinate, (nv,)."""
 
     @property
     def nq(self) -> int:

@@ -16,16 +16,18 @@ KernelSupport = Literal["anywhere", "as base", "nowhere"]
 
 
 class Units(NamedTuple):
-    """Units of q, v, a and tau at one coordinate, in the order in which limits stack them."""
+    """Units at one coordinate, in the order in which limits stack them."""
 
     q: str
     v: str
     a: str
     tau: str
+    jerk: str
+    torque_rate: str
 
 
-ANGLE = Units("rad", "rad/s", "rad/s^2", "N m")
-LENGTH = Units("m", "m/s", "m/s^2", "N")
+ANGLE = Units("rad", "rad/s", "rad/s^2", "N m", "rad/s^3", "N m/s")
+LENGTH = Units("m", "m/s", "m/s^2", "N", "m/s^3", "N/s")
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class BoundedSearch:
     guess: the initial guess, on the problem's grid.
     iterations: steps of all solves.
     margins: share of its range by which each bound is tightened in each interval, shape
-        (2, N, 4 nv + pairs). clearance: bounded distances, or None.
+        (2, N, kinds nv + pairs). clearance: bounded distances, or None.
     tightened: the margins before the last tightening and the excess then, if there was one on this
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
@@ -81,7 +81,7 @@ class BoundedSearch:
         return float(self.problem.clearance.margin) + self.limits.tolerance * DISTANCE_SCALE
 
     def no_margins(self) -> Array:
-        """Zero margins, shape (2, N, 4 nv + pairs)."""
+        """Zero margins, shape (2, N, kinds nv + pairs)."""
         pairs = 0 if self.clearance is None else self.clearance.size
         return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
 
@@ -137,7 +137,8 @@ class BoundedSearch:
             return -1
         if outcome.model.factor(0.0) is not None:
             return 0
-        if not self.problem.plain and isinstance(outcome.model, BandModel):
+        mergeable = self.problem.plain and self.problem.ld.k == 2
+        if not mergeable and isinstance(outcome.model, BandModel):
             return outcome.model.negative_eigenvalues()
         objective = BoundedAction(
             self.problem, self.limits, self.margins, "tree", more=self.clearance
@@ -147,7 +148,7 @@ class BoundedSearch:
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def excess(self, path: DiscretePath) -> Array:
-        """Excess over lower and upper bounds in every interval, shape (2, N, 4 nv + pairs)."""
+        """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs)."""
         trajectory = self.problem.trajectory(path)
         excess = excess_along(trajectory, self.limits)
         sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)

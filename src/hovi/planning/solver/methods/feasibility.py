@@ -136,7 +136,7 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
     yield search.guess
     problem = search.problem
     T = problem.grid.duration
-    base = stretched(search.problem.trajectory(search.guess), T)
+    base = stretched(search.problem.trajectory(search.guess), T, problem.ld.k)
     for seed in range(BUMPED_GUESSES):
         yield problem.path(with_bump(base, problem.coordinates, T, seed))
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
@@ -13,6 +15,7 @@ from hovi.planning.solver.methods.bounded_search import STOPPED, BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
 from hovi.planning.solver.status import Status, diverged, unfinished
 from hovi.system.deadline import OutOfTimeError
@@ -38,6 +41,16 @@ class InteriorPoint(Method):
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; the guess may violate the limits, and intervals may be split."""
+        solve = partial(self._minimize, report=report)
+        return with_torque_rates_last(solve, problem, path, options)
+
+    def _minimize(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None,
+    ) -> MethodResult:
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
         if reason:

@@ -124,7 +124,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     chosen[1:] |= worst[:-1]
     chosen[:-1] |= worst[1:]
     motion, guess = (
-        stretched(search.problem.trajectory(path), grid.duration)
+        stretched(search.problem.trajectory(path), grid.duration, grid.order)
         for path in (outcome.x, search.guess)
     )
     search.problem = search.problem.on(grid.halved(chosen))

@@ -1,0 +1,81 @@
+"""Limits on the torque rate are imposed only on motions that would exceed them.
+
+Their rows cost as much as all others together, and few motions come near them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options
+from hovi.planning.problem.limit_violation import closeness, excess_along
+from hovi.planning.problem.limits import KINDS, Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.status import Status
+from hovi.scene.jerk_lagrangian import JerkLagrangian
+from hovi.scene.lagrangian import PointTerms
+from hovi.system.deadline import Deadline
+
+Solve = Callable[[TrajectoryProblem, DiscretePath, Options], MethodResult]
+TORQUE_RATE = KINDS.index("torque_rate")
+NEAR_A_RATE = 0.02
+"""Distance of a guess from the limits on the torque rate, as a share of their range, below which
+they are imposed at once where the guess is the motion of a similar problem."""
+
+
+def with_torque_rates_last(
+    solve: Solve, problem: TrajectoryProblem, path: DiscretePath, options: Options
+) -> MethodResult:
+    """The result of a solve without limits on the torque rate; with them if the motion needs them.
+
+    solve: of a problem from a guess with options. The second solve begins at the first one's motion
+    and on its grid. There is only one if the guess is the motion of a similar problem and near such
+    a limit.
+    """
+    limits, lagrangian = problem.limits, problem.ld.lagrangian
+    if limits is None or not isinstance(lagrangian, JerkLagrangian) or not lagrangian.torque_rates:
+        return solve(problem, path, options)
+    if options.near and _margin(problem, limits, path) < NEAR_A_RATE:
+        return solve(problem, path, options)
+    deadline = Deadline(options.time_limit)
+    without = dataclasses.replace(lagrangian, torque_rates=False)
+    ld = DiscreteLagrangian(without, problem.grid)
+    loose = dataclasses.replace(problem, ld=ld, limits=_without_torque_rates(limits))
+    first = solve(loose, path, options)
+    full = problem.on(first.problem.grid)
+    trajectory = full.trajectory(first.path)
+    if first.status is Status.MINIMUM and excess_along(trajectory, limits).worst > limits.tolerance:
+        left = dataclasses.replace(options, time_limit=deadline.seconds_left, near=True)
+        second = solve(full, first.path, left)
+        return dataclasses.replace(
+            second, nit=first.nit + second.nit, history=[*first.history, *second.history]
+        )
+    forces = None if first.forces is None else [_with_rates(terms) for terms in first.forces]
+    return dataclasses.replace(first, problem=full, forces=forces)
+
+
+def _margin(problem: TrajectoryProblem, limits: Limits, path: DiscretePath) -> float:
+    """Least distance of a path's torque rates from their limits, as a share of the range."""
+    return float(closeness(problem.trajectory(path), limits)[TORQUE_RATE].min())
+
+
+def _without_torque_rates(limits: Limits) -> Limits:
+    lower, upper = limits.lower.copy(), limits.upper.copy()
+    lower[TORQUE_RATE], upper[TORQUE_RATE] = -np.inf, np.inf
+    return Limits(lower, upper, limits.tolerance)
+
+
+def _with_rates(terms: PointTerms) -> PointTerms:
+    """Terms in the torques as terms in the torques and their rates."""
+    gradient, weight = terms.output_gradient, terms.output_weight
+    return dataclasses.replace(
+        terms,
+        output_gradient=np.concatenate([gradient, np.zeros_like(gradient)], axis=1),
+        output_weight=np.concatenate([weight, np.zeros_like(weight)], axis=1),
+    )
