@@ -294,3 +294,15 @@ def test_invalid_options_are_refused(
 ) -> None:
     assert main(["accuracy", "two_link_reach", *arguments]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_motions_with_a_cost_on_the_jerk_are_measured_on_tables_of_their_order() -> None:
+    task = hovi.load_task(hovi.example("two_link_reach"))
+    effects = [*task.scene.effects, hovi.effects.JerkCost(0.01)]
+    task = dataclasses.replace(task, scene=hovi.Scene(task.scene.robot, effects))
+    diagram = work_precision(
+        task, schemes=["galerkin-2", "hermite-simpson"], repeats=1, budget=10.0
+    )
+    assert {run.method for run in diagram.runs if run.family == "hovi"} >= {"galerkin-2"}
+    assert min(run.error.cost for run in diagram.runs) < 1e-8
+    assert any("hermite-simpson is no scheme for the jerk" in note for note in diagram.notes)
