@@ -201,7 +201,7 @@ def test_info_names_the_sources_of_the_limits_of_an_arm(run: Run, tmp_path: Path
     text = example("ur5_reach.toml").read_text().replace('limits = "none"', 'limits = "ur5"')
     code, out, _ = run("info", scene(tmp_path, text, None))
     assert code == 0
-    assert "limits of a UR5 (CB3), published in" in out
+    assert "seed 0, limits ur5\nlimits of a UR5 (CB3), published in" in out
     assert "github.com/UniversalRobots" in out
 
 

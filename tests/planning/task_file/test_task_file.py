@@ -200,6 +200,7 @@ MISTAKES = {
     "no goal": ("[goal]", "[gaol]", ["`gaol`", "'goal'"]),
     "start without q": ("q = [-1.57", "v = [-1.57", ["line 8", "`start.q`", "missing"]),
     "limits by an unknown word": ('"none"', '"urd"', ["line 6", "`limits`", '"urdf"', '"urd"']),
+    "limits of another arm": ('"none"', '"panda"', ["line 6", "panda_joint1", "shoulder, elbow"]),
     "limits as a number": ('"none"', "3", ["line 6", "`limits`", '"urdf"', "3"]),
     "robot of the wrong type": ('robot = "two_link.urdf"', "robot = 3", ["`robot`", "3"]),
     "locked of the wrong type": ('"none"', '"none"\nlocked = "elbow"', ["`locked`", "list"]),

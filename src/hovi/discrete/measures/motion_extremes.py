@@ -75,7 +75,7 @@ def extremes(trajectory: Trajectory) -> Extremes:
     series, units = _accelerations(trajectory), _units(trajectory)
     return Extremes(
         _extreme(trajectory, series, [each.a for each in units]),
-        _extreme(trajectory, _derivative(trajectory, series), [_per_second(u.a) for u in units]),
+        _extreme(trajectory, _derivative(trajectory, series), [each.jerk for each in units]),
     )
 
 
@@ -170,8 +170,3 @@ def _values(series: Array, s: Array) -> Array:
 def _units(trajectory: Trajectory) -> Sequence[Units]:
     robot = trajectory.robot
     return [NO_UNITS] * trajectory.v.shape[1] if robot is None else robot.coordinate_units
-
-
-def _per_second(unit: str) -> str:
-    """The unit of the derivative of something per s^2."""
-    return unit.replace("s^2", "s^3")

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from itertools import pairwise
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
@@ -17,6 +18,9 @@ from hovi.planning.problem.arms import limit_set as module
 from hovi.planning.problem.arms.limit_set import KIND_WORDS, NAMES, LimitSet, limit_set
 from hovi.planning.problem.limits import KINDS, as_limits, urdf_limits
 from hovi.robot.robot import Robot
+from samples.manifold_robots import chain
+
+Array = npt.NDArray[np.float64]
 
 SETS = hovi.limit_sets()
 DOCS = Path(__file__).resolve().parents[4] / "docs"
@@ -168,6 +172,15 @@ def test_continuous_joints_have_no_position_limits() -> None:
     assert free == [f"j2s6s200_joint_{i}" for i in (1, 4, 6)]
 
 
+def test_a_joint_that_is_continuous_in_the_urdf_has_none_either() -> None:
+    model = chain([pin.JointModelRX()] * 5 + [pin.JointModelRUBZ()])
+    for i, name in enumerate(SETS["ur5"].joints, start=1):
+        model.names[i] = name
+    limits = as_limits(hovi.load_robot(model), "ur5")
+    assert np.isinf(limits.upper[0]).tolist() == [False] * 5 + [True]
+    assert np.isfinite(limits.upper[1]).all()
+
+
 def test_a_robot_with_other_joints_is_refused_in_one_sentence(ur5: Robot) -> None:
     with pytest.raises(InputError, match=r"panda_joint1, .* but robot 'ur5' has shoulder") as no:
         as_limits(ur5, "panda")
@@ -205,26 +218,55 @@ MOVES = {
 }
 
 
+def reached(robot: Robot, trajectory: hovi.Trajectory, armature: float) -> dict[str, Array]:
+    """All kinds at 8001 samples: torques by pin.rnea, jerk and torque rate by differences."""
+    t = np.linspace(0, trajectory.duration, 8001)
+    q, v, a, _ = trajectory.sample(t)
+    model, data = robot.model.copy(), robot.model.createData()
+    model.gravity.linear = np.array([0, 0, -9.81])
+    model.armature = np.full(model.nv, armature)
+    tau = np.array([pin.rnea(model, data, *point) for point in zip(q, v, a, strict=True)])
+    jerk, rate = (np.diff(x, axis=0) / t[1] for x in (a, tau))
+    return {"q": q, "v": v, "a": a, "tau": tau, "jerk": jerk, "torque_rate": rate}
+
+
+def least_room(values: dict[str, Array], arm: LimitSet, kinds: Iterable[str]) -> dict[str, float]:
+    """The least distance to a limit of each kind, as a share of its range."""
+    room = {}
+    for kind in kinds:
+        low, high = np.array(arm.limits[kind]).T
+        inside = np.minimum(values[kind] - low, high - values[kind])
+        room[kind] = float(np.min(inside / (high - low)))
+    return room
+
+
 @pytest.mark.parametrize("name", MOVES)
 def test_a_plan_holds_them_at_samples_of_its_own(name: str) -> None:
-    """Torques by pin.rnea, accelerations by differences of the sampled velocities."""
     example, start, goal, duration = MOVES[name]
     robot = hovi.load_robot(example, locked=FINGERS if example == "panda" else [])
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), hovi.effects.Armature(1.0)])
     found = hovi.plan(scene, start, goal, duration=duration, limits=name, intervals=16)
     assert found.success, found.message
-    t = np.linspace(0, found.trajectory.duration, 4001)
-    motion = found.trajectory.sample(t)
-    model, data = robot.model.copy(), robot.model.createData()
-    model.gravity.linear = np.array([0, 0, -9.81])
-    model.armature = np.ones(model.nv)
-    tau = [pin.rnea(model, data, *point) for point in zip(*motion[:3], strict=True)]
-    a = [(later - v) / (t[1] - t[0]) for v, later in pairwise(motion.v)]
-    reached = {"q": motion.q, "v": motion.v, "a": np.array(a), "tau": np.array(tau)}
-    closest = np.inf
-    for kind in reached.keys() & SETS[name].limits.keys():
-        low, high = np.array(SETS[name].limits[kind]).T
-        room = np.minimum(reached[kind] - low, high - reached[kind]) / (high - low)
-        assert room.min() > -1e-5, kind
-        closest = min(closest, room.min())
-    assert closest < 0.01  # otherwise nothing was limited
+    arm = SETS[name]
+    kinds = arm.limits.keys() - set(arm.beyond(2))
+    room = least_room(reached(robot, found.trajectory, 1.0), arm, kinds)
+    assert -1e-6 < min(room.values()) < 0.01, room
+
+
+SMOOTH = {
+    "panda": ([0, -0.5, 0, -2, 0, 1.6, 0.7], [0.7, 0.1, -0.3, -1.5, 0.3, 1.9, 0.2], 0.9),
+    "xarm7": ([0, -0.5, 0, 1, 0, 1, 0], [0.6, 0.2, 0.3, 1.7, -0.3, 1.4, 0.5], 1.0),
+}
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_a_smooth_plan_holds_those_on_jerk_and_torque_rate_too(name: str) -> None:
+    start, goal, duration = SMOOTH[name]
+    robot = hovi.load_robot(name, locked=FINGERS if name == "panda" else [])
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    found = hovi.plan(scene, start, goal, duration=duration, limits=name, smooth=True)
+    assert found.success, found.message
+    values, arm = reached(robot, found.trajectory, 0.0), SETS[name]
+    room = least_room(values, arm, arm.limits)
+    assert -1e-6 < min(room.values()) < 0.01, room
+    assert np.abs(values["a"][[0, -1]]).max() < 1e-6
