@@ -14,9 +14,11 @@ from scipy.integrate import solve_ivp
 
 import hovi
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.interval_paths import path_of_order
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import guess_path
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_rate import configuration_rate
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -102,6 +104,7 @@ def test_a_free_rigid_body_turns_between_two_orientations_as_euler_says() -> Non
     signs = np.sign(np.vecdot(motion.q, true.y[:4].T))[:, None]
     np.testing.assert_allclose(signs * motion.q, true.y[:4].T, rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.trajectory.momenta[0, 0], moments * w0, atol=1e-10)
+    np.testing.assert_allclose(found.trajectory.v[-1], motion.v[-1], rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -174,6 +177,8 @@ def test_a_free_end_on_a_group_has_no_momentum() -> None:
     found = solved(hovi.mechanics(scene), 0.2, State(q[0]), State(q[1], free=["j0"]))
     assert np.abs(found.trajectory.momenta[0, 0, :3]).max() > 1e-2
     np.testing.assert_allclose(found.trajectory.momenta[-1, 0, :3], 0.0, atol=1e-10)
+    guess = guess_path(found.problem, found.trajectory)
+    np.testing.assert_allclose(guess.q, found.trajectory.q, rtol=0, atol=1e-14)
 
 
 # The discrete action
@@ -272,7 +277,54 @@ def trig(x: Array) -> tuple[Array, Array]:
     return np.cos(x), np.sin(x)
 
 
+def test_angles_turn_by_more_than_half_a_turn_in_an_interval(tmp_path: Path) -> None:
+    jet = [ca.SX.sym("q", 2), *(ca.SX.sym(f"q{j}", 1) for j in (1, 2, 3))]
+    L = CasadiLagrangian(jet, ca.sumsqr(jet[-1]) / 2, ConfigurationSpace(("SO(2)",)))
+    goal = State([np.cos(1.0), np.sin(1.0)], turns={"q[0]": 5})
+    found = solved(L, 1.0, State([1.0, 0.0]), goal, intervals=3)
+    assert found.cost == pytest.approx(360 * (10 * np.pi + 1) ** 2, rel=1e-11)
+    found.trajectory.save(tmp_path / "turns.npz")
+    loaded = hovi.Trajectory.load(tmp_path / "turns.npz")
+    np.testing.assert_allclose(loaded.sample([0.5]).v, [[15 / 8 * (10 * np.pi + 1)]], rtol=1e-11)
+    again = hovi.solve(found.problem, loaded)
+    assert again.cost == pytest.approx(found.cost, rel=1e-11)
+
+
 # Files, guesses and refusals
+
+
+def test_orientations_keep_the_turns_of_their_path() -> None:
+    space, axis = ConfigurationSpace(("SO(3)",)), np.array([0.6, 0.0, 0.8])
+    q, angle = turned_by(axis, np.array([0.0, 3.6])), np.array([[[3.5 * 0.6, 0.01, 3.5 * 0.8]]])
+    steps = np.array([0.5])
+    path = path_of_order(1, q, np.zeros((2, 0, 3)), angle / 0.5, np.zeros((1, 0, 3)), steps, space)
+    np.testing.assert_allclose(path.z[0, 0], 3.6 / 0.5 * axis, rtol=1e-12)
+
+
+def test_a_guess_has_the_turns_of_its_goal() -> None:
+    axis = np.array([0.0, 0.0, 1.0])
+    q = turned_by(axis, np.array([0.0, 0.5]))
+    L = hovi.mechanics(hovi.Scene(rigid_body(MOMENTS)))
+    path = problem_of(L, 1.0, State(q[0]), State(q[1], turns={"turn": [0, 0, 1]})).guess("cubic")
+    np.testing.assert_allclose(path.z[:, 0].sum(axis=0) / 8, (2 * np.pi + 0.5) * axis, atol=1e-12)
+
+
+def test_a_curve_is_followed_between_the_nodes_of_its_path() -> None:
+    """A body that turns about two axes in turn; its path errs by what its polynomials cannot do."""
+    L = hovi.mechanics(hovi.Scene(rigid_body(MOMENTS)))
+    robot = rigid_body(MOMENTS)
+
+    def curve(t: Array) -> tuple[Array, Array, Array]:
+        x = np.stack([t, 0.5 * t**2, np.sin(t)], axis=1)
+        dx = np.stack([1 + 0 * t, t, np.cos(t)], axis=1)
+        return robot.chart.jet(np.tile(robot.neutral(), (len(t), 1)), x, dx, 0 * x)
+
+    ends = curve(np.array([0.0, 1.0]))[0]
+    problem = problem_of(L, 1.0, State(ends[0]), State(ends[1]))
+    t = np.linspace(0.0, 1.0, 41)
+    motion = problem.trajectory(problem.path(curve))
+    miss = robot.difference(curve(t)[0], motion.configurations(t))
+    np.testing.assert_allclose(miss, 0.0, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("base", ["free-flyer", "continuous"])
@@ -287,6 +339,7 @@ def test_motions_are_saved_loaded_replanned_and_certified(base: str, tmp_path: P
         np.testing.assert_array_equal(one, other)
     again = found.replan(goal=State(q[2]))
     assert again.success
+    np.testing.assert_array_equal(guess_path(again.problem, found.trajectory.path).q[-1], q[2])
     direct = solved(hovi.mechanics(scene), 0.3, State(q[0]), State(q[2]))
     assert again.cost == pytest.approx(direct.cost, rel=1e-10)
     from_file = hovi.solve(again.problem, loaded)
