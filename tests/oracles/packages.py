@@ -32,6 +32,7 @@ FLOORS = [
 INSIDE = {
     "robot": [{"space", "urdf"}, {""}],
     "effects": [{"expressions"}, {""}],
+    "flows": [{""}, {"execution"}],
     "planning": [
         {"clearance"},
         {"problem"},
