@@ -19,6 +19,7 @@ from .flows.exact_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagr
 from .flows.exact_lagrangian import conjugate_time as conjugate_time
 from .flows.execution.tracking import Tracking as Tracking
 from .flows.execution.tracking import play as play
+from .flows.group_lagrangian import ChartedLagrangian as ChartedLagrangian
 from .flows.legendre_transforms import hamiltonian as hamiltonian
 from .flows.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
 from .flows.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus
