@@ -27,10 +27,14 @@ from samples.manifold_robots import BASES, configurations, with_arm
 
 Array = npt.NDArray[np.float64]
 
-MIXED = ConfigurationSpace(("SE(3)", "SO(2)", 1, "SE(2)"))
 ROTATIONS = ConfigurationSpace(("SO(3)",))
 PLANE = ConfigurationSpace(("SE(2)", "SO(2)"))
-SPACES = {"all groups": MIXED, "rotations": ROTATIONS, "an angle": ConfigurationSpace(("SO(2)",))}
+SPACES = {
+    "a pose": ConfigurationSpace(("SE(3)",)),
+    "a plane, a number and an angle": ConfigurationSpace(("SE(2)", 1, "SO(2)")),
+    "rotations": ROTATIONS,
+    "an angle": ConfigurationSpace(("SO(2)",)),
+}
 each_space = pytest.mark.parametrize("space", SPACES.values(), ids=list(SPACES))
 each_order = pytest.mark.parametrize("k", [1, 2])
 
