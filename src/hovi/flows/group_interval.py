@@ -66,7 +66,11 @@ class GroupInterval:
         points: Array = np.einsum("qri,nia->rnqa", table, np.append(hv, Z, axis=1))
         ends = hv + Z[:, :2]
         return IntervalCharts(
-            Chart(self.space), self._scheme, np.full(N, h), points.reshape(3, -1, self.n), ends
+            Chart(self.space),
+            self._scheme,
+            np.full(N, float(h)),
+            points.reshape(3, -1, self.n),
+            ends,
         )
 
     def end(self, start: Array, interval: IntervalCharts) -> Array:
@@ -203,7 +207,7 @@ class GroupInterval:
         many = IntervalCharts(
             interval.chart,
             interval.scheme,
-            np.full(C, self.h),
+            np.full(C, float(self.h)),
             np.tile(interval.x, (1, C, 1)),
             np.repeat(interval.ends, C, axis=0),
         )
