@@ -21,6 +21,9 @@ from .flows.euler_lagrange import euler_lagrange_residual as euler_lagrange_resi
 from .flows.euler_lagrange import regularity as regularity
 from .flows.exact_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagrangian
 from .flows.exact_lagrangian import conjugate_time as conjugate_time
+from .flows.execution.tracking import Tracking as Tracking
+from .flows.execution.tracking import play as play
+from .flows.group_lagrangian import ChartedLagrangian as ChartedLagrangian
 from .flows.legendre_transforms import hamiltonian as hamiltonian
 from .flows.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
 from .flows.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus
@@ -36,8 +39,6 @@ from .flows.stepper import flow as flow
 from .flows.symmetry import Symmetry as Symmetry
 from .flows.symmetry import base_rotation as base_rotation
 from .flows.symmetry import base_translation as base_translation
-from .flows.tracking import Tracking as Tracking
-from .flows.tracking import play as play
 from .planning.clearance.clearance import Clearance as Clearance
 from .planning.clearance.obstacles import Box as Box
 from .planning.clearance.obstacles import Capsule as Capsule

@@ -32,8 +32,8 @@ from hovi.effects import (
     ViscousFriction,
     Wrench,
 )
+from hovi.flows.execution.tracking import play
 from hovi.flows.simulator import simulate
-from hovi.flows.tracking import play
 from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot

@@ -20,13 +20,13 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Gravity, SceneSymbols, ViscousFriction
 from hovi.errors import InputError
-from hovi.flows.controllers import FEEDBACKS, controller
-from hovi.flows.dynamics_replay import chart_rates
+from hovi.flows.execution.controllers import FEEDBACKS, controller
+from hovi.flows.execution.dynamics_replay import chart_rates
+from hovi.flows.execution.tracking import play
 from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import highest_derivative, legendre
 from hovi.flows.simulator import simulate
 from hovi.flows.stepper import flow
-from hovi.flows.tracking import play
 from hovi.planning.search.planner import plan
 from hovi.robot.loading import load_robot
 from hovi.robot.mimic_model import Coupling, coupled

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+from hovi import symbolic
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects import Gravity
 from hovi.errors import InputError
@@ -20,8 +22,9 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
-from hovi.scene.standard_lagrangians import spline
+from hovi.scene.standard_lagrangians import mechanics, spline
 from hovi.schemes import by_name, galerkin
 
 Array = npt.NDArray[np.float64]
@@ -29,9 +32,9 @@ Array = npt.NDArray[np.float64]
 SEGMENTS = 50
 
 
-def jets(n: int, size: float) -> Array:
-    """(q, v, a, jerk) of solutions' starts, shape (4, SEGMENTS, n)."""
-    return size * np.random.default_rng(n).normal(size=(4, SEGMENTS, n))
+def jets(n: int, size: float, count: int = 4) -> Array:
+    """(q, v, a, jerk, ...) of solutions' starts, shape (count, SEGMENTS, n)."""
+    return size * np.random.default_rng(n).normal(size=(count, SEGMENTS, n))
 
 
 @pytest.fixture(scope="module")
@@ -82,22 +85,36 @@ def test_higher_orders_in_extended_precision_on_fifty_segments(arm_scene: Scene,
     assert extended_slope(arm_scene, r, SEGMENTS) == pytest.approx(2 * (r + 2) + 1, abs=0.3)
 
 
-def extended_slope(scene: Scene, r: int, segments: int) -> float:
-    """Slope of max |L_d - L_d^e| with 40 digits; L_d^e with nine inner modes, of order 22."""
+def extended_slope(scene: Scene, r: int, segments: int, k: int = 2) -> float:
+    """Slope of max |L_d - L_d^e| with 40 digits; L_d^e with nine inner modes, of order 18 + 2 k."""
     mp = pytest.importorskip("mpmath")
     from oracles.extended_precision import action, graph
 
-    lagrangian = scene.effort_lagrangian()
-    torque = graph(casadi_functions(scene.model).inverse_dynamics)
-    x, p = legendre(lagrangian, *jets(2, 0.5)[:, :segments])
+    lagrangian, functions = of_order(scene, k), casadi_functions(scene.model)
+    torque, kinetic, potential = (
+        graph(function)
+        for function in (
+            functions.inverse_dynamics,
+            functions.kinetic_energy,
+            functions.potential_energy,
+        )
+    )
+
+    def exact_value(*jet: list[Any]) -> Any:
+        if k == 1:
+            return kinetic(*jet)[0] - potential(jet[0])[0]
+        jerk = sum(j * j for j in jet[3]) * mp.mpf(JERK_WEIGHT) / 2 if k == 3 else 0
+        return sum(u * u for u in torque(*jet[:3])) / 2 + jerk
+
+    x, p = legendre(lagrangian, *jets(2, 0.5, 2 * k)[:, :segments])
     errors, steps = [], [0.03, 0.021, 0.015]
     with mp.workdps(40):
         for h in steps:
-            exact = SchemeLagrangian(lagrangian, galerkin(9), h).from_start(x, p)
-            close = SchemeLagrangian(lagrangian, galerkin(r), h).between(x, exact.w)
+            exact = SchemeLagrangian(lagrangian, galerkin(9, k), h).from_start(x, p)
+            close = SchemeLagrangian(lagrangian, galerkin(r, k), h).between(x, exact.w)
             pairs = [
                 [
-                    action(lambda *jet: sum(u * u for u in torque(*jet)) / 2, h, *ends)
+                    action(exact_value, h, *ends)
                     for ends in (
                         (x[i], exact.w[i], close.inner[i]),
                         (x[i], exact.w[i], exact.inner[i]),
@@ -107,6 +124,47 @@ def extended_slope(scene: Scene, r: int, segments: int) -> float:
             ]
             errors.append(float(max(abs(a - b) for a, b in pairs)))
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+# Of orders other than 2, on the arm
+
+JERK_WEIGHT = 0.3
+
+
+def of_order(scene: Scene, k: int) -> Lagrangian:
+    """K - V, the effort, and the effort with 1/2 w |jerk|^2."""
+    if k == 1:
+        return mechanics(scene)
+    if k == 2:
+        return scene.effort_lagrangian()
+    jet = [ca.SX.sym(f"q{j}", scene.robot.nv) for j in range(4)]
+    effort = symbolic.lagrangian(scene)(*jet[:3], 0.0)
+    return CasadiLagrangian(jet, effort + JERK_WEIGHT / 2 * ca.sumsqr(jet[3]))
+
+
+@pytest.mark.parametrize(
+    ("k", "r", "size", "steps"),
+    [
+        (1, 0, 0.5, [0.02, 0.014, 0.01]),
+        (1, 1, 0.5, [0.04, 0.028, 0.02]),
+        (1, 2, 0.5, [0.06, 0.042, 0.03]),
+        (1, 3, 1.0, [0.1, 0.08, 0.06]),
+        (3, 0, 0.5, [0.06, 0.042, 0.03]),
+        (3, 1, 0.5, [0.14, 0.1, 0.08]),
+    ],
+)
+def test_mechanics_and_least_jerk_of_the_arm_have_order_2_r_plus_k(
+    arm_scene: Scene, k: int, r: int, size: float, steps: list[float]
+) -> None:
+    starts = jets(2, size, 2 * k)
+    measured = variational_order(of_order(arm_scene, k), galerkin(r, k), steps, *starts)
+    assert measured.order == pytest.approx(2 * (r + k), abs=0.3)
+    assert measured.reliable, measured.reason
+
+
+@pytest.mark.parametrize(("k", "r"), [(1, 4), (3, 2)])
+def test_their_higher_orders_in_extended_precision(arm_scene: Scene, k: int, r: int) -> None:
+    assert extended_slope(arm_scene, r, 6, k) == pytest.approx(2 * (r + k) + 1, abs=0.3)
 
 
 def nonlinear(k: int) -> CasadiLagrangian:

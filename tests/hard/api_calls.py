@@ -145,6 +145,7 @@ def calls() -> dict[str, Call]:
         _segments_and_periods,
         _symbolic,
         _flows,
+        _groups,
         _files,
     )
     for group in groups:
@@ -592,6 +593,48 @@ def _flows() -> list[Call]:
             own(ld, "value", x[None], x1[None]),
             own(ld, "between", x[None], segment.w, 0.0),
         ]
+    return found
+
+
+def _groups() -> list[Call]:
+    """Mechanics of a plane body with a turning joint: L_d between points, symmetries, a problem."""
+    space = ConfigurationSpace(("SE(2)", "SO(2)"))
+    q, v = ca.SX.sym("q", 6), ca.SX.sym("v", 4)
+    L = hovi.CasadiLagrangian([q, v], ca.sumsqr(v) / 2 + q[2] + ca.sin(q[4]), space)
+    grid = hovi.Grid.uniform(1.0, N, galerkin(1, 1))
+    ld = hovi.DiscreteLagrangian(L, grid)
+    one = hovi.ChartedLagrangian(L, space, galerkin(1, 1), H)
+    x = np.array([[0.1, 0.2, 1.0, 0.0, 0.0, 1.0]])
+    p = np.array([[0.3, -0.2, 0.4, 0.5]])
+    segment = one.from_start(x[None], p[None])
+    x1 = segment.x1[0]
+    slide = hovi.Symmetry(lambda q: ca.vertcat(q[2], -q[3], 0, 0), 4, space)
+    ends = hovi.State(x[0]), hovi.State(x1[0], free=["q[3]"])
+    path = hovi.TrajectoryProblem(ld, *ends).guess("cubic")
+    found = [
+        build(hovi.ChartedLagrangian, lagrangian=L, space=space, scheme=galerkin(1, 1), h=H),
+        call(hovi.ChartedLagrangian.of, ld),
+        build(hovi.TrajectoryProblem, ld=ld, start=ends[0], goal=ends[1]),
+        *(own(ld, name, path) for name in ("values", "action", "gradient", "derivatives")),
+        build(hovi.Symmetry, generator=lambda q: ca.vertcat(q[2], -q[3], 0, 0), n=4, space=space),
+        own(slide, "lift", x[None]),
+        own(slide, "momentum", x[None], p[None]),
+        own(slide, "defect", L, x, p),
+        call(hovi.flow, one, x, p, 3, symmetries={"slide": slide}),
+        call(hovi.discrete_hamiltonian_flow, one, x, p, "plus"),
+        call(hovi.regularity, one, x, x1),
+        call(hovi.conjugate_time, L, x, p, 0.2),
+        call(hovi.variational_order, L, galerkin(0, 1), [0.03, 0.02, 0.01], x, p),
+        own(hovi.ExactDiscreteLagrangian(L, H), "joining", x[None], x1[None], 0.0),
+    ]
+    for name, arguments in {
+        "from_start": (x[None], p[None], 0.0, None),
+        "from_end": (x1[None], p[None], 0.0),
+        "joining": (x[None], x1[None], 0.0),
+        "between": (x[None], segment.w, 0.0),
+        "value": (x[None], x1[None]),
+    }.items():
+        found.append(own(one, name, *arguments))
     return found
 
 

@@ -77,8 +77,8 @@ def gauss(points: int) -> tuple[list[Any], list[Any]]:
     return nodes, weights
 
 
-def mode(degree: int) -> list[list[Any]]:
-    """Monomial coefficients of the double integral, integral and value of sqrt(2 m + 1) P_m."""
+def mode(degree: int, integrals: int) -> list[list[Any]]:
+    """Monomial coefficients of sqrt(2 m + 1) P_m(2 s - 1) and its integrals, the last one first."""
     p = [
         mp.sqrt(2 * degree + 1)
         * (-1) ** (degree + i)
@@ -87,33 +87,37 @@ def mode(degree: int) -> list[list[Any]]:
         for i in range(degree + 1)
     ]
     jets = [p]
-    for _ in range(2):
+    for _ in range(integrals):
         jets.insert(0, [mp.mpf(0), *(c / (i + 1) for i, c in enumerate(jets[0]))])
     return jets
 
 
 def action(lagrangian: Callable[..., Any], h: float, x0: Array, w: Array, inner: Array) -> Any:
-    """L_d of Galerkin for k = 2 with modes as NumPy found them, shape x0, w (2, n), inner (r, n).
+    """L_d of Galerkin with modes as NumPy found them, shape x0, w (k, n), inner (r, n).
 
     L_d is extremal in the inner modes: what they lack in digits counts squared.
-    lagrangian: lists (q, v, a) of mpmath numbers -> L.
+    lagrangian: lists (q, q', ..., q^(k)) of mpmath numbers -> L.
     """
-    nodes, weights = gauss(len(inner) + 2)
-    signs = [-1, 1, *[1] * len(inner)]  # b_0 = sqrt(3) (1 - 2 s)
-    modes = [mode(m) for m in (1, 0, *range(2, 2 + len(inner)))]
+    k = len(x0)
+    nodes, weights = gauss(len(inner) + k)
+    degrees = [*range(k - 1, -1, -1), *range(k, k + len(inner))]
+    signs = [(-1) ** m if m < k else 1 for m in degrees]  # b_j = sqrt(2 m + 1) P_m(1 - 2 s)
+    modes = [mode(m, k) for m in degrees]
     rows = [*w, *inner]
     step = mp.mpf(h)
     total = mp.mpf(0)
     for s, weight in zip(nodes, weights, strict=True):
-        jet: list[list[Any]] = [[], [], []]
+        jet: list[list[Any]] = [[] for _ in range(k + 1)]
         for joint in range(x0.shape[1]):
-            q0, v0 = mp.mpf(x0[0, joint]), mp.mpf(x0[1, joint])
-            base = [q0 + step * s * v0, v0, mp.mpf(0)]
-            for j in range(3):
+            for j in range(k + 1):
+                taylor = [
+                    (step * s) ** (i - j) / mp.factorial(i - j) * mp.mpf(x0[i, joint])
+                    for i in range(j, k)
+                ]
                 moved = [
                     sign * mp.fsum(c * s**i for i, c in enumerate(m[j])) * mp.mpf(row[joint])
                     for sign, m, row in zip(signs, modes, rows, strict=True)
                 ]
-                jet[j].append(base[j] + step ** (2 - j) * mp.fsum(moved))
+                jet[j].append(mp.fsum(taylor) + step ** (k - j) * mp.fsum(moved))
         total += weight * lagrangian(*jet)
     return step * total

@@ -33,6 +33,7 @@ INSIDE = {
     "robot": [{"space", "urdf"}, {""}],
     "effects": [{"expressions"}, {""}],
     "discrete": [{""}, {"measures"}],
+    "flows": [{""}, {"execution"}],
     "planning": [
         {"clearance"},
         {"problem"},

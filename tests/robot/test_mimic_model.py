@@ -18,7 +18,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.dynamics.torque_model import CasadiTorque
 from hovi.effects import Drag, Gravity, MovingBase, Payload, ViscousFriction, Wrench
 from hovi.errors import ModelError, SceneError
-from hovi.flows.dynamics_replay import replay_dynamics
+from hovi.flows.execution.dynamics_replay import replay_dynamics
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box

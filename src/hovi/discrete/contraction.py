@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
-from hovi.discrete.interval_charts import IntervalCharts
+from hovi.discrete.interval_charts import Charts
 
 Array = npt.NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Expansion:
     gradient: Array
     hessian: Array
     outputs: list[tuple[Array, Array]]
-    charts: list[IntervalCharts] | None = None
+    charts: list[Charts] | None = None
 
     @property
     def action(self) -> float:

@@ -18,7 +18,7 @@ from hovi.checks.shapes import require_shape
 from hovi.discrete.contraction import Expansion, contract
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
-from hovi.discrete.interval_charts import IntervalCharts, charts_on, jet_on
+from hovi.discrete.interval_charts import Charts, charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
 from hovi.scene.lagrangian import Lagrangian, PointTerms
@@ -39,7 +39,7 @@ class DiscreteLagrangian:
 
     lagrangian: L on T^(k)Q.
     grid: the intervals and their schemes, which are tables for the same k.
-    Raises SchemeError if the orders differ, InputError for groups if k is not 2.
+    Raises SchemeError if the orders differ, InputError for k > 2 on noncommutative groups.
     """
 
     lagrangian: Lagrangian
@@ -52,10 +52,11 @@ class DiscreteLagrangian:
                 f"{self.grid.order}, this one is of order {self.lagrangian.order}; use "
                 f"galerkin(inner_modes, derivatives={self.lagrangian.order})."
             )
-        if self.k != 2 and self.lagrangian.space is not None:
+        if self.k > 2 and self.chart is not None:
             raise InputError(
-                f"boundary value problems of order {self.k} need joints with nq = nv: lock the "
-                "others with load_robot(..., locked=[...])."
+                f"boundary value problems of order {self.k} need the third derivatives of charts "
+                "of orientations, which are not there: lock such joints with "
+                "load_robot(..., locked=[...])."
             )
         _ = self.segments  # raises where the grid has no node at the end of one
 
@@ -294,7 +295,8 @@ class DiscreteLagrangian:
     def _end_columns(self) -> Array:
         """Matrices from the gradient in an interval's end columns to D1 .. D2k, (N, 2 k, 2 k)."""
         scales = self.grid.steps[:, None] ** np.tile(np.arange(self.k), 2)
-        nodal = np.eye(4) if self.chart is not None else regular_from_nodal(0, self.k).T
+        k = self.k
+        nodal = np.eye(2 * k) if self.chart is not None else regular_from_nodal(0, k).T
         return np.asarray(scales[:, :, None] * nodal)
 
     def point_gradients(
@@ -364,7 +366,7 @@ class DiscreteLagrangian:
         space = self.lagrangian.space
         return batch.jet(path) if space is None else jet_on(space, batch, path)
 
-    def _charts(self, path: DiscretePath) -> list[IntervalCharts] | None:
+    def _charts(self, path: DiscretePath) -> list[Charts] | None:
         if self.chart is None:
             return None
         return [charts_on(self.chart, batch, path) for batch in self.batches]

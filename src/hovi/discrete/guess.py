@@ -10,13 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import misfit, path_of_order, regularized_nodes
+from hovi.discrete.interval_paths import misfit
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError, InputError, nearest
 from hovi.robot.space.coordinates import Coordinates
 from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows
-from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
 Boundary = tuple[Array, Array, Array, Array]
@@ -54,24 +53,7 @@ def cubic(coordinates: Coordinates, boundary: Boundary, duration: float) -> Curv
 
     def curve(t: Array) -> tuple[Array, Array, Array]:
         jet = interval_rows(np.asarray(t) / T, 0) @ local  # (M, 3, n)
-        return _in_chart(coordinates, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
-
-    return curve
-
-
-def hermite(ends: Array, duration: float) -> Curve:
-    """The polynomial of degree 2 k - 1 between two points: the minimizer of 1/2 |q^(k)|^2.
-
-    ends: (q, q', ..., q^(k-1)) at the start and at the goal, shape (2, k, n). duration: T, in [s].
-    """
-    k, T = ends.shape[1], duration
-    scaled = ends * T ** np.arange(k)[:, None]
-    local = np.concatenate([scaled[0, 1:], regular_from_nodal(0, k)[k:] @ np.concatenate(scaled)])
-
-    def curve(t: Array) -> tuple[Array, ...]:
-        jet = jet_rows(np.asarray(t) / T, k, 0, max(k, 2)) @ local
-        rates = (jet[:, j] / T**j for j in range(1, jet.shape[1]))
-        return ends[0, 0] + jet[:, 0], *rates
+        return in_chart(coordinates, q0, jet[:, 0], jet[:, 1] / T, jet[:, 2] / T**2)
 
     return curve
 
@@ -98,12 +80,12 @@ def minimum_jerk(coordinates: Coordinates, boundary: Boundary, duration: float) 
         x = (s**power).T @ c
         dx = (power[1:] * s ** power[:-1]).T @ c[1:]
         ddx = (power[2:] * power[1:-1] * s ** power[:-2]).T @ c[2:]
-        return _in_chart(coordinates, q0, x, dx / T, ddx / T**2)
+        return in_chart(coordinates, q0, x, dx / T, ddx / T**2)
 
     return curve
 
 
-def _in_chart(
+def in_chart(
     coordinates: Coordinates, q0: Array, x: Array, dx: Array, ddx: Array
 ) -> tuple[Array, Array, Array]:
     """The jet of q0 (+) x(t)."""
@@ -207,39 +189,9 @@ def path_on_grid(
     """
     q, v, _ = (x.copy() for x in curve(grid.t))
     q[0], v[0], q[-1], v[-1] = boundary
-    rotation = None if coordinates.vector_joints else _rotation(curve, grid, coordinates)
+    rotation = None if coordinates.vector_joints else rotation_along(curve, grid, coordinates)
     inner = _inner_modes(curve, grid, coordinates, q)
     return DiscretePath(q, v, regularized(coordinates, grid, q, v, rotation), inner)
-
-
-def path_of_any_order(curve: Curve, grid: Grid, ends: Array) -> DiscretePath:
-    """As `path_on_grid`, for any order k on vector spaces.
-
-    ends: (q, q', ..., q^(k-1)) at the start and at the goal, shape (2, k, n).
-    """
-    k, h = grid.order, grid.steps[:, None]
-    nodes = np.stack(curve(grid.t)[:k], axis=1)
-    nodes[[0, -1]] = ends
-    inner = np.zeros((grid.intervals, grid.inner_modes, nodes.shape[2]))
-    for scheme, index in grid.groups:
-        r = scheme.inner_modes
-        if r > 0:
-            s, projection = _projection(r, k)
-            t = grid.t[:-1][index][:, None] + h[index] * s
-            top = curve(t.ravel())[k].reshape(len(index), len(s), -1)
-            inner[index, :r] = np.matmul(projection, top)
-    z = regularized_nodes(nodes, grid.steps)
-    return path_of_order(k, nodes[:, 0], nodes[:, 1:], z, inner, grid.steps)
-
-
-def moved_any(path: DiscretePath, grid: Grid, ends: Array) -> DiscretePath:
-    """As `moved`, for any order k on vector spaces; ends: as in `path_of_any_order`."""
-    change = ends - path.nodes[[0, -1]]
-    if not change.any():
-        return path
-    more = path_of_any_order(hermite(change, grid.duration), grid, change)
-    z, inner = path.z + more.z, path.inner + more.inner
-    return path_of_order(grid.order, path.q + more.q, path.rates + more.rates, z, inner, grid.steps)
 
 
 def check_path(path: DiscretePath, grid: Grid, coordinates: Coordinates) -> None:
@@ -322,7 +274,7 @@ def with_ends_of_nodes(path: DiscretePath, grid: Grid, coordinates: Coordinates)
     return DiscretePath(path.q, path.v, z, path.inner)
 
 
-def _rotation(curve: Curve, grid: Grid, coordinates: Coordinates) -> Array:
+def rotation_along(curve: Curve, grid: Grid, coordinates: Coordinates) -> Array:
     """The integral of v over every interval, by Gauss quadrature, shape (N, nv).
 
     Raises ChartError if an orientation rotates by more than MAX_ROTATION in an interval.
@@ -354,7 +306,7 @@ def _inner_modes(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Arra
         r = scheme.inner_modes
         if r == 0:
             continue
-        s, projection = _projection(r)
+        s, projection = projection_on_modes(r)
         t = grid.t[:-1][index][:, None] + grid.steps[index][:, None] * s
         q, v, a = curve(t.ravel())
         if not coordinates.space.flat:
@@ -365,7 +317,7 @@ def _inner_modes(curve: Curve, grid: Grid, coordinates: Coordinates, nodes: Arra
 
 
 @functools.cache
-def _projection(inner_modes: int, k: int = 2) -> tuple[Array, Array]:
+def projection_on_modes(inner_modes: int, k: int = 2) -> tuple[Array, Array]:
     """Gauss points of [0, 1], (Q,), and the projection of values there on inner modes, (r, Q)."""
     x, w = np.polynomial.legendre.leggauss(inner_modes + k)
     s = (x + 1) / 2

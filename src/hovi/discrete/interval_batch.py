@@ -86,8 +86,15 @@ class IntervalBatch:
         return self.scheme.derivatives + 1
 
     def local(self, path: DiscretePath) -> Array:
-        """(x, x', x'') of q = q0 (+) x at the quadrature points, shape (3, B Q, n)."""
+        """(x, x', x'') of q = q0 (+) x at the quadrature points, shape (3, B Q, n).
+
+        For any order k max(k, 2) derivatives, where x'' = 0 for k = 1.
+        """
         still = np.zeros_like(path.v)
+        if self.scheme.derivatives != 2:
+            moving = DiscretePath(still, path.v, path.z, path.inner, path.higher)
+            x = np.stack(interpolate_any(self.scheme.table, self.h, self.numbers, moving))
+            return x if len(x) > 2 else np.append(x, np.zeros_like(x[:1]), axis=0)
         local = still, path.v, path.z, path.inner
         return interpolate(self.scheme.table, self.h, self.numbers, local)
 

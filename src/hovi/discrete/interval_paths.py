@@ -5,11 +5,15 @@ The compiled code works on plain arrays.
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
 from hovi.discrete.grid import DiscretePath
+from hovi.robot.space.chart import Chart
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.scheme import regular_from_nodal
 
@@ -63,11 +67,13 @@ def scaled_data(path: DiscretePath, intervals: Index, steps: Array, modes: int) 
     return np.concatenate([ends, top * steps[:, None] ** k], axis=1)
 
 
-def move_any(path: DiscretePath, step: Array, steps: Array) -> DiscretePath:
-    """The path after a step, for any order k on vector spaces.
+def move_any(
+    path: DiscretePath, step: Array, steps: Array, space: ConfigurationSpace | None = None
+) -> DiscretePath:
+    """The path after a step, for any order k on vector spaces and commutative groups, or k = 1.
 
     step: in the columns (q0, h q0', ..., q1, h q1', ..., c), shape (N, 2 k + r, n).
-    steps: h, shape (N,).
+    steps: h, shape (N,). space: None for a vector space.
     """
     k, powers = path.order, steps[:, None] ** np.arange(path.order + 1.0)
     first, last = step[:, :k] / powers[:, :k, None], step[-1, k : 2 * k] / powers[-1, :k, None]
@@ -77,34 +83,60 @@ def move_any(path: DiscretePath, step: Array, steps: Array) -> DiscretePath:
     inner = path.inner.copy()
     inner[:, : step.shape[1] - 2 * k] += step[:, 2 * k :] / powers[:, k:, None]
     rates = path.rates + nodes[:, 1:]
-    return path_of_order(k, path.q + nodes[:, 0], rates, z, inner, steps)
+    q = path.q + nodes[:, 0] if space is None else space.integrate(path.q, nodes[:, 0])
+    return path_of_order(k, q, rates, z, inner, steps, space)
 
 
-def regularized_nodes(nodes: Array, steps: Array) -> Array:
-    """z of every interval from (q, q', ..., q^(k-1)) at the nodes, on vector spaces, (N, k, n).
+def regularized_nodes(nodes: Array, steps: Array, change: Array | None = None) -> Array:
+    """z of every interval from (q, q', ..., q^(k-1)) at the nodes, (N, k, n).
 
-    nodes: shape (N + 1, k, n). steps: h, shape (N,).
+    nodes: shape (N + 1, k, n). steps: h, shape (N,). change: q1 (-) q0 of the intervals, (N, n), on
+        commutative groups and for k = 1, where the q of nodes are not read; q1 - q0 if None.
     """
     k, h = nodes.shape[1], steps[:, None]
     scaled = np.concatenate([nodes[:-1], nodes[1:]], axis=1)
+    if change is not None:
+        scaled[:, 0], scaled[:, k] = 0.0, change
     scaled *= (h ** np.tile(np.arange(k), 2))[:, :, None]
     return np.asarray(np.matmul(regular_from_nodal(0, k)[k:], scaled) / (h**k)[:, None])
 
 
+def changes_along(path: DiscretePath, steps: Array) -> Array:
+    """x1 of q1 = q0 (+) x1 by the z of every interval, (N, n): sum_i h^i q0^(i) / i! + h^k z_0."""
+    k, h = path.order, steps[:, None]
+    x1 = h**k * path.z[:, 0]
+    for i in range(1, k):
+        x1 = x1 + h**i / factorial(i) * path.rates[:-1, i - 1]
+    return x1
+
+
 def path_of_order(
-    k: int, q: Array, rates: Array, z: Array, inner: Array, steps: Array
+    k: int,
+    q: Array,
+    rates: Array,
+    z: Array,
+    inner: Array,
+    steps: Array,
+    space: ConfigurationSpace | None = None,
 ) -> DiscretePath:
-    """A path from q (N + 1, n) and its derivatives (N + 1, k - 1, n) at the nodes.
+    """A path from q (N + 1, nq) and its derivatives (N + 1, k - 1, n) at the nodes.
 
     z, inner: as in DiscretePath. steps: h, shape (N,). For k = 1 the velocities follow from the
-    curve of each interval.
+    curve of each interval, and on noncommutative groups z from the nodes, with the full turns that
+    bring it closest to what is given.
     """
     if k > 1:
         return DiscretePath(q, rates[:, 0], z, inner, rates[:, 1:])
+    h, curved = steps[:, None], space is not None and not space.flat
+    if space is not None and curved:
+        z = (space.difference_near(q[:-1], q[1:], h * z[:, 0]) / h)[:, None]
     r = inner.shape[1]
     rows = jet_rows(np.array([0.0, 1.0]), 1, r)[:, 1]  # (2, 1 + r), of h v over (h z, h inner)
     ends = np.einsum("sm,kmn->skn", rows, np.concatenate([z, inner], axis=1))
-    return DiscretePath(q, np.concatenate([ends[0], ends[1, -1:]]), z, inner)
+    last = ends[1, -1:]
+    if space is not None and curved:  # v = J(x1) x1', where x1' is that of the chart
+        last = Chart(space).jet(q[-2:-1], h[-1:] * z[-1], last, np.zeros_like(last))[1]
+    return DiscretePath(q, np.concatenate([ends[0], last]), z, inner)
 
 
 def move(path: PathArrays, step: Array, steps: Array, nodal: bool) -> PathArrays:

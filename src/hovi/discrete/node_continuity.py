@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.interval_paths import regularized_nodes
+from hovi.discrete.interval_paths import changes_along, regularized_nodes
 from hovi.errors import InputError
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
@@ -30,7 +30,7 @@ def require_continuous(
     The message names the interval.
     """
     if path.order != 2:
-        _require_ends(path, grid)
+        _require_ends(path, grid, space)
         return
     h = grid.steps[:, None]
     x, v = h * path.v[:-1] + h**2 * path.z[:, 0], path.v[:-1] + h * path.z[:, 1]
@@ -43,10 +43,16 @@ def require_continuous(
         _require_small(name, found[1:] - expected, found)
 
 
-def _require_ends(path: DiscretePath, grid: Grid) -> None:
-    """As `require_continuous`, for any order on vector spaces."""
-    k, h, nodes = path.order, grid.steps[:, None], path.nodes
-    gap = regularized_nodes(nodes, grid.steps) - path.z
+def _require_ends(path: DiscretePath, grid: Grid, space: ConfigurationSpace | None) -> None:
+    """As `require_continuous`, for other orders."""
+    k, h = path.order, grid.steps[:, None]
+    if space is None:
+        change, nodes = None, path.nodes
+    else:
+        near = changes_along(path, grid.steps)
+        change = space.difference_near(path.q[:-1], path.q[1:], near)
+        nodes = np.append(np.append(near, near[-1:], axis=0)[:, None], path.rates, axis=1)
+    gap = regularized_nodes(nodes, grid.steps, change) - path.z
     for j in range(k):
         name = ("q", "v", "a")[j] if j < 3 else f"derivative {j}"
         _require_small(name, h ** (k - j) * gap[:, j], nodes[:, j])

@@ -87,8 +87,8 @@ class State:
                     f"values of {', '.join(['q', *given][:order])} only: leave them out."
                 )
 
-    def jet_on(self, coordinates: Coordinates, name: str) -> Array:
-        """(q, v, a, jerk) on a vector space, shape (4, nv), zero where none is given.
+    def jet_on(self, coordinates: Coordinates, name: str) -> list[Array]:
+        """(q, v, a, jerk), q of shape (nq,) and the rest (nv,), zero where none is given.
 
         Raises InputError as `on` does.
         """
@@ -98,7 +98,7 @@ class State:
             coordinates.check_velocity(zero if x is None else x, f"{name}.{key}")
             for key, x in given.items()
         ]
-        return np.stack([*self.on(coordinates, name), *rates])
+        return [*self.on(coordinates, name), *rates]
 
     def free_on(self, coordinates: Coordinates, name: str, order: int = 2) -> Mask:
         """Which components of q (in the tangent space), v, ... are free, shape (k, nv).

@@ -221,6 +221,8 @@ class Trajectory:
         x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:
             return (path.q[k] + x, *rates)[: order + 1]
+        if top > 2:  # on commutative groups
+            return (self.space.integrate(path.q[k], x), *rates)[: order + 1]
         return Chart(self.space).jet(path.q[k], x, *rates)[: order + 1]
 
     def save(self, path: str | os.PathLike[str]) -> None:

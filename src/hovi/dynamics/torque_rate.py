@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.torque_model import TorqueModel
+from hovi.robot.space.configuration_space import ConfigurationSpace
 
 Array = npt.NDArray[np.float64]
 
@@ -28,9 +29,12 @@ Stencil = tuple[float, tuple[tuple[int, float], ...]]
 
 @dataclass(frozen=True, eq=False)
 class TorqueRate:
-    """d tau / dt at P points, on a vector space and for torques that do not depend on time.
+    """d tau / dt at P points, for torques that do not depend on time.
 
-    torques: tau(q, v, a). q, v, a, j: at the points, shape (P, n) each.
+    On vector spaces and commutative groups, where q (+) t v has the velocity v.
+
+    torques: tau(q, v, a). q: at the points, shape (P, nq). v, a, j: shape (P, n) each.
+    space: the configuration space; None if it is a vector space.
     """
 
     torques: TorqueModel
@@ -38,6 +42,7 @@ class TorqueRate:
     v: Array
     a: Array
     j: Array
+    space: ConfigurationSpace | None = None
 
     def value(self, jacobian: Array | None = None) -> Array:
         """d tau / dt, shape (P, n), in [N m/s] or [N/s]. jacobian: J, if it is known."""
@@ -46,8 +51,8 @@ class TorqueRate:
 
     def linearize(self, jacobian: Array) -> tuple[Array, Array]:
         """d tau / dt, (P, n), and its Jacobian in (q, v, a, j), (P, n, 4 n); jacobian: J."""
-        n = self.q.shape[1]
-        derivative = np.zeros((*self.q.shape, 4 * n))
+        n = self.v.shape[1]
+        derivative = np.zeros((*self.v.shape, 4 * n))
 
         def jacobian_at(q: Array, v: Array, a: Array) -> Array:
             return self.torques.linearize(q, v, a)[1]
@@ -61,7 +66,7 @@ class TorqueRate:
 
         With E y = x' for y = (q, v, a, j) it is S' + S E + (S E)^T.
         """
-        n = self.q.shape[1]
+        n = self.v.shape[1]
         none = np.zeros(n)
 
         def second(q: Array, v: Array, a: Array) -> Array:
@@ -86,7 +91,9 @@ class TorqueRate:
         total: Array | float = 0.0
         for number, weight in terms:
             e = number * step
-            moved = function(self.q + e * self.v, self.v + e * self.a, self.a + e * self.j)
+            dq = e * self.v
+            q = self.q + dq if self.space is None else self.space.integrate(self.q, dq)
+            moved = function(q, self.v + e * self.a, self.a + e * self.j)
             moved *= weight / step[:, :, None]
             total += moved
         return np.asarray(total)

@@ -2,7 +2,7 @@
 
 [ColomboFerraroMartin2016, sections 3 and 4, theorem 2 and its corollary]
 
-Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n).
+Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n); points on groups are rows.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from hovi.flows.legendre_transforms import (
     inverse_legendre_plus,
     legendre_minus,
     legendre_plus,
+    unbatched,
 )
-from hovi.flows.segment import SegmentLagrangian
+from hovi.flows.segment import IntervalLagrangian
 
 Array = npt.NDArray[np.float64]
 Form = Literal["plus", "minus", "momentum"]
@@ -41,7 +42,7 @@ class Regularity:
 
 
 @check_arguments
-def regularity(ld: SegmentLagrangian, x0: Array, x1: Array) -> Regularity:
+def regularity(ld: IntervalLagrangian, x0: Array, x1: Array) -> Regularity:
     """W_d at (x0, x1), with determinant and condition.
 
     For k = 2 its leading terms are D13 = -12/h^3 W, D14 = 6/h^2 W, D23 = -6/h^2 W, D24 = 2/h W, and
@@ -52,20 +53,20 @@ def regularity(ld: SegmentLagrangian, x0: Array, x1: Array) -> Regularity:
 
 
 @check_arguments
-def euler_lagrange_residual(ld: SegmentLagrangian, x0: Array, x1: Array, x2: Array) -> Array:
-    """D_{i+k} L_d(x0, x1) + D_i L_d(x1, x2), i = 1 .. k, which is F^+ - F^-; shape as x0."""
+def euler_lagrange_residual(ld: IntervalLagrangian, x0: Array, x1: Array, x2: Array) -> Array:
+    """D_{i+k} L_d(x0, x1) + D_i L_d(x1, x2), i = 1 .. k, which is F^+ - F^-; shape as momenta."""
     return legendre_plus(ld, x0, x1)[1] - legendre_minus(ld, x1, x2)[1]
 
 
 @check_arguments
-def discrete_lagrangian_map(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
+def discrete_lagrangian_map(ld: IntervalLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F_{L_d} = (F^-)^-1 o F^+: (x0, x1) -> (x1, x2)."""
     return inverse_legendre_minus(ld, *legendre_plus(ld, x0, x1))
 
 
 @check_arguments
 def discrete_hamiltonian_flow(
-    ld: SegmentLagrangian, x0: Array, p0: Array, form: Form = "momentum"
+    ld: IntervalLagrangian, x0: Array, p0: Array, form: Form = "momentum"
 ) -> tuple[Array, Array]:
     """The discrete Hamiltonian flow (x0, p0) -> (x1, p1) on T*T^(k-1)Q, in three forms.
 
@@ -75,7 +76,7 @@ def discrete_hamiltonian_flow(
     """
     if form == "momentum":
         segment = ld.from_start(batch(x0), batch(p0))
-        return segment.x1.reshape(np.shape(x0)), segment.p1.reshape(np.shape(x0))
+        return unbatched(x0, segment.x1), unbatched(x0, segment.p1)
     if form == "plus":
         ends = discrete_lagrangian_map(ld, *inverse_legendre_plus(ld, x0, p0))
         return legendre_plus(ld, *ends)

@@ -17,12 +17,17 @@ from scipy.optimize import brentq
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
-from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_segment
-from hovi.flows.segment import Segment, SegmentLagrangian, flat
+from hovi.flows.charted_segment import ChartedSegment
+from hovi.flows.group_lagrangian import ChartedLagrangian
+from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_step
+from hovi.flows.segment import IntervalLagrangian, Segment, flat
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme, galerkin
 
 Array = npt.NDArray[np.float64]
+
+AnySegment = Segment | ChartedSegment
+Approximation = SchemeLagrangian | ChartedLagrangian
 
 INNER_MODES = (4, 7, 10, 14, 19, 25, 32, 40)
 """Numbers of inner modes, in the order in which they are tried."""
@@ -30,8 +35,8 @@ INNER_MODES = (4, 7, 10, 14, 19, 25, 32, 40)
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class ExactDiscreteLagrangian(SegmentLagrangian):
-    """L_d^e to a tolerance, with all its derivatives.
+class ExactDiscreteLagrangian(IntervalLagrangian):
+    """L_d^e to a tolerance, with all its derivatives; on groups for k = 1 and 2.
 
     lagrangian: L on T^(k)Q. h: in [s]. tolerance: of the ends, and of the regularized momenta (for
         k = 2 h p and p~ - h p), relative to the largest.
@@ -44,28 +49,32 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
     tolerance: float = 1e-12
 
     def __post_init__(self) -> None:
-        check_segment(self.lagrangian, self.h)
+        check_step(self.h)
 
-    def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
-        """The exact solution with given ends."""
-        return self._raised(lambda ld, _: ld.between(x0, w, t0))
+    def between(self, x0: Array, w: Array, t0: float = 0.0) -> AnySegment:
+        """The exact solution with given ends, in regularized coordinates."""
+        return self._raised(lambda ld: ld.between(x0, w, t0))
+
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> AnySegment:
+        """The exact solution between two points of T^(k-1)Q."""
+        return self._raised(lambda ld: ld.joining(x0, x1, t0))
 
     def from_start(
-        self, x0: Array, p0: Array, t0: float = 0.0, guess: Segment | None = None
-    ) -> Segment:
-        """The exact solution that starts at (x0, p0): F_H, by theorem 3."""
-        return self._raised(lambda ld, guess: ld.from_start(x0, p0, t0, guess))
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: AnySegment | None = None
+    ) -> AnySegment:
+        """The exact solution that starts at (x0, p0): F_H, by theorem 3; `guess` is not used."""
+        return self._raised(lambda ld: ld.from_start(x0, p0, t0))
 
-    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> Segment:
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> AnySegment:
         """The exact solution that ends at (x1, p1)."""
-        return self._raised(lambda ld, _: ld.from_end(x1, p1, t0))
+        return self._raised(lambda ld: ld.from_end(x1, p1, t0))
 
-    def _raised(self, solve: Callable[[SchemeLagrangian, Segment | None], Segment]) -> Segment:
+    def _raised(self, solve: Callable[[Approximation], AnySegment]) -> AnySegment:
         """Raise the degree until the ends and their momenta stop changing."""
-        before: Segment | None = None
+        before: AnySegment | None = None
         for inner_modes in INNER_MODES:
-            ld = SchemeLagrangian(self.lagrangian, _table(inner_modes, self.k), self.h)
-            segment = solve(ld, None)
+            table = _table(inner_modes, self.k)
+            segment = solve(approximation(self.lagrangian, table, self.h))
             if before is not None and _change(before, segment) <= self.tolerance:
                 _refuse_conjugate_points(segment)
                 return segment
@@ -77,23 +86,34 @@ class ExactDiscreteLagrangian(SegmentLagrangian):
         )
 
 
+def approximation(lagrangian: Lagrangian, scheme: Scheme, h: float) -> Approximation:
+    """L_d of a scheme on one interval, on a vector space or on a group."""
+    space = lagrangian.space
+    if space is None:
+        return SchemeLagrangian(lagrangian, scheme, h)
+    return ChartedLagrangian(lagrangian, space, scheme, h)
+
+
 @check_arguments
 def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float) -> float:
     """The first conjugate point along a solution, the upper bound of h of L_d^e, in [s].
 
     By Morse's index theorem the action between fixed ends is a minimum up to it; there, the
     smallest eigenvalue of the inner modes' Hessian is zero.
-    x0, p0: start, shape (k, n). longest: end of the search, in [s]. Returns inf if there is none.
+    x0, p0: start, shape (k, n); on groups x0 is a row (1, nq + (k - 1) nv).
+    longest: end of the search, in [s]. Returns inf if there is none.
     Raises InputError for other shapes, and a `longest` that is not positive.
     """
-    for name, array in (("x0", x0), ("p0", p0)):
-        require_shape(name, array, lagrangian.order, lagrangian.nv)
+    k, n = lagrangian.order, lagrangian.nv
+    shape = (k, n) if lagrangian.space is None else (1, lagrangian.nq + (k - 1) * n)
+    require_shape("x0", x0, *shape)
+    require_shape("p0", p0, k, n)
     if not 0 < longest < np.inf:
         raise InputError(f"longest must be positive and finite, in seconds, got {longest}.")
     scheme = _table(INNER_MODES[-1], lagrangian.order)
 
     def least(h: float) -> float:
-        segment = SchemeLagrangian(lagrangian, scheme, h).from_start(x0[None], p0[None])
+        segment = approximation(lagrangian, scheme, h).from_start(x0[None], p0[None])
         return float(_inner_eigenvalues(segment)[0, 0])
 
     h = longest / 16
@@ -104,15 +124,12 @@ def conjugate_time(lagrangian: Lagrangian, x0: Array, p0: Array, longest: float)
     return float(brentq(least, h / 1.25 if h > longest / 16 else longest * 1e-3, h, xtol=1e-12))
 
 
-def _change(before: Segment, after: Segment) -> float:
+def _change(before: AnySegment, after: AnySegment) -> float:
     """The relative change by a higher degree, of the derivatives of phi in (h x0, w) and the ends.
 
-    Momenta are these derivatives times powers of 1/h, which amplify rounding errors; w amplifies
-    them by the condition of d2L/dq^(k)2.
+    On groups of L_d in (q0, h v0, q1, h v1).
     """
-    k = after.k
-    scale = np.concatenate([np.full(k, after.h), np.ones(k)])[:, None]
-    old, new = (scale * s.gradient[:, : 2 * k] for s in (before, after))
+    old, new = before.scaled_momenta, after.scaled_momenta
     size = np.abs(new).max(axis=(1, 2), keepdims=True)
     changes = [np.max(np.abs(new - old) / np.where(size > 0, size, 1.0))]
     for old, new in ((before.x0, after.x0), (before.x1, after.x1)):
@@ -120,7 +137,7 @@ def _change(before: Segment, after: Segment) -> float:
     return float(max(changes))
 
 
-def _refuse_conjugate_points(segment: Segment) -> None:
+def _refuse_conjugate_points(segment: AnySegment) -> None:
     negative = _inner_eigenvalues(segment) < 0
     r = segment.inner.shape[1]
     last = segment.hessian[:, -1, -1]
@@ -134,8 +151,8 @@ def _refuse_conjugate_points(segment: Segment) -> None:
         )
 
 
-def _inner_eigenvalues(segment: Segment) -> Array:
-    m = 2 * segment.k * segment.x0.shape[2]
+def _inner_eigenvalues(segment: AnySegment) -> Array:
+    m = 2 * segment.k * segment.w.shape[2]
     inner = flat(segment.hessian)[:, m:, m:]
     return np.asarray(np.linalg.eigvalsh((inner + inner.transpose(0, 2, 1)) / 2))
 

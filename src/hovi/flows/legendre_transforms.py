@@ -3,7 +3,8 @@
 [ColomboFerraroMartin2016, sections 3 and 4; F+ and F- as in its theorems, interchanged with respect
 to its first display]
 
-Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n).
+Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n); on groups points are rows, of shape
+(B, 1, nq + (k - 1) nv) or (1, nq + (k - 1) nv).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
-from hovi.flows.segment import SegmentLagrangian
+from hovi.flows.segment import IntervalLagrangian
 from hovi.optimize.batched_newton import newton
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
@@ -33,29 +34,29 @@ INVOLVED = 0.1
 
 
 @check_arguments
-def legendre_minus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
+def legendre_minus(ld: IntervalLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^- L_d: (x0, x1) -> (x0, p0) with p0 = (-D_1 L_d, ..., -D_k L_d)."""
     segment = ld.joining(batch(x0), batch(x1))
-    return x0, segment.p0.reshape(np.shape(x0))
+    return x0, unbatched(x0, segment.p0)
 
 
 @check_arguments
-def legendre_plus(ld: SegmentLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
+def legendre_plus(ld: IntervalLagrangian, x0: Array, x1: Array) -> tuple[Array, Array]:
     """F^+ L_d: (x0, x1) -> (x1, p1) with p1 = (D_{k+1} L_d, ..., D_2k L_d)."""
     segment = ld.joining(batch(x0), batch(x1))
-    return x1, segment.p1.reshape(np.shape(x0))
+    return x1, unbatched(x1, segment.p1)
 
 
 @check_arguments
-def inverse_legendre_minus(ld: SegmentLagrangian, x0: Array, p0: Array) -> tuple[Array, Array]:
+def inverse_legendre_minus(ld: IntervalLagrangian, x0: Array, p0: Array) -> tuple[Array, Array]:
     """(F^- L_d)^-1: (x0, p0) -> (x0, x1), near the diagonal."""
-    return x0, ld.from_start(batch(x0), batch(p0)).x1.reshape(np.shape(x0))
+    return x0, unbatched(x0, ld.from_start(batch(x0), batch(p0)).x1)
 
 
 @check_arguments
-def inverse_legendre_plus(ld: SegmentLagrangian, x1: Array, p1: Array) -> tuple[Array, Array]:
+def inverse_legendre_plus(ld: IntervalLagrangian, x1: Array, p1: Array) -> tuple[Array, Array]:
     """(F^+ L_d)^-1: (x1, p1) -> (x0, x1), near the diagonal."""
-    return ld.from_end(batch(x1), batch(p1)).x0.reshape(np.shape(x1)), x1
+    return unbatched(x1, ld.from_end(batch(x1), batch(p1)).x0), x1
 
 
 @check_arguments
@@ -186,6 +187,11 @@ def hamiltonian(lagrangian: Lagrangian, x: Array | Sequence[Array], p: Array) ->
     jet.append(highest_derivative(lagrangian, jet, p))
     rates = np.stack(jet[1:], axis=1)
     return np.asarray(np.sum(p * rates, axis=(1, 2)) - lagrangian.value(*jet))
+
+
+def unbatched(x: Array, values: Array) -> Array:
+    """A batch, or its only row if x is no batch."""
+    return values if np.ndim(x) == 3 else values[0]
 
 
 def batch(x: npt.ArrayLike) -> Array:

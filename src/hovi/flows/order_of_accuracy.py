@@ -13,9 +13,8 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError
-from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
+from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian, approximation
 from hovi.flows.legendre_transforms import legendre
-from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
 
@@ -109,7 +108,7 @@ def variational_order(
     found = []
     for h in steps:
         exact = ExactDiscreteLagrangian(lagrangian, h).from_start(x, p)
-        approximate = SchemeLagrangian(lagrangian, scheme, h).between(x, exact.w)
+        approximate = approximation(lagrangian, scheme, h).between(x, exact.w)
         error = np.abs(approximate.values - exact.values)
         found.append((h, error.max(), error.mean(), np.abs(exact.values).max()))
     return VariationalOrder(*np.array(found, dtype=np.float64).T)

@@ -49,7 +49,12 @@ class SchemeLagrangian(SegmentLagrangian):
     h: float
 
     def __post_init__(self) -> None:
-        check_segment(self.lagrangian, self.h)
+        check_step(self.h)
+        if self.lagrangian.nq != self.lagrangian.nv:
+            raise InputError(
+                "a SchemeLagrangian needs joints with nq = nv: for others use "
+                "hovi.ChartedLagrangian(lagrangian, space, scheme, h)."
+            )
         if self.scheme.derivatives != self.lagrangian.order:
             raise SchemeError(
                 f"scheme {self.scheme.name!r} is for Lagrangians of order "
@@ -248,14 +253,9 @@ def uniform_grid(ld: DiscreteLagrangian) -> tuple[Scheme, float]:
     return schemes[0][0], float(steps[0])
 
 
-def check_segment(lagrangian: Lagrangian, h: float) -> None:
-    """Raise InputError for an invalid step, or a configuration space that is no vector space."""
+def check_step(h: float) -> None:
+    """Raise InputError for an invalid step."""
     if not (np.isfinite(h) and h > 0):
         raise InputError(f"a step must be positive and finite, got {h} s.")
     if not MIN_STEP <= h <= MAX_STEP:
         raise InputError(f"a step must be from {MIN_STEP:g} to {MAX_STEP:g} s, got {h:g} s.")
-    if lagrangian.nq != lagrangian.nv:
-        raise InputError(
-            "L_d between two points needs joints with nq = nv: lock the others with "
-            "load_robot(..., locked=[...]), or use hovi.flow."
-        )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -82,6 +83,16 @@ class Segment:
     def derivatives(self) -> Array:
         """D_1 .. D_2k of L_d with respect to (x0, x1), shape (B, 2 k, n)."""
         return np.concatenate([-self.p0, self.p1], axis=1)
+
+    @property
+    def scaled_momenta(self) -> Array:
+        """Derivatives of phi in (h x0, w), of one size as h tends to zero, shape (B, 2 k, n).
+
+        Momenta are these times powers of 1/h, which amplify rounding errors; w amplifies them by
+        the condition of d2L/dq^(k)2.
+        """
+        scale = np.concatenate([np.full(self.k, self.h), np.ones(self.k)])[:, None]
+        return np.asarray(scale * self.gradient[:, : 2 * self.k])
 
     @property
     def step_derivative(self) -> Array:
@@ -162,10 +173,41 @@ def flat(blocks: Array) -> Array:
     return blocks.transpose(0, 1, 3, 2, 4).reshape(B, m * n, count * n)
 
 
-@check_arguments
-class SegmentLagrangian(ABC):
+class EndsAndMomenta(Protocol):
+    """What the segments of vector spaces and of groups have in common.
+
+    Momenta have shape (B, k, n), L_d (B,), and W_d = [D_{i, k+j} L_d] (B, k n, k n).
+    """
+
+    @property
+    def x0(self) -> Array:
+        """The start."""
+
+    @property
+    def x1(self) -> Array:
+        """The end."""
+
+    @property
+    def p0(self) -> Array:
+        """Momenta at the start."""
+
+    @property
+    def p1(self) -> Array:
+        """Momenta at the end."""
+
+    @property
+    def values(self) -> Array:
+        """L_d."""
+
+    @property
+    def regularity_matrix(self) -> Array:
+        """W_d."""
+
+
+class IntervalLagrangian(ABC):
     """L_d(x0, x1) for an interval of length h, x = (q, q', ..., q^(k-1)) in T^(k-1)Q.
 
+    On vector spaces points have shape (B, k, n), on groups (B, 1, nq + (k - 1) nv).
     lagrangian: L on T^(k)Q. h: length of the interval, in [s].
     """
 
@@ -186,6 +228,42 @@ class SegmentLagrangian(ABC):
     def regularized(self) -> Regularized:
         """The transformation between (x0, w) and (x0, x1)."""
         return regularized(self.k, self.h)
+
+    @property
+    def on_group(self) -> bool:
+        """Whether points are rows (q, q', ..), as on groups."""
+        return self.lagrangian.space is not None
+
+    @abstractmethod
+    def joining(self, x0: Array, x1: Array, t0: float = 0.0) -> EndsAndMomenta:
+        """The segment between two points. t0: time at its start, in [s]."""
+
+    @abstractmethod
+    def from_start(
+        self, x0: Array, p0: Array, t0: float = 0.0, guess: Any = None
+    ) -> EndsAndMomenta:
+        """(F^-)^-1: the segment that starts at x0 with momenta p0.
+
+        guess: the segment before.
+        """
+
+    @abstractmethod
+    def from_end(self, x1: Array, p1: Array, t0: float = 0.0) -> EndsAndMomenta:
+        """(F^+)^-1: the segment that ends at x1 with momenta p1."""
+
+    def value(self, x0: Array, x1: Array) -> Array:
+        """L_d(x0, x1), shape (B,)."""
+        return self.joining(x0, x1).values
+
+
+@check_arguments
+class SegmentLagrangian(IntervalLagrangian):
+    """L_d(x0, x1) on a vector space."""
+
+    @property
+    def on_group(self) -> bool:
+        """False."""
+        return False
 
     @abstractmethod
     def between(self, x0: Array, w: Array, t0: float = 0.0) -> Segment:
@@ -218,7 +296,3 @@ class SegmentLagrangian(ABC):
             B = len(array)
             if B == 0:
                 raise InputError(f"{name} must have one row or more, got shape {array.shape}.")
-
-    def value(self, x0: Array, x1: Array) -> Array:
-        """L_d(x0, x1), shape (B,)."""
-        return self.joining(x0, x1).values

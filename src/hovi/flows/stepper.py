@@ -23,7 +23,8 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.flows.group_lagrangian import ChartedLagrangian, ChartedSegment
+from hovi.flows.charted_segment import ChartedSegment
+from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import (
     coordinates_in_words,
     hamiltonian,
@@ -31,7 +32,7 @@ from hovi.flows.legendre_transforms import (
     require_regular_lagrangian,
 )
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, uniform_grid
-from hovi.flows.segment import Segment, SegmentLagrangian
+from hovi.flows.segment import IntervalLagrangian, Segment
 from hovi.flows.symmetry import Symmetry
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
@@ -55,7 +56,7 @@ class Flow:
     symmetries: by name, for `momentum_maps`.
     """
 
-    ld: SegmentLagrangian | ChartedLagrangian
+    ld: IntervalLagrangian
     t: Array
     x: Array
     p: Array
@@ -72,8 +73,8 @@ class Flow:
     @property
     def jets(self) -> list[Array]:
         """q, q', ..., q^(k-1) at the nodes, k arrays (N + 1, nq) or (N + 1, n)."""
-        if isinstance(self.ld, ChartedLagrangian):
-            return self.ld.split(self.x[:, 0])
+        if self.ld.on_group:
+            return _rows_apart(self.ld, self.x[:, 0])
         return list(np.moveaxis(self.x, 1, 0))
 
     @property
@@ -114,7 +115,7 @@ class Flow:
 
 @check_arguments
 def flow(
-    ld: DiscreteLagrangian | SegmentLagrangian | ChartedLagrangian,
+    ld: DiscreteLagrangian | IntervalLagrangian,
     z0: State | npt.ArrayLike,
     p0: npt.ArrayLike,
     steps: int,
@@ -135,6 +136,7 @@ def flow(
         error in q above `tolerance` (relative to max(|q|, 1)); otherwise InputError states the time
         up to which the motion is accurate. Optimal control is unstable in both directions of time.
         Motions on groups are not monitored.
+    symmetries: by name, whose momentum maps are wanted along the motion.
     Raises InputError also for wrong shapes, steps without a solution, and a Lagrangian that is
     singular in q^(k) at the start (passive joints, costs of a curve's shape alone), SchemeError for
     a scheme that is not regular.
@@ -142,15 +144,13 @@ def flow(
     segment = _segment(ld) if isinstance(ld, DiscreteLagrangian) else ld
     if isinstance(segment, SchemeLagrangian | ChartedLagrangian) and segment.k == 2:
         require_regular(segment.scheme)
-    if symmetries and isinstance(segment, ChartedLagrangian):
-        raise InputError("momentum maps are supported only for joints with nq = nv.")
     x, p = _start(segment, z0, p0)
     if steps < 1:
         raise InputError(f"the number of steps must be 1 or more, got {steps}.")
     require_regular_lagrangian(segment.lagrangian, _jet(segment, x), p[None], t0)
     stepper = _stepper(segment, x, p, t0)
     monitor = None
-    if not force and not isinstance(segment, ChartedLagrangian):
+    if not force and not segment.on_group:
         monitor = _RoundingMonitor(segment, x, p, tolerance)
     records = _allocate(segment, x, p, steps)
     for i in range(steps):
@@ -173,10 +173,8 @@ def _segment(ld: DiscreteLagrangian) -> SchemeLagrangian | ChartedLagrangian:
     return ChartedLagrangian(ld.lagrangian, space, scheme, h)
 
 
-def _stepper(
-    ld: SegmentLagrangian | ChartedLagrangian, x: Array, p: Array, t0: float
-) -> _Stepper | _ChartedStepper:
-    if isinstance(ld, ChartedLagrangian):
+def _stepper(ld: IntervalLagrangian, x: Array, p: Array, t0: float) -> _Stepper | _ChartedStepper:
+    if ld.on_group:
         return _ChartedStepper(ld, x, p, t0)
     return _Stepper(ld, x, p, t0)
 
@@ -184,7 +182,7 @@ def _stepper(
 class _ChartedStepper:
     """The state of a flow on groups."""
 
-    def __init__(self, ld: ChartedLagrangian, x: Array, p: Array, t0: float) -> None:
+    def __init__(self, ld: IntervalLagrangian, x: Array, p: Array, t0: float) -> None:
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
         self._segment: ChartedSegment | None = None
         self._steps = 0
@@ -196,6 +194,7 @@ class _ChartedStepper:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
         except InputError as failure:
             raise _ended(t, self._steps + 1, failure) from failure
+        assert isinstance(segment, ChartedSegment)
         self.x, self.p, self._segment = segment.x1[0], segment.p1[0], segment
         self._steps += 1
         return segment
@@ -204,7 +203,7 @@ class _ChartedStepper:
 class _Stepper:
     """The state of a flow, with the remainders of its compensated sums."""
 
-    def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, t0: float) -> None:
+    def __init__(self, ld: IntervalLagrangian, x: Array, p: Array, t0: float) -> None:
         R = ld.regularized
         self.ld, self.x, self.p, self.t0 = ld, x, p, t0
         self._remainder = np.zeros((2, *x.shape))
@@ -222,6 +221,7 @@ class _Stepper:
             segment = self.ld.from_start(self.x[None], self.p[None], t, self._segment)
         except InputError as failure:
             raise _ended(t, self._steps + 1, failure) from failure
+        assert isinstance(segment, Segment)
         dx = self._taylor @ self.x + self._moments @ segment.w[0]
         dp = self._momentum_taylor @ self.p + self._kick @ segment.gradient[0, : self.ld.k]
         self.x, self._remainder[0] = compensated(self.x, dx, self._remainder[0])
@@ -238,7 +238,7 @@ def _ended(t: float, step: int, failure: InputError) -> InputError:
 class _RoundingMonitor:
     """Propagates rounding errors of the start by the tangent maps of the steps."""
 
-    def __init__(self, ld: SegmentLagrangian, x: Array, p: Array, tolerance: float) -> None:
+    def __init__(self, ld: IntervalLagrangian, x: Array, p: Array, tolerance: float) -> None:
         sizes = np.concatenate([np.abs(x).max(axis=1), np.abs(p).max(axis=1)])
         sizes[0] = max(1.0, sizes[0])
         self._tangent = np.diag(EPS * np.repeat(sizes, ld.n))
@@ -266,17 +266,17 @@ def compensated(sum_: Array, increment: Array, remainder: Array) -> tuple[Array,
 
 
 def _start(
-    ld: SegmentLagrangian | ChartedLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
+    ld: IntervalLagrangian, z0: State | npt.ArrayLike, p0: npt.ArrayLike
 ) -> tuple[Array, Array]:
     """x and p as arrays (k, n). Raises InputError for wrong shapes."""
     if isinstance(z0, State):
         v = np.zeros(ld.n) if z0.v is None else z0.v
         rows = [np.asarray(z0.q, float), np.asarray(v, float)][: ld.k]
-        z0 = np.concatenate(rows)[None] if isinstance(ld, ChartedLagrangian) else np.stack(rows)
+        z0 = np.concatenate(rows)[None] if ld.on_group else np.stack(rows)
     x, p = numbers_of("z0", z0), numbers_of("p0", p0)
     shape = (ld.k, ld.n)
-    if isinstance(ld, ChartedLagrangian):
-        shape = (1, ld.space.nq + (ld.k - 1) * ld.n)
+    if ld.on_group:
+        shape = (1, ld.lagrangian.nq + (ld.k - 1) * ld.n)
     for name, array, expected in (("z0", x, shape), ("p0", p, (ld.k, ld.n))):
         if array.shape != expected or not np.isfinite(array).all():
             raise InputError(
@@ -286,12 +286,17 @@ def _start(
     return x, p
 
 
-def _jet(ld: SegmentLagrangian | ChartedLagrangian, x: Array) -> list[Array]:
+def _jet(ld: IntervalLagrangian, x: Array) -> list[Array]:
     """(q, q', ..., q^(k-1)) of one point, k arrays of one row."""
-    return ld.split(x) if isinstance(ld, ChartedLagrangian) else list(x[:, None])
+    return _rows_apart(ld, x) if ld.on_group else list(x[:, None])
 
 
-def _require_regular_step(ld: SegmentLagrangian | ChartedLagrangian, segment: Segment) -> None:
+def _rows_apart(ld: IntervalLagrangian, x: Array) -> list[Array]:
+    """(q, q', ..) of points on a group, (N, nq + (k - 1) nv)."""
+    return np.split(x, [ld.lagrangian.nq], axis=1)[: ld.k]
+
+
+def _require_regular_step(ld: IntervalLagrangian, segment: Segment) -> None:
     """Raise InputError where the discrete Lagrangian is singular: W_d, and a step's equations."""
     own, carried = segment.newton_terms
     kernel = kernel_coordinates((own - carried)[0], ld.n, (np.abs(own) + np.abs(carried))[0])
@@ -304,7 +309,7 @@ def _require_regular_step(ld: SegmentLagrangian | ChartedLagrangian, segment: Se
 
 
 def _allocate(
-    ld: SegmentLagrangian | ChartedLagrangian, x: Array, p: Array, steps: int
+    ld: IntervalLagrangian, x: Array, p: Array, steps: int
 ) -> tuple[Array, Array, Array, Array]:
     """Arrays for x, p, z and inner modes of all steps, with the start filled in."""
     # an exact L_d may use the maximum number of inner modes

@@ -97,7 +97,7 @@ class JerkLagrangian(Lagrangian):
         if not self.torque_rates:
             return self.effort.output(q, v, a, t=t)
         tau, J = self.effort.torque(q, v, a, t)
-        rate = TorqueRate(self.effort.torques, q, v, a, j)
+        rate = TorqueRate(self.effort.torques, q, v, a, j, self.space)
         return np.concatenate([tau, rate.value(J)], axis=1)
 
     @check_arguments
@@ -129,7 +129,7 @@ class JerkLagrangian(Lagrangian):
             gradient[:, 3] += terms.jet_gradient[:, 3 * n :]
             if self.torque_rates:
                 J = self.effort.torque(q, v, a, t)[1]
-                Jr = TorqueRate(self.effort.torques, q, v, a, j).linearize(J)[1]
+                Jr = TorqueRate(self.effort.torques, q, v, a, j, self.space).linearize(J)[1]
                 gradient += _transposed(Jr, terms.output_gradient[:, n:]).reshape(gradient.shape)
         return gradient
 
@@ -165,7 +165,7 @@ class JerkLagrangian(Lagrangian):
             hessian[:, last, last] += terms.jet_weight[:, k:]
         value, outputs = first.value + self._square(j), first.outputs
         if self.torque_rates:
-            rate = TorqueRate(self.effort.torques, q, v, a, j)
+            rate = TorqueRate(self.effort.torques, q, v, a, j, self.space)
             rates, Jr = rate.linearize(np.ascontiguousarray(first.jacobian))
             if terms is not None:
                 gradient += _transposed(Jr, terms.output_gradient[:, n:])

@@ -23,7 +23,7 @@ from hovi.cli.application import main
 from hovi.discrete.state import State
 from hovi.effects import Armature, Drag, Gravity, Payload, VelocityCost, ViscousFriction, Wrench
 from hovi.errors import InputError, SceneError
-from hovi.flows.tracking import play
+from hovi.flows.execution.tracking import play
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.task import Task

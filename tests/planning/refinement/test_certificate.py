@@ -15,7 +15,7 @@ from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.state import State
 from hovi.effects import Armature, Custom, Gravity, ViscousFriction, Wrench
 from hovi.errors import InputError
-from hovi.flows.dynamics_replay import replay_dynamics
+from hovi.flows.execution.dynamics_replay import replay_dynamics
 from hovi.planning.refinement.certificate import certify, momentum_jump
 from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import nodal_hamiltonian

@@ -12,7 +12,6 @@ import pytest
 import hovi
 from hovi.effects import Gravity, JerkCost
 from hovi.errors import InputError
-from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 START = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0])
@@ -190,8 +189,29 @@ def test_limits_on_rates_without_a_cost_on_the_jerk_are_refused(ur5: hovi.Scene)
             hovi.plan(ur5, START, GOAL, 1.5, limits=limits)
 
 
-def test_continuous_joints_are_refused_by_name(two_link: Robot) -> None:
-    scene = hovi.Scene(hovi.load_robot("kinova"), [Gravity()])
+def test_continuous_joints_move_smoothly_within_limits_on_the_torque_rate() -> None:
+    """The kinova's; the rate by differences of the fourth order of the torque along the motion."""
+    robot = hovi.load_robot("kinova")
+    scene = hovi.Scene(robot, [Gravity()])
+    start = robot.integrate(robot.neutral(), np.array([0.3, 2.8, 1.2, 0.5, 1.0, 0.2]))
+    goal = robot.integrate(start, np.array([0.8, 0.4, -0.3, 0.6, 0.4, -0.5]))
+    free = hovi.plan(scene, start, goal, 1.5, smooth=True)
+    assert free.success, free.message
+
+    def largest_rate(motion: hovi.Trajectory) -> float:
+        t, h = np.linspace(0.01, 1.49, 1_001), 1e-4
+        tau = [motion.sample(t + i * h).tau for i in (-2, -1, 1, 2)]
+        return float(np.abs((tau[0] - 8 * tau[1] + 8 * tau[2] - tau[3]) / (12 * h)).max())
+
+    bound = 0.8 * largest_rate(free.trajectory)
+    found = hovi.plan(scene, start, goal, 1.5, smooth=True, limits={"torque_rate": bound})
+    assert found.success, found.message
+    np.testing.assert_allclose(found.trajectory.jet([0.0, 1.5])[2], 0.0, atol=1e-9)
+    assert largest_rate(found.trajectory) < (1 + 1e-4) * bound
+
+
+def test_orientations_are_refused_by_name() -> None:
+    scene = hovi.Scene(hovi.load_robot(hovi.example("flying_body.urdf"), free_flyer=True))
     q = scene.robot.neutral()
-    with pytest.raises(InputError, match="order 3"):
-        hovi.plan(scene, q, q, 1.0, smooth=True)
+    with pytest.raises(InputError, match="order 3 need the third derivatives of charts"):
+        hovi.plan(scene, q, q, 1.0, smooth=True, limits="none")

@@ -14,7 +14,7 @@ from hovi.accuracy.effect_study.candidates import check_frames_move, effect_cand
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
-from hovi.flows.tracking import play
+from hovi.flows.execution.tracking import play
 from hovi.planning.search.job import Progress
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from hovi.flows.execution.tracking import Tracking
     from hovi.flows.simulator import Simulation
-    from hovi.flows.tracking import Tracking
     from hovi.planning.task_file.task import Task
 
 
@@ -96,7 +96,7 @@ def _track(
     inner_modes: int,
 ) -> Tracking:
     from hovi.cli.arguments.files import load_trajectory
-    from hovi.flows.tracking import play
+    from hovi.flows.execution.tracking import play
 
     return play(
         task.scene,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hovi.cli.reports.accuracy import errors_json, errors_text
-from hovi.flows.dynamics_replay import DynamicsReplay
+from hovi.flows.execution.dynamics_replay import DynamicsReplay
 from hovi.planning.refinement.certificate import Certificate, Peak
 
 NOT_OPTIMALITY = "this certifies dynamics and torques, not optimality"

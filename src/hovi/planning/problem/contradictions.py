@@ -30,9 +30,9 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
-    more: Array = problem.end_jets[:, 2:3] if problem.ld.k > 2 else np.zeros((2, 0, len(v0)))
+    accelerations = problem.end_jets[2:3] if problem.ld.k > 2 else ()
     for i, (end, state) in enumerate((("start", (q0, v0)), ("goal", (q1, v1)))):
-        for row, values in enumerate((*state, *more[i])):
+        for row, values in enumerate((*state, *(a[i] for a in accelerations))):
             held = ~problem.free_ends[i, row]
             here = limits.at_ends[i]
             sentence = _outside(problem.coordinates, end, row, values, here, held)

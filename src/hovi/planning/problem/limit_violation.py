@@ -142,7 +142,8 @@ def _outputs(trajectory: Trajectory, k: Index, s: Array, limits: Limits) -> Arra
         t = trajectory.t[k] + s * trajectory.grid.steps[k]
         tau = trajectory.scene.inverse_dynamics(q, v, a, t)
         if limits.bounded[KINDS.index("torque_rate")].any():
-            rate = TorqueRate(trajectory.scene.torques, q, v, a, j).value()
+            rate = TorqueRate(trajectory.scene.torques, q, v, a, j, trajectory.space).value()
+    q = q if trajectory.space is None else trajectory.space.coordinates(q)
     return np.stack([q, v, a, tau, j, rate], axis=1)
 
 

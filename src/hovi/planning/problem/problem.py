@@ -18,13 +18,16 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import (
     Boundary,
     Curve,
-    hermite,
     moved,
-    moved_any,
     named_curve,
-    path_of_any_order,
     path_on_grid,
     with_turns,
+)
+from hovi.discrete.path_of_any_order import (
+    moved_any,
+    path_of_any_order,
+    polynomial,
+    with_fixed,
 )
 from hovi.discrete.state import Periodic, State
 from hovi.discrete.stored_torque import StoredTorque
@@ -73,7 +76,7 @@ class TrajectoryProblem:
     via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None.
     boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
-    end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, shape (2, k, nv).
+    end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, k arrays of two rows.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
     conditions: equations at nodes. unreachable: why the goal cannot be met, or "".
@@ -89,7 +92,7 @@ class TrajectoryProblem:
     via: tuple[Via, ...] = ()
     clearance: Clearance | None = None
     boundary: Boundary = field(init=False, repr=False)
-    end_jets: Array = field(init=False, repr=False)
+    end_jets: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
@@ -131,8 +134,8 @@ class TrajectoryProblem:
         for state, name in named:
             state.require_order(k, name)
         if k != 2:
-            jets = np.stack([state.jet_on(coordinates, name)[:k] for state, name in named])
-            object.__setattr__(self, "end_jets", jets)
+            jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
+            object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
         object.__setattr__(self, "boundary", (*start, *goal))
         object.__setattr__(self, "free_ends", np.stack(free))
         object.__setattr__(self, "conditions", tuple(conditions))
@@ -209,8 +212,8 @@ class TrajectoryProblem:
     def path(self, curve: Curve) -> DiscretePath:
         """A curve sampled on the grid, with the problem's ends in fixed components."""
         if self.ld.k != 2:
-            ends = np.stack(curve(np.array([0.0, self.grid.duration]))[: self.ld.k], axis=1)
-            return path_of_any_order(curve, self.grid, self._with_fixed(ends))
+            ends = curve(np.array([0.0, self.grid.duration]))[: self.ld.k]
+            return path_of_any_order(curve, self.grid, self._with_fixed(ends), self.coordinates)
         q, v, _ = curve(np.array([0.0, self.grid.duration]))
         return path_on_grid(curve, self.grid, self.ends(q, v), self.coordinates)
 
@@ -218,24 +221,22 @@ class TrajectoryProblem:
         """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
         if self.ld.k == 2:
             return moved(path, self.grid, self.ends(path.q, path.v), self.coordinates)
-        return moved_any(path, self.grid, self._with_fixed(path.nodes[[0, -1]]))
+        ends = [x[[0, -1]] for x in (path.q, *np.moveaxis(path.rates, 1, 0))]
+        return moved_any(path, self.grid, self._with_fixed(ends), self.coordinates)
 
     def guess(self, name: str) -> DiscretePath:
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
         T = self.grid.duration
         if self.ld.k != 2:
-            return self.path(hermite(self.end_jets, T))
+            return self.path(polynomial(self.coordinates, self.end_jets, T, self.turns))
         curve = named_curve(name, self.coordinates, self.boundary, T)
         if self.turns.any():
             curve = with_turns(curve, self.coordinates, T, self.turns)
         return self.path(curve)
 
-    def _with_fixed(self, ends: Array) -> Array:
-        """Ends (2, k, nv) with the problem's own in fixed components."""
-        ends = np.where(self.free_ends, ends, self.end_jets)
-        if self.periodic:
-            ends[1] = ends[0] + self.end_jets[1] - self.end_jets[0]
-        return ends
+    def _with_fixed(self, ends: Sequence[Array]) -> list[Array]:
+        """(q, q', ..., q^(k-1)) of two ends, with the problem's own in fixed components."""
+        return with_fixed(self.coordinates, ends, self.end_jets, self.free_ends, self.periodic)
 
     def trajectory(self, path: DiscretePath) -> Trajectory:
         """A path on the grid as a trajectory without momenta, for sampling."""

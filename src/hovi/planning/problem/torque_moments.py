@@ -73,7 +73,9 @@ class TorqueMoments:
             if expansion.charts is None:
                 slopes = moments.slopes(jacobian)
             else:
-                slopes = moments.slopes_in_charts(jacobian, expansion.charts[i])
+                charts = expansion.charts[i]
+                assert isinstance(charts, IntervalCharts)  # torques have Lagrangians of order 2
+                slopes = moments.slopes_in_charts(jacobian, charts)
             B, rows, m, n = slopes.shape
             flat = slopes.reshape(B, rows, m * n)
             scaled = flat.transpose(0, 2, 1) * (weight / moments.batch.h[:, None, None])

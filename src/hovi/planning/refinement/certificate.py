@@ -14,7 +14,7 @@ from hovi.discrete.curve_integral import CurveIntegral, integral_along
 from hovi.discrete.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
-from hovi.flows.dynamics_replay import DynamicsReplay, replay_dynamics
+from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.error_estimate import estimate_error

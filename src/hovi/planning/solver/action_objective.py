@@ -273,7 +273,8 @@ class ActionObjective(Objective[DiscretePath]):
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
         if self.ld.k != 2:
-            return move_any(x, model.gather(step), self.problem.grid.steps)
+            on = self.problem.coordinates
+            return move_any(x, model.gather(step), self.problem.grid.steps, on.curved_space)
         nodal = self.coordinates == "nodal"
         dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
         path = _new_path(self._integrate(x.q, dq), *moved)

@@ -15,7 +15,6 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, moved, stretched
 from hovi.discrete.measures.motion_effort import effort_of
-from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import Periodic, State, as_state
 from hovi.discrete.trajectory import Trajectory
@@ -27,6 +26,7 @@ from hovi.planning.problem.tolerance import Accuracy
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.nodal_momenta import accumulated_momenta
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.robot.space.coordinates import Coordinates
@@ -258,7 +258,7 @@ def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePat
             check_path(guess, grid, coordinates)
         else:
             grid.require_path(guess, coordinates.nq, coordinates.nv)
-            require_continuous(guess, grid)
+            require_continuous(guess, grid, coordinates.curved_space)
         return problem.moved(guess)
     if isinstance(guess, str):
         return problem.guess(guess)

@@ -11,6 +11,7 @@ import casadi as ca
 import pinocchio as pin
 
 from hovi.errors import SceneError
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.groups import SE2, SE3, SO2, SO3
 from hovi.robot.space.joint_kinds import kind_of
 
@@ -26,6 +27,30 @@ def configuration_rate(model: pin.Model, q: ca.SX, v: ca.SX) -> ca.SX:
         rate = v[joint.idx_v : joint.idx_v + joint.nv]
         rates.append(_rate(str(name), joint, here, rate))
     return ca.vertcat(*rates)
+
+
+def rate_on(space: ConfigurationSpace, q: ca.SX, v: ca.SX) -> ca.SX:
+    """The same on a product of vector spaces and groups."""
+    rate = ca.SX(space.nq, 1)
+    rows, columns = space.plain
+    if len(rows):
+        rate[rows.tolist()] = v[columns.tolist()]
+    for factor in space.factors:
+        rate[factor.q] = _RATES[factor.group.name](q[factor.q], v[factor.v])
+    return rate
+
+
+def bracket_on(space: ConfigurationSpace, x: ca.SX, y: ca.SX) -> ca.SX:
+    """The Lie bracket [x, y] of left-invariant tangent vectors, columns of nv."""
+    result = ca.SX(space.nv, 1)
+    for factor in space.curved:
+        indices = list(factor.group.se3_indices)
+        a, b, c = ca.SX(6, 1), ca.SX(6, 1), ca.SX(6, 1)
+        a[indices], b[indices] = x[factor.v], y[factor.v]
+        c[:3] = ca.cross(a[3:], b[:3]) + ca.cross(a[:3], b[3:])
+        c[3:] = ca.cross(a[3:], b[3:])
+        result[factor.v] = c[indices]
+    return result
 
 
 def _rate(name: str, joint: pin.JointModel, q: ca.SX, v: ca.SX) -> ca.SX:

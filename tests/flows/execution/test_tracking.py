@@ -17,9 +17,9 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity, Payload, ViscousFriction, Wrench
 from hovi.errors import InputError
-from hovi.flows.controllers import FEEDBACKS, Controller, OpenLoop, controller
+from hovi.flows.execution.controllers import FEEDBACKS, Controller, OpenLoop, controller
+from hovi.flows.execution.tracking import Tracking, play
 from hovi.flows.simulator import simulate
-from hovi.flows.tracking import Tracking, play
 from hovi.planning.refinement.certificate import certify
 from hovi.planning.search.planner import plan
 from hovi.planning.task_file.reading import load_task

@@ -5,9 +5,9 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.nodal_momenta import accumulated_momenta
 from hovi.discrete.state import State
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.nodal_momenta import accumulated_momenta
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene

@@ -13,7 +13,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
-from hovi.flows.controllers import Controller, controller
+from hovi.flows.execution.controllers import Controller, controller
 from hovi.flows.simulator import Simulation, simulate
 from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.scene import Scene

@@ -1,0 +1,1 @@
+"""Planned torques as executed: forward simulation, feedback controllers, tracking."""
