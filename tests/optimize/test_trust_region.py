@@ -501,3 +501,16 @@ def test_outcomes_start_empty() -> None:
     outcome = Outcome(0.0, 1.0, Stop.DIVERGED, 0)
     assert outcome.history == []
     assert outcome.saddles_left == []
+
+
+@pytest.mark.parametrize("cubic", [0.05, 0.1, 0.2])
+def test_no_step_is_taken_once_only_rounding_remains(cubic: float) -> None:
+    """Newton's iterates of 1 + x^2/2 + c x^3 are x' = 3 c x^2 / (1 + 6 c x), towards 0."""
+    f = objective(1, lambda x: 1 + x[0] ** 2 / 2 + cubic * x[0] ** 3)
+    found = minimize(f, np.array([1e-3]), Options(exact=True))
+    iterates = [1e-3]
+    for _ in range(found.iterations):
+        iterates.append(3 * cubic * iterates[-1] ** 2 / (1 + 6 * cubic * iterates[-1]))
+    left = [x**2 / 2 + cubic * x**3 for x in iterates]
+    assert left[-1] <= 1e-26 < left[-2]
+    assert found.x[0] == pytest.approx(iterates[-1], abs=1e-16)

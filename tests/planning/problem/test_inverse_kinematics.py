@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import hovi
+from hovi.planning.problem.frame_goal import FrameCondition
 from hovi.planning.problem.inverse_kinematics import _seeds, inverse_kinematics
 from hovi.robot.robot import Robot
 
@@ -69,3 +71,37 @@ def test_a_goal_a_few_micrometres_beyond_the_reach_is_not_met(
     goal = hovi.FrameGoal("tip", position=[0.0, 0.0, -2.5 - beyond])
     found = inverse_kinematics(two_link, goal, np.array([-1.2, 0.3]))
     assert (found.reason == "") == is_met
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded(FrameCondition):
+    """Keeps every configuration at which it is evaluated."""
+
+    tried: list[np.ndarray] = field(default_factory=list)
+
+    def evaluate(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self.tried.append(q.copy())
+        return super().evaluate(q, v)
+
+
+class RecordedGoal(hovi.FrameGoal):
+    """A goal whose condition is the same object each time."""
+
+    def condition(self, robot: Robot) -> FrameCondition:
+        return self.__dict__.setdefault("recorded", Recorded(self, robot))
+
+
+def test_no_step_moves_a_joint_by_more_than_half_a_radian(ur5: Robot) -> None:
+    """Each configuration is a seed, or that near to one before it."""
+    goal, near = RecordedGoal("tool0", position=[-0.4, 0.3, 0.2]), np.full(6, 0.3)
+    assert inverse_kinematics(ur5, goal, near).reason == ""
+    tried = goal.condition(ur5).tried
+    free = np.full(6, np.inf)
+    seeds = [*_seeds(ur5, near, -free, free)]
+    steps = 0
+    for i, q in enumerate(tried):
+        if any(np.array_equal(q, seed) for seed in seeds):
+            continue
+        steps += 1
+        assert min(np.abs(q - before).max() for before in tried[:i]) <= 0.5 * (1 + 1e-12)
+    assert steps > 10

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,12 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.refinement.candidate import Candidate, contributions
 from hovi.planning.refinement.error_estimate import FinerSolution, finer_than
-from hovi.planning.refinement.next_grid import TARGET_SHARE, _demands, interpolated_to
+from hovi.planning.refinement.next_grid import (
+    TARGET_SHARE,
+    _demands,
+    interpolated_to,
+    next_grid,
+)
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -82,3 +89,14 @@ def test_intervals_that_meet_their_demands_meet_the_tolerance(
     scale = max(1.0, candidate.error / known.sum())
     assert demand.power == 2
     np.testing.assert_allclose(demand.factor * known * scale, TARGET_SHARE * size / 4, rtol=1e-12)
+
+
+@pytest.mark.parametrize("error", [1e-4, 5e-3, 2e-2, 0.1])
+def test_the_modes_are_trusted_up_to_an_error_of_one_per_cent(
+    arm_scene: Scene, error: float
+) -> None:
+    """Beyond that an interval gets six of them at most, whatever the tolerance."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid(STEPS, (galerkin(4),) * 4))
+    found = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V)))
+    candidate = dataclasses.replace(Candidate.of(found, Tolerance(1e-14)), contradicted=error)
+    assert (next_grid(candidate).inner_modes > 6) == (error <= 0.01)

@@ -24,6 +24,8 @@ inline bool consistent(const pinocchio::Model& model) {
         model.nvs.size(), model.children.size(), model.supports.size(), model.subtrees.size()})
     holds &= size == n;
   if (!holds) return false;
+  // of the universe, from which Pinocchio takes the sizes of its data
+  holds &= model.parents[0] == 0 && model.nqs[0] == 0 && model.nvs[0] == 0;
   int nq = 0, nv = 0;
   for (std::size_t i = 1; i < n; ++i) {
     const auto& joint = model.joints[i];
