@@ -55,7 +55,7 @@ class DiscreteLagrangian:
         if self.k > 2 and self.chart is not None:
             raise InputError(
                 f"boundary value problems of order {self.k} need the third derivatives of charts "
-                "of orientations, which are not there: lock such joints with "
+                "of orientations, which are not implemented: lock such joints with "
                 "load_robot(..., locked=[...])."
             )
         _ = self.segments  # raises where the grid has no node at the end of one

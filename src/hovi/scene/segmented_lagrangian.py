@@ -183,6 +183,6 @@ def _require_fitting(first: Lagrangian, other: Lagrangian) -> None:
     scene = getattr(other, "scene", None)
     if isinstance(scene, Scene) and scene.passive:
         raise InputError(
-            f"passive joints are not there for motions in segments, and {scene.passive[0]!r} is "
-            "one: solve each segment as a problem of its own."
+            f"motions in segments do not support passive joints such as {scene.passive[0]!r}: "
+            "solve each segment as a problem of its own."
         )

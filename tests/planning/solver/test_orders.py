@@ -228,7 +228,7 @@ def test_a_third_positional_argument_of_a_state_is_no_acceleration() -> None:
 
 def test_limits_of_other_orders_are_refused_by_name() -> None:
     limits = as_limits(hovi.spline(1, 4).coordinates, {"base": "none", "v": 1.0})
-    with pytest.raises(InputError, match="limits are there for Lagrangians of orders 2 and 3"):
+    with pytest.raises(InputError, match="limits need a Lagrangian of order 2 or 3"):
         problem_of(hovi.spline(1, 4), 1.0, State([0.0]), State([1.0]), limits=limits)
     limits = as_limits(hovi.spline(1, 2).coordinates, {"base": "none", "jerk": 1.0})
     with pytest.raises(InputError, match=r"the jerk and on the torque rate need .* of order 3"):

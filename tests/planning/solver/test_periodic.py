@@ -315,7 +315,7 @@ def test_what_a_periodic_motion_does_not_have_is_refused() -> None:
         (lambda: problem_of(L, Periodic([np.nan])), "the displacement of a period"),
         (
             lambda: problem_of(forced(2), via=(hovi.Via(1.0, State([0.0])),)),
-            "periodic motions have no via points and passive joints",
+            "periodic motions have no via points or passive joints",
         ),
     ]
     for make, reason in refused:

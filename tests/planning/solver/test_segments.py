@@ -384,7 +384,7 @@ def test_segments_that_do_not_fit_are_refused() -> None:
     with pytest.raises(InputError, match="for each of the 2 segments, got 1"):
         lift([None])
     passive = dataclasses.replace(empty_and_loaded()[0], passive=("elbow",)).effort_lagrangian()
-    with pytest.raises(InputError, match="passive joints are not there for motions in segments"):
+    with pytest.raises(InputError, match="motions in segments do not support passive joints"):
         make([on(effort, 1.0, 4), on(passive, 1.0, 4)], *ends)
     arm = hovi.Scene(hovi.load_robot("kinova")).effort_lagrangian()
     if arm.space is not None:  # its joints turn without end

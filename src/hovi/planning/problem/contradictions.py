@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.clearance.clearance_violation import distance_in_words
+from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
-from hovi.planning.problem.limits import KIND_NAMES, KINDS, Limits
+from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.space.coordinates import Coordinates

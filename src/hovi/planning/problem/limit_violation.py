@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.dynamics.torque_rate import TorqueRate
-from hovi.planning.problem.limits import FIRST_KINDS, KIND_NAMES, KINDS, Limits
+from hovi.planning.problem.arms.limit_set import KIND_NAMES
+from hovi.planning.problem.limits import FIRST_KINDS, KINDS, Limits
 from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates

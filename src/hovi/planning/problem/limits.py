@@ -14,8 +14,8 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
+from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
-from hovi.planning.problem.arms.limit_set import is_limit_set, limit_set
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -23,18 +23,10 @@ from hovi.robot.space.coordinates import Coordinates
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]
 
-KINDS = ("q", "v", "a", "tau", "jerk", "torque_rate")
+KINDS = tuple(KIND_NAMES)
 """The limited quantities, in the order of the rows of Limits."""
-FIRST_KINDS = 4
-"""Number of those that motions of every order have; the others need order 3."""
-KIND_NAMES = {
-    "q": "position",
-    "v": "velocity",
-    "a": "acceleration",
-    "tau": "torque",
-    "jerk": "jerk",
-    "torque_rate": "torque rate",
-}
+FIRST_KINDS = len(KINDS) - len(OF_ORDER_3)
+"""Number of those that motions of order 2 have; the others, which come last, need order 3."""
 UNBOUNDED = 1e15
 """Absolute value above which a bound counts as no bound."""
 MIN_RANGE = 1e-12
@@ -134,7 +126,7 @@ class Limits:
 
     @cached_property
     def on_rates(self) -> bool:
-        """Whether there is a limit on the jerk or on d tau / dt, of which order 2 knows nothing."""
+        """Whether there is a limit on the jerk or on d tau / dt, which needs order 3."""
         return bool(self.bounded[FIRST_KINDS:].any())
 
     @property
@@ -250,7 +242,7 @@ def as_limits(
         if key not in keys:
             raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
     base = _by_name(coordinates, limits.get("base", "urdf"), order)
-    if not limits.keys().isdisjoint(KINDS[FIRST_KINDS:]):
+    if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)
     lower, upper = base.lower.copy(), base.upper.copy()
     for row, kind in enumerate(KINDS):

@@ -45,7 +45,8 @@ _CHECKED_HERE = (
     *("max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
-_RIVALS = "scheme", "tolerance"
+_EXCLUSIVE = "scheme", "tolerance"
+"""Options of which at most one may be given."""
 _CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
 
 
@@ -217,7 +218,7 @@ class PlanOptions:
         Raises InputError for unknown options and invalid values.
         """
         require_known(type(self), changes)
-        options = dataclasses.replace(self, **_without_rival(changes), **changes)
+        options = dataclasses.replace(self, **_withdrawn(changes), **changes)
         if not changes.keys() & set(_CLEARANCE_OPTIONS):  # keep its cached distances
             options.__dict__["clearance"] = self.clearance
         return options
@@ -234,10 +235,10 @@ class PlanOptions:
         return self.with_changes(limits=limits, tolerance=tolerance)
 
 
-def _without_rival(changes: Mapping[str, Any]) -> dict[str, Any]:
-    """What is withdrawn by changes that name a tolerance but no scheme, or the reverse."""
-    named = [name for name in _RIVALS if changes.get(name) is not None]
-    return {rival: None for rival in _RIVALS if named and rival not in changes}
+def _withdrawn(changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The scheme as None if changes name a tolerance but no scheme, and the reverse."""
+    named = [name for name in _EXCLUSIVE if changes.get(name) is not None]
+    return {name: None for name in _EXCLUSIVE if named and name not in changes}
 
 
 explain(PlanOptions, PlanOptions)
