@@ -15,20 +15,8 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
-from hovi.discrete.guess import (
-    Boundary,
-    Curve,
-    moved,
-    named_curve,
-    path_on_grid,
-    with_turns,
-)
-from hovi.discrete.path_of_any_order import (
-    moved_any,
-    path_of_any_order,
-    polynomial,
-    with_fixed,
-)
+from hovi.discrete.guess import Boundary, Curve, moved, named_curve, path_on_grid, with_turns
+from hovi.discrete.path_of_any_order import moved_any, path_of_any_order, polynomial, with_fixed
 from hovi.discrete.state import Periodic, State
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory import Trajectory
@@ -109,45 +97,53 @@ class TrajectoryProblem:
             require_plannable(scene)
         if len(self.passive) > 0 and len(self.ld.lagrangian.output_weight) == 0:
             raise InputError("passive joints need a Lagrangian of torques: leave them out.")
-        coordinates, N, k = self.coordinates, self.grid.intervals, self.ld.k
         first, last = self.start, self.goal
         if isinstance(last, Periodic):
             timed = self.ld.lagrangian.timed
-            first, last = last.ends(self.start, coordinates, k, timed)
+            first, last = last.ends(self.start, self.coordinates, self.ld.k, timed)
+        self._set_conditions(first, last)
+        _ = self.distances  # raises for missing collision shapes
+
+    def _set_conditions(self, first: State, last: State | FrameGoal) -> None:
+        """Set the boundary data and the conditions at nodes, from both ends and the via points."""
+        coordinates, limits = self.coordinates, self.limits
         start = first.on(coordinates, "start")
         last_limits = None if limits is None else limits.at_ends[1]
         end = goal_state(last, "goal", coordinates, start[0], last_limits)
-        goal = end.state.on(coordinates, "goal")
-        conditions = [NodeCondition(N, condition) for condition in end.conditions]
+        conditions = [NodeCondition(self.grid.intervals, each) for each in end.conditions]
         unreachable = end.reason
         for via in self.via:
-            reached = goal_state(
-                via.goal, f"via point at {via.time:g} s", coordinates, start[0], self.limits
-            )
+            name = f"via point at {via.time:g} s"
+            reached = goal_state(via.goal, name, coordinates, start[0], limits)
             node = self.grid.node_at(via.time)
             conditions += [
                 NodeCondition(node, each) for each in via_conditions(via, reached, coordinates)
             ]
             unreachable = unreachable or reached.reason
-        named = (first, "start"), (end.state, "goal")
+        object.__setattr__(self, "conditions", tuple(conditions))
+        self._set_ends(first, end.state)
+        if self.about_robot and not self.periodic:
+            unreachable = unreachable or free_fall_contradiction(
+                self.scene, self.boundary, self.free_ends, self.grid.duration
+            )
+            known = without_redundancy(self.scene, self.boundary[3], self.free_ends)
+            object.__setattr__(self, "free_ends", known)
+        object.__setattr__(self, "unreachable", unreachable)
+
+    def _set_ends(self, start: State, goal: State) -> None:
+        """Set what both ends prescribe and leave free."""
+        coordinates, k = self.coordinates, self.ld.k
+        named = (start, "start"), (goal, "goal")
+        q0, v0, q1, v1 = (x for state, name in named for x in state.on(coordinates, name))
         free = [state.free_on(coordinates, name, k) for state, name in named]
         for state, name in named:
             state.require_order(k, name)
         if k != 2:
             jets = [state.jet_on(coordinates, name)[:k] for state, name in named]
             object.__setattr__(self, "end_jets", tuple(map(np.stack, zip(*jets, strict=True))))
-        object.__setattr__(self, "boundary", (*start, *goal))
+        object.__setattr__(self, "boundary", (q0, v0, q1, v1))
         object.__setattr__(self, "free_ends", np.stack(free))
-        object.__setattr__(self, "conditions", tuple(conditions))
-        if self.about_robot and not self.periodic:
-            unreachable = unreachable or free_fall_contradiction(
-                self.scene, self.boundary, self.free_ends, self.grid.duration
-            )
-            known = without_redundancy(self.scene, goal[1], self.free_ends)
-            object.__setattr__(self, "free_ends", known)
-        object.__setattr__(self, "unreachable", unreachable)
-        object.__setattr__(self, "turns", end.state.turns_on(coordinates, "goal"))
-        _ = self.distances  # raises for missing collision shapes
+        object.__setattr__(self, "turns", goal.turns_on(coordinates, "goal"))
 
     @classmethod
     def of_segments(
@@ -374,10 +370,10 @@ class TrajectoryProblem:
 
 
 def _require_supported(problem: TrajectoryProblem) -> None:
-    """Raise InputError for what is not there for this order, or for periodic motions."""
+    """Raise InputError for what this order, or a periodic motion, does not support."""
     k = problem.ld.k
     if problem.periodic and (problem.via or len(problem.passive) > 0):
-        raise InputError("periodic motions have no via points and passive joints: leave them out.")
+        raise InputError("periodic motions have no via points or passive joints: leave them out.")
     limits = problem.limits
     wanted = {
         "limits": limits is not None and bool(limits.bounded.any()),
@@ -388,8 +384,8 @@ def _require_supported(problem: TrajectoryProblem) -> None:
     named = [what for what, is_wanted in wanted.items() if is_wanted]
     if k not in LIMITED_ORDERS and named:
         raise InputError(
-            f"{' and '.join(named)} are there for Lagrangians of orders 2 and 3, and this one is "
-            f"of order {k}: leave them out."
+            f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
+            f"{k}: leave them out."
         )
     if limits is not None and limits.on_rates and k != 3:
         raise InputError(
