@@ -15,6 +15,7 @@ from .discrete.state import Periodic as Periodic
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory
 from .errors import HoviError as HoviError
+from .flows.charted_lagrangian import ChartedLagrangian as ChartedLagrangian
 from .flows.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
 from .flows.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map
 from .flows.euler_lagrange import euler_lagrange_residual as euler_lagrange_residual
@@ -23,7 +24,6 @@ from .flows.exact_lagrangian import ExactDiscreteLagrangian as ExactDiscreteLagr
 from .flows.exact_lagrangian import conjugate_time as conjugate_time
 from .flows.execution.tracking import Tracking as Tracking
 from .flows.execution.tracking import play as play
-from .flows.group_lagrangian import ChartedLagrangian as ChartedLagrangian
 from .flows.legendre_transforms import hamiltonian as hamiltonian
 from .flows.legendre_transforms import inverse_legendre_minus as inverse_legendre_minus
 from .flows.legendre_transforms import inverse_legendre_plus as inverse_legendre_plus

@@ -20,10 +20,10 @@ from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Gravity, SceneSymbols, ViscousFriction
 from hovi.errors import InputError
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.execution.controllers import FEEDBACKS, controller
 from hovi.flows.execution.dynamics_replay import chart_rates
 from hovi.flows.execution.tracking import play
-from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import highest_derivative, legendre
 from hovi.flows.simulator import simulate
 from hovi.flows.stepper import flow

@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 
 from hovi.effects import Gravity
 from hovi.errors import InputError
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
-from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import jet_at_momenta, legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.step_guesses import continued_modes, joined_modes, taylor_modes

@@ -10,7 +10,7 @@ import pytest
 
 from hovi.effects import Gravity
 from hovi.errors import InputError
-from hovi.flows.group_lagrangian import ChartedLagrangian
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import kernel_coordinates, legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow

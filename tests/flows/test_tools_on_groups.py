@@ -14,8 +14,8 @@ from scipy.integrate import solve_ivp
 
 import hovi
 from hovi.errors import InputError
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.charted_segment import symplectic_form
-from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import highest_derivative
 from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace

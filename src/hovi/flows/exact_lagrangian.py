@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.charted_segment import ChartedSegment
-from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_step
 from hovi.flows.segment import IntervalLagrangian, Segment, flat
 from hovi.scene.lagrangian import Lagrangian

@@ -17,7 +17,7 @@ from hovi.discrete.guess import regularized
 from hovi.discrete.state import State, as_state, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.flows.group_lagrangian import ChartedLagrangian
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import hamiltonian, highest_derivative, legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.stepper import Flow, flow

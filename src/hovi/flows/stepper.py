@@ -23,8 +23,8 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.flows.charted_lagrangian import ChartedLagrangian
 from hovi.flows.charted_segment import ChartedSegment
-from hovi.flows.group_lagrangian import ChartedLagrangian
 from hovi.flows.legendre_transforms import (
     coordinates_in_words,
     hamiltonian,

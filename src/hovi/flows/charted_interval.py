@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class GroupInterval:
+class ChartedInterval:
     """An interval of length h of a scheme of order k, 1 or 2.
 
     lagrangian: L on T^(k)Q. space: Q. h: in [s].

@@ -25,8 +25,8 @@ from hovi.checks.arguments import check_arguments, unchecked
 from hovi.checks.shapes import require_shape
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.errors import InputError, SchemeError
+from hovi.flows.charted_interval import ChartedInterval, root_of
 from hovi.flows.charted_segment import ChartedSegment, NodalExpansion, joined
-from hovi.flows.group_interval import GroupInterval, root_of
 from hovi.flows.legendre_transforms import jet_at_momenta
 from hovi.flows.scheme_lagrangian import uniform_grid
 from hovi.flows.segment import IntervalLagrangian
@@ -82,9 +82,9 @@ class ChartedLagrangian(IntervalLagrangian):
         return cls(ld.lagrangian, space, *uniform_grid(ld))
 
     @cached_property
-    def interval(self) -> GroupInterval:
+    def interval(self) -> ChartedInterval:
         """The interval as a function of its start and its modes."""
-        return GroupInterval(self.lagrangian, self.space, self.scheme, self.h)
+        return ChartedInterval(self.lagrangian, self.space, self.scheme, self.h)
 
     def split(self, x: Array) -> list[Array]:
         """(q, q', ..) of rows x (N, nq + (k - 1) nv)."""
