@@ -1,7 +1,7 @@
 """hovi's discrete problem as an efficient nonlinear program for Ipopt.
 
-The highest derivatives at the quadrature points are the controls: accelerations, or jerks where the
-jerk costs something. All others there follow from them by the scheme's own table; k linear defects
+The highest derivatives at the quadrature points are the controls: accelerations, or jerks for
+costs on the jerk. All others there follow from them by the scheme's own table; k linear defects
 per joint connect an interval to the next node for order k; the cost contains RNEA. The exact
 Hessian is generated and interpreted by CasADi, expanded to scalars, or assembled from a point
 kernel compiled by gcc.

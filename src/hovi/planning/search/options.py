@@ -136,7 +136,7 @@ class PlanOptions:
     )
     smooth: bool = option(
         False,
-        "whether the jerk costs something too, with a weight that follows from the inertia and the "
+        "whether to add a cost on the jerk, with a weight that follows from the inertia and the "
         "duration: accelerations are zero at both ends, or as given, and torques are continuous.",
         SceneKey("true or false"),
     )
