@@ -206,7 +206,11 @@ def test_the_gradient_and_hessian_of_the_action_are_its_derivatives(k: int) -> N
         (2, State([1.0], a=[0.0]), "goal has a or free_acceleration, but motions of order 2"),
         (3, State([1.0], jerk=[0.0]), "values of q, v, a only: leave them out"),
         (3, State([1.0], a=[np.nan]), r"goal.a is nan at joint 'q\[0\]'"),
-        (4, hovi.FrameGoal("tool", position=[0, 0, 1]), "goals of frames need a Lagrangian of order 2 or 3"),
+        (
+            4,
+            hovi.FrameGoal("tool", position=[0, 0, 1]),
+            "goals of frames need a Lagrangian of order 2 or 3",
+        ),
     ],
 )
 def test_ends_of_another_order_are_refused_by_name(k: int, goal: Any, sentence: str) -> None:
