@@ -8,6 +8,7 @@ E-perp).
 
 from __future__ import annotations
 
+from functools import cache
 from math import factorial
 
 import numpy as np
@@ -100,15 +101,23 @@ def jet_rows(s: Array, k: int, inner_modes: int, highest: int | None = None) -> 
     """
     s, top = np.asarray(s, dtype=np.float64), k if highest is None else highest
     taylor = [_taylor_column(s, top, i) for i in range(1, k)]
-    signs = [(-1.0) ** m for m in end_degrees(k)]
-    basis = [x * _mode_column(s, k, m, top) for x, m in zip(signs, end_degrees(k), strict=True)]
-    ends = np.stack(basis, axis=2) @ inverse_gamma(k)
-    modes = [_mode_column(s, k, m, top) for m in range(k, k + inner_modes)]
-    return np.concatenate([_stacked(taylor, s, top), ends, _stacked(modes, s, top)], axis=2)
+    first = np.stack(taylor, axis=2) if taylor else np.zeros((len(s), top + 1, 0))
+    series = _series(k, inner_modes, top)
+    modes = legendre(2 * s - 1, len(series) - 1).T @ series.reshape(len(series), -1)
+    return np.concatenate([first, modes.reshape(len(s), *series.shape[1:])], axis=2)
 
 
-def _stacked(columns: list[Array], s: Array, top: int) -> Array:
-    return np.stack(columns, axis=2) if columns else np.zeros((len(s), top + 1, 0))
+@cache
+def _series(k: int, inner_modes: int, top: int) -> Array:
+    """Legendre coefficients of the columns of (Z, c) in each derivative, (D, top + 1, k + r)."""
+    degrees = end_degrees(k)
+    columns = [
+        _mode_series(k, m, top, k + inner_modes) for m in (*degrees, *range(k, k + inner_modes))
+    ]
+    series = np.stack(columns, axis=2)
+    signs = np.array([(-1.0) ** m for m in degrees])
+    series[:, :, :k] = (signs * series[:, :, :k]) @ inverse_gamma(k)
+    return series
 
 
 def _taylor_column(s: Array, top: int, i: int) -> Array:
@@ -119,17 +128,17 @@ def _taylor_column(s: Array, top: int, i: int) -> Array:
     return column
 
 
-def _mode_column(s: Array, k: int, degree: int, top: int) -> Array:
-    """The k integrals of sqrt(2 m + 1) P_m(2 s - 1), the k-fold one first, (M, top + 1).
+def _mode_series(k: int, degree: int, top: int, modes: int) -> Array:
+    """Of the k integrals of sqrt(2 m + 1) P_m(2 s - 1), the k-fold one first, (k + modes, top + 1).
 
-    Derivatives of the polynomial itself follow where top > k.
+    Derivatives of the polynomial itself follow where top > k. degree: m, less than modes.
     """
-    series = np.zeros(degree + 1)
-    series[degree] = np.sqrt(2 * degree + 1)
-    column = np.zeros((len(s), top + 1))
+    own = np.zeros(degree + 1)
+    own[degree] = np.sqrt(2 * degree + 1)
+    series = np.zeros((k + modes, top + 1))
     for j in range(top + 1):
-        terms: Array = repeated_integral(series, max(k - j, 0))
+        terms: Array = repeated_integral(own, max(k - j, 0))
         if j > k:
-            terms = np.asarray(2.0 ** (j - k) * np.polynomial.legendre.legder(series, j - k))
-        column[:, j] = terms @ legendre(2 * s - 1, max(len(terms) - 1, 1))[: len(terms)]
-    return column
+            terms = np.asarray(2.0 ** (j - k) * np.polynomial.legendre.legder(own, j - k))
+        series[: len(terms), j] = terms
+    return series

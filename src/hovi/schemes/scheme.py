@@ -7,7 +7,7 @@ higher-order counterpart of a Butcher tableau.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import factorial
 
 import numpy as np
@@ -117,6 +117,7 @@ class Scheme:
         return Scheme, (self.name, self.order, self.points, self.weights, self.table)
 
 
+@cache
 def regular_from_nodal(inner_modes: int, k: int = 2) -> Array:
     """R of (q0, h v0, Z0, Z1, c) = R (q0, h v0, q1, h v1, c), shape (4 + r, 4 + r).
 
@@ -126,4 +127,5 @@ def regular_from_nodal(inner_modes: int, k: int = 2) -> Array:
     for j in range(k):
         for i in range(j, k):
             R[k + j, i] = -1.0 / factorial(i - j)
+    R.setflags(write=False)
     return R

@@ -29,7 +29,7 @@ MAX_GRIDS_ALONE = 3
 MAX_INERTIA_SHARE = 0.03
 """Largest inertia of a joint that counts as whirling, relative to that of the heaviest: the torque
 that spins a heavier one shows in the cost. `hovi info` warns of far lighter ones only."""
-MAX_WORK = 30_000
+MAX_WORK = 20_000
 """Maximum number of steps times intervals of a solve that follows a whirling motion."""
 HOPELESS_RATIO = 40.0
 """The same ratio above which finer grids are not tried for a motion that is not resolved."""

@@ -13,7 +13,7 @@ import numpy as np
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.trust_region import Options
-from hovi.planning.problem.limit_violation import closeness, excess_along
+from hovi.planning.problem.limit_violation import closeness
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.method import MethodResult
@@ -49,8 +49,7 @@ def with_torque_rates_last(
     loose = dataclasses.replace(problem, ld=ld, limits=_without_torque_rates(limits))
     first = solve(loose, path, options)
     full = problem.on(first.problem.grid)
-    trajectory = full.trajectory(first.path)
-    if first.status is Status.MINIMUM and excess_along(trajectory, limits).worst > limits.tolerance:
+    if first.status is Status.MINIMUM and _margin(full, limits, first.path) < -limits.tolerance:
         left = dataclasses.replace(options, time_limit=deadline.seconds_left, near=True)
         second = solve(full, first.path, left)
         return dataclasses.replace(
@@ -62,7 +61,10 @@ def with_torque_rates_last(
 
 def _margin(problem: TrajectoryProblem, limits: Limits, path: DiscretePath) -> float:
     """Least distance of a path's torque rates from their limits, as a share of the range."""
-    return float(closeness(problem.trajectory(path), limits)[TORQUE_RATE].min())
+    lower, upper = np.full_like(limits.lower, -np.inf), np.full_like(limits.upper, np.inf)
+    lower[TORQUE_RATE], upper[TORQUE_RATE] = limits.lower[TORQUE_RATE], limits.upper[TORQUE_RATE]
+    alone = Limits(lower, upper, limits.tolerance)
+    return float(closeness(problem.trajectory(path), alone)[TORQUE_RATE].min())
 
 
 def _without_torque_rates(limits: Limits) -> Limits:
