@@ -49,6 +49,7 @@ from .planning.problem.arms.limit_set import limit_sets as limit_sets
 from .planning.problem.frame_goal import FrameGoal as FrameGoal
 from .planning.problem.goals import Via as Via
 from .planning.problem.limits import Limits as Limits
+from .planning.problem.limits import as_limits as as_limits
 from .planning.problem.problem import TrajectoryProblem as TrajectoryProblem
 from .planning.problem.tolerance import Accuracy as Accuracy
 from .planning.problem.tolerance import Tolerance as Tolerance

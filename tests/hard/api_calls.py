@@ -376,6 +376,7 @@ def _problems() -> list[Call]:
         call(hovi.Clearance.from_dict, hovi.Clearance((sphere,)).to_dict()),
         build(hovi.Limits, lower=limits.lower, upper=limits.upper, tolerance=1e-6),
         call(hovi.Limits.from_dict, limits.to_dict()),
+        call(hovi.as_limits, robot(), {"base": "none", "v": 1.0}, order=2),
         own(limits, "with_margin", 0.1),
         own(limits, "excess", np.zeros((3, 4, 2))),
         build(hovi.Limits, lower=-np.ones((6, 2)), upper=np.ones((6, 2)), tolerance=1e-6),
@@ -408,7 +409,7 @@ def _problems() -> list[Call]:
         ),
         own(task, "with_options", intervals=4),
         own(task.options, "with_changes", intervals=4),
-        own(task.options, "on", robot()),
+        own(task.options, "on", scene()),
     ]
 
 

@@ -12,6 +12,7 @@ import pytest
 import hovi
 from hovi.effects import Gravity, JerkCost
 from hovi.errors import InputError
+from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
 START = np.array([0.0, -1.2, 1.4, -1.0, -1.5, 0.0])
@@ -185,7 +186,7 @@ def test_both_smooth_and_a_weight_of_the_jerk_are_refused(ur5: hovi.Scene) -> No
 
 def test_limits_on_rates_without_a_cost_on_the_jerk_are_refused(ur5: hovi.Scene) -> None:
     for limits in ({"jerk": 10.0}, {"torque_rate": 10.0}):
-        with pytest.raises(InputError, match="add the effect jerk_cost to the scene, plan with"):
+        with pytest.raises(InputError, match="add the effect jerk_cost to the scene, set smooth"):
             hovi.plan(ur5, START, GOAL, 1.5, limits=limits)
 
 
@@ -215,3 +216,46 @@ def test_orientations_are_refused_by_name() -> None:
     q = scene.robot.neutral()
     with pytest.raises(InputError, match="order 3 need the third derivatives of charts"):
         hovi.plan(scene, q, q, 1.0, smooth=True, limits="none")
+
+
+def test_a_limit_on_the_torque_rate_alone_holds(two_link: Robot) -> None:
+    scene = hovi.Scene(two_link, [Gravity()])
+    start, goal = np.zeros(2), np.array([1.0, 0.6])
+    free = hovi.plan(scene, start, goal, 1.0, smooth=True, limits="none")
+    bound = 0.7 * float(np.abs(rows(free.trajectory)[6]).max())
+    limits = {"base": "none", "torque_rate": bound}
+    found = hovi.plan(scene, start, goal, 1.0, smooth=True, limits=limits)
+    assert found.success, found.message
+    assert np.abs(rows(found.trajectory)[6]).max() < (1 + 3e-6) * bound
+
+
+def test_a_via_point_takes_no_acceleration() -> None:
+    with pytest.raises(InputError, match="a via point takes no `a`: leave it out"):
+        hovi.Via(0.5, hovi.State([0.0, 0.0], a=[1.0, 0.0]))
+    with pytest.raises(InputError, match="takes no `free_acceleration`"):
+        hovi.Via(0.5, hovi.State([0.0, 0.0], free_acceleration=("elbow",)))
+
+
+def test_a_smooth_motion_replans_to_the_goal_of_a_frame(
+    ur5: hovi.Scene, smooth: hovi.Solution
+) -> None:
+    frame = ur5.robot.tip_frame
+    position = ur5.robot.frame_position(frame, GOAL[None])[0] + 0.02
+    again = smooth.replan(goal=hovi.FrameGoal(frame, position=position))
+    assert again.success, again.message
+    end = ur5.robot.frame_position(frame, again.trajectory.q[-1:])[0]
+    np.testing.assert_allclose(end, position, atol=1e-7)
+    np.testing.assert_allclose(again.trajectory.jet([0.0, 1.5])[2], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("limits", ["none", {"tau": 40.0, "jerk": 2e3}])
+def test_passive_joints_have_no_torque_along_a_smooth_motion(limits: object) -> None:
+    """A cart-pole, on the grid of the search within limits and on one with few points."""
+    folder = Path(hovi.example("cart_pole_swing_up")).parent
+    robot = hovi.load_robot(folder / "cart_pole.urdf")
+    passive = robot.joint_names[1]
+    scene = hovi.Scene(robot, [Gravity()], passive=[passive])
+    found = hovi.plan(scene, [0.0, 0.0], [0.4, 0.0], 1.2, smooth=True, limits=limits)
+    assert found.success, found.message
+    tau = np.abs(rows(found.trajectory)[4]).max(axis=0)
+    assert tau[1] < 0.01 * tau[0]

@@ -132,6 +132,10 @@ def test_a_payload_picked_up_half_way_is_least_effort_by_ipopt_as_well() -> None
     np.testing.assert_allclose(np.hstack([path.q, path.v])[1:-1], nodes, rtol=0, atol=1e-6)
 
 
+def test_the_effort_of_segments_is_their_cost_where_nothing_else_costs_anything() -> None:
+    assert lifted().effort == pytest.approx(lifted().cost, rel=1e-12)
+
+
 def test_momenta_are_continuous_where_segments_meet_and_torques_are_not() -> None:
     found = hovi.solve(lift(steps=(24, 36)))
     problem, motion = found.problem, found.trajectory

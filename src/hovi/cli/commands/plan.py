@@ -41,6 +41,10 @@ def plan(
             metavar="urdf|none|ARM", help="Override the scene's; ARM such as panda, ur5e."
         ),
     ] = None,
+    smooth: Annotated[
+        bool | None,
+        typer.Option("--smooth/--no-smooth", help="Override the scene's: a cost on the jerk."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the random guesses.")] = None,
     time_limit: Annotated[
         str | None, typer.Option(metavar="SECONDS", help="Return the best motion found by then.")

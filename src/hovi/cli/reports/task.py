@@ -25,6 +25,8 @@ def describe_task(task: Task) -> str:
         how = f"tolerance {as_number_or_text(options.effective_tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
     lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
+    if options.smooth:
+        lines.append("smooth: with a cost on the jerk, see the effect jerk_cost")
     arm = limit_set_of(task)
     if arm is not None:
         lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
@@ -52,7 +54,9 @@ def _end(goal: State | FrameGoal, name: str, robot: Robot) -> list[str]:
         return [f"{name}: frame {goal.frame!r}", *_frame_parts(goal)]
     q, v = goal.on(robot, name)
     lines = [f"{name} q = {_numbers(q)}", f"{name} v = {_numbers(v)}"]
-    for key in ("free", "free_velocity"):
+    if goal.a is not None:
+        lines.append(f"{name} a = {_numbers(np.asarray(goal.a, dtype=float))}")
+    for key in ("free", "free_velocity", "free_acceleration"):
         if getattr(goal, key):
             lines.append(f"{name} {key} = {', '.join(getattr(goal, key))}")
     return lines

@@ -22,7 +22,7 @@ def effort_of(trajectory: Trajectory) -> float | None:
     accelerations.
     """
     stored = trajectory.torque
-    known = trajectory.scene is not None if stored is None else stored.values.shape[2] > 0
+    known = stored is None or stored.values.shape[2] > 0
     if not known or trajectory.grid.order < 2:
         return None
     active = _active(trajectory)
@@ -47,7 +47,10 @@ def _torques(trajectory: Trajectory, batch: IntervalBatch) -> Array:
         points = batch.scheme.points
         k, s = np.repeat(batch.numbers, len(points)), np.tile(points, len(batch.numbers))
         return trajectory.torque(k, s)
-    assert trajectory.scene is not None
     space, path = trajectory.space, trajectory.path
     q, v, a = (batch.jet(path) if space is None else jet_on(space, batch, path))[:3]
+    if trajectory.segments is not None:
+        k = np.repeat(batch.numbers, len(batch.scheme.points))
+        return trajectory.segments.inverse_dynamics(k, (q, v, a), batch.t)
+    assert trajectory.scene is not None
     return trajectory.scene.inverse_dynamics(q, v, a, batch.t)

@@ -47,6 +47,15 @@ class Via:
             raise InputError(f"the time of a via point must be positive, got {self.time} s.")
         if isinstance(self.goal, State) and self.goal.turns:
             raise InputError("a via point takes no `turns`: set them on the goal.")
+        rates = ("a", "free_acceleration", "jerk", "free_jerk")
+        given = [key for key in rates if _is_given(getattr(self.goal, key, None))]
+        if given:
+            raise InputError(f"a via point takes no `{given[0]}`: leave it out.")
+
+
+def _is_given(value: object) -> bool:
+    """Whether a field of a State is neither None nor an empty sequence."""
+    return value is not None and not (isinstance(value, tuple | list) and len(value) == 0)
 
 
 @dataclass(frozen=True, eq=False)

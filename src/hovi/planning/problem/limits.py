@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hovi.checks.arguments import check_arguments
+from hovi.checks.arguments import check_arguments, check_arguments_except
+from hovi.checks.kinds import shown
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
@@ -219,6 +220,7 @@ def urdf_limits(robot: Robot) -> Limits:
     return Limits(lower, upper)
 
 
+@check_arguments_except("limits")
 def as_limits(
     coordinates: Coordinates, limits: str | Limits | Mapping[str, Any], order: int = 2
 ) -> Limits:
@@ -235,12 +237,17 @@ def as_limits(
     """
     if isinstance(limits, Limits):
         return limits
+    if not isinstance(limits, str | Mapping):
+        raise InputError(
+            f"limits are 'urdf', 'none', the name of an arm, a mapping or a hovi.Limits, not "
+            f"{shown(limits)}."
+        )
     if not isinstance(limits, Mapping):
         return _warned_of_degrees(coordinates, _by_name(coordinates, limits, order))
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
-            raise InputError(f"limits have no key {key!r}: {nearest(key, keys)}")
+            raise InputError(f"limits have no key {key!r}: {nearest(str(key), keys)}")
     base = _by_name(coordinates, limits.get("base", "urdf"), order)
     if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)

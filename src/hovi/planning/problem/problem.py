@@ -220,6 +220,12 @@ class TrajectoryProblem:
         ends = [x[[0, -1]] for x in (path.q, *np.moveaxis(path.rates, 1, 0))]
         return moved_any(path, self.grid, self._with_fixed(ends), self.coordinates)
 
+    def moved_to_guesses(self, path: DiscretePath) -> DiscretePath:
+        """As `moved`, with the problem's own initial guesses in free components, too."""
+        if self.ld.k == 2:
+            return moved(path, self.grid, self.boundary, self.coordinates)
+        return moved_any(path, self.grid, self.end_jets, self.coordinates)
+
     def guess(self, name: str) -> DiscretePath:
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
         T = self.grid.duration
@@ -390,5 +396,5 @@ def _require_supported(problem: TrajectoryProblem) -> None:
     if limits is not None and limits.on_rates and k != 3:
         raise InputError(
             "limits on the jerk and on the torque rate need a Lagrangian of order 3: add the "
-            "effect jerk_cost to the scene, plan with smooth=True, or leave them out."
+            "effect jerk_cost to the scene, set smooth = true, or leave them out."
         )

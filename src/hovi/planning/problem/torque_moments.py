@@ -102,9 +102,9 @@ class _BatchMoments:
 
     @cached_property
     def _columns(self) -> Array:
-        """P_j times the rows of the table, (K m, 3 Q)."""
+        """P_j times the R = k + 1 rows of the table at each point, (K m, R Q)."""
         products = np.einsum("kq,qdm->kmqd", self.tests, self.batch.scheme.nodal_table)
-        return np.asarray(products.reshape(-1, 3 * products.shape[2]))
+        return np.asarray(products.reshape(-1, products.shape[2] * products.shape[3]))
 
     def of(self, torques: Array) -> Array:
         """m_j, shape (B, K, p), of torques at the points, shape (P, p)."""
@@ -114,12 +114,13 @@ class _BatchMoments:
     def slopes(self, jacobian: Array) -> Array:
         """h dm_j in the nodal columns of the intervals, shape (B, K p, m, n).
 
-        jacobian: of the torques in (q, v, a) at the points, shape (P, p, 3 n).
+        jacobian: of the torques in (q, v, ...) at the points, shape (P, p, R n).
         """
         (K, Q), B, p = self.tests.shape, len(self.batch.h), jacobian.shape[1]
-        by_row = jacobian.reshape(B, Q, p, 3, -1).transpose(0, 1, 3, 2, 4)
+        R = self.batch.scheme.nodal_table.shape[1]
+        by_row = jacobian.reshape(B, Q, p, R, -1).transpose(0, 1, 3, 2, 4)
         by_row = by_row * self.batch.row_weights[..., None, None]
-        slopes = np.matmul(self._columns, by_row.reshape(B, 3 * Q, -1))
+        slopes = np.matmul(self._columns, by_row.reshape(B, R * Q, -1))
         slopes = slopes.reshape(B, K, -1, p, by_row.shape[-1]).transpose(0, 1, 3, 2, 4)
         return np.asarray(slopes.reshape(B, K * p, *slopes.shape[3:]))
 

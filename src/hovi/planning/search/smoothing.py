@@ -32,7 +32,7 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
     """
     if scene.order != 2:
         raise InputError(
-            "smooth = True chooses the weight of a cost on the jerk, and the scene has one, "
+            "smooth = true chooses the weight of a cost on the jerk, and the scene has one, "
             "jerk_cost: leave one of the two out."
         )
     robot = scene.robot

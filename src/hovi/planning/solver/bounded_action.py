@@ -56,9 +56,13 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._bounded = np.flatnonzero(limits.bounded.ravel())
         self.columns = self._output_columns(self._bounded)
         if self.columns.max(initial=0) >= self._size:
-            raise InputError(
-                "limits on tau need a Lagrangian whose outputs are torques; leave them out."
+            kind = "the torque rate" if limits.on_torque_rate else "tau"
+            whose = (
+                "of one scene with a cost on the jerk"
+                if limits.on_torque_rate
+                else ("whose outputs are torques")
             )
+            raise InputError(f"limits on {kind} need a Lagrangian {whose}; leave them out.")
         self.more = more
         self.bounds = self._bounds(margins)
         self._predicted: list[Array] | None = None

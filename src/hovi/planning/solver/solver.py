@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import check_path, moved, stretched
+from hovi.discrete.guess import check_path, stretched
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import Periodic, State, as_state
@@ -129,7 +129,7 @@ class Solution:
         origin = self if guess is None else guess
         path = origin.trajectory.path
         if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
-            path = moved(path, problem.grid, problem.boundary, problem.coordinates)
+            path = problem.moved_to_guesses(path)
         if problem.limited or not problem.plain:
             found = solve_on_grid(problem, path, near=True, **options)
         else:

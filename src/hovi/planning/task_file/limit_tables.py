@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from hovi.errors import InputError
+from hovi.errors import InputError, nearest
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.limits import KINDS, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
@@ -26,7 +26,9 @@ def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any
         return given
     if not isinstance(given, dict):
         expected = '"urdf", "none", the name of an arm or a table [limits]'
-        raise toml.error(("limits",), f"`limits` must be {expected}, but it is {in_toml(given)}")
+        hint = f": {nearest(given, NAMES)}" if isinstance(given, str) else ""
+        sentence = f"`limits` must be {expected}, but it is {in_toml(given)}{hint}"
+        raise toml.error(("limits",), sentence)
     try:
         LimitsTable.model_validate(given)
     except ValidationError as invalid:

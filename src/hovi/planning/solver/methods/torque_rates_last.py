@@ -47,6 +47,8 @@ def with_torque_rates_last(
     without = dataclasses.replace(lagrangian, torque_rates=False)
     ld = DiscreteLagrangian(without, problem.grid)
     loose = dataclasses.replace(problem, ld=ld, limits=_without_torque_rates(limits))
+    if not loose.limited:
+        return solve(problem, path, options)
     first = solve(loose, path, options)
     full = problem.on(first.problem.grid)
     if first.status is Status.MINIMUM and _margin(full, limits, first.path) < -limits.tolerance:
