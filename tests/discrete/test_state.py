@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -107,3 +108,12 @@ def test_the_command_warns_once(models: Path, tmp_path: Path, capsys) -> None:
     main(["plan", str(tmp_path / "scene.toml"), "--starts", "2", "--time-limit", "2"])
     told = capsys.readouterr().err
     assert told.count("warning: shoulder is 90 rad") == 1
+
+
+def test_a_motion_of_many_turns_does_not_look_like_degrees(arm_scene: Scene) -> None:
+    goal = np.array([-np.pi / 2 + 12 * np.pi, 0.0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_degrees(arm_scene.robot, [np.array([-np.pi / 2, 0.0]), goal])
+    with pytest.warns(HoviWarning, match="looks like degrees"):
+        warn_of_degrees(arm_scene.robot, [np.array([-90.0, 0.0]), np.array([45.5, 0.0])])

@@ -13,6 +13,9 @@ MIN_SUSPICIOUS, MAX_SUSPICIOUS = 8 * np.pi, 720.0
 """Bounds of angles in this range, in [rad], look like degrees: few joints make four turns, and a
 number beyond two turns in degrees, such as 1000, usually stands for no bound."""
 
+DEGREE_STEP = 0.5
+"""Angles in degrees are mostly whole numbers, or halves."""
+
 
 def ranges_in_degrees(
     names: Sequence[str], angles: npt.NDArray[np.bool_], lower: Array, upper: Array
@@ -41,7 +44,8 @@ def angles_in_degrees(
     """The coordinates that look like degrees, as a clause; "" if none does.
 
     Those which are more than a turn beyond a range that they would meet in degrees, and those which
-    move by a suspicious angle: joints without a range may be wound up, but few move by four turns.
+    move by a suspicious angle between multiples of DEGREE_STEP: joints without a range may be wound
+    up, and may make some turns, but that is a multiple of pi.
 
     names: of the coordinates, (nv,). angles: which are angles, (nv,).
     q: successive configurations, shape (M, nv). lower, upper: position ranges. All in [rad].
@@ -51,6 +55,7 @@ def angles_in_degrees(
     beyond = (q > upper + 2 * np.pi) | (q < lower - 2 * np.pi)
     beyond &= bounded & (degrees >= lower) & (degrees <= upper)
     moved = np.abs(np.diff(q, axis=0)).max(axis=0, initial=0.0) > MIN_SUSPICIOUS
+    moved &= (np.abs(np.remainder(q / DEGREE_STEP + 0.5, 1.0) - 0.5) < 1e-9).all(axis=0)
     possible = angles & (np.abs(q) <= MAX_SUSPICIOUS).all(axis=0)
     found = np.flatnonzero(possible & (beyond.any(axis=0) | moved))
     if not len(found):
