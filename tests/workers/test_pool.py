@@ -165,7 +165,8 @@ def test_without_a_process_that_starts_there_are_no_results(
 
 
 PARENT = """
-import os, sys, time
+import os, signal, sys, time
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup ignores
 from hovi.system.deadline import Deadline
 from hovi.workers.pool import results_in_workers
 
