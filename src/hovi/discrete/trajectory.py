@@ -168,13 +168,20 @@ class Trajectory:
         """
         k, s = self._checked(k, s)
         q, v, a = self._interpolate(k, s, 2)
+        return Sample(q, v, a, self.torques(k, s, (q, v, a)))
+
+    def torques(self, k: Index, s: Array, jet: tuple[Array, Array, Array]) -> Array:
+        """tau in given intervals where (q, v, a) is known, shape (M, nv), in [N m] or [N].
+
+        k, s: as for `sample_intervals`. jet: q of shape (M, nq), v and a of shape (M, nv).
+        """
         if self.torque is not None:
-            return Sample(q, v, a, self.torque(k, s))
+            return self.torque(k, s)
         t = self.t[k] + s * self.grid.steps[k]
         if self.segments is not None:
-            return Sample(q, v, a, self.segments.inverse_dynamics(k, (q, v, a), t))
+            return self.segments.inverse_dynamics(k, jet, t)
         assert self.scene is not None
-        return Sample(q, v, a, self.scene.inverse_dynamics(q, v, a, t))
+        return self.scene.inverse_dynamics(*jet, t)
 
     def _checked(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Index, Array]:
         """Interval numbers and relative positions as arrays, (M,) each. Raises InputError."""

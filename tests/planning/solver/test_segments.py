@@ -21,6 +21,7 @@ from hovi.planning.problem.contradictions import static_sentence
 from hovi.planning.problem.limit_violation import closeness, excess_along
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
+from hovi.planning.solver.solver import solve_on_grid
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import by_name, galerkin
@@ -134,6 +135,28 @@ def test_a_payload_picked_up_half_way_is_least_effort_by_ipopt_as_well() -> None
 
 def test_the_effort_of_segments_is_their_cost_where_nothing_else_costs_anything() -> None:
     assert lifted().effort == pytest.approx(lifted().cost, rel=1e-12)
+
+
+def test_torque_limits_hold_between_the_points_of_segments_of_order_3() -> None:
+    """Of a coarse grid, on which the motion without limits needs more."""
+    limits = bounds(tau=[11.0, 4.5], jerk=1e4)
+    parts = [
+        hovi.DiscreteLagrangian(
+            hovi.Scene(
+                scene.robot, [*scene.effects, hovi.effects.JerkCost(1e-4)]
+            ).effort_lagrangian(),
+            hovi.Grid.uniform(T, 4, galerkin(1, 3)),
+        )
+        for scene, T in zip(empty_and_loaded(), (0.6, 0.9), strict=True)
+    ]
+    ends = State([0.0, 0.0]), State([1.0, 0.5])
+    found = solve_on_grid(hovi.TrajectoryProblem.of_segments(parts, *ends, limits=[limits, limits]))
+    assert found.success, found.message
+    N = found.trajectory.grid.intervals
+    k, s = np.repeat(np.arange(N), 101), np.tile(np.linspace(0.0, 1.0, 101), N)
+    largest = np.abs(found.trajectory.sample_intervals(k, s).tau).max(axis=0)
+    assert (largest < np.array([11.0, 4.5]) * (1 + 3e-6)).all()
+    assert largest[0] > 10.5
 
 
 def test_momenta_are_continuous_where_segments_meet_and_torques_are_not() -> None:

@@ -43,14 +43,7 @@ def _active(trajectory: Trajectory) -> npt.NDArray[np.bool_]:
 
 def _torques(trajectory: Trajectory, batch: IntervalBatch) -> Array:
     """tau at the quadrature points of a batch, (P, nv)."""
-    if trajectory.torque is not None:
-        points = batch.scheme.points
-        k, s = np.repeat(batch.numbers, len(points)), np.tile(points, len(batch.numbers))
-        return trajectory.torque(k, s)
-    space, path = trajectory.space, trajectory.path
+    points, space, path = batch.scheme.points, trajectory.space, trajectory.path
+    k, s = np.repeat(batch.numbers, len(points)), np.tile(points, len(batch.numbers))
     q, v, a = (batch.jet(path) if space is None else jet_on(space, batch, path))[:3]
-    if trajectory.segments is not None:
-        k = np.repeat(batch.numbers, len(batch.scheme.points))
-        return trajectory.segments.inverse_dynamics(k, (q, v, a), batch.t)
-    assert trajectory.scene is not None
-    return trajectory.scene.inverse_dynamics(q, v, a, batch.t)
+    return trajectory.torques(k, s, (q, v, a))

@@ -138,14 +138,11 @@ def _outputs(trajectory: Trajectory, k: Index, s: Array, limits: Limits) -> Arra
     if len(limits.kinds) == FIRST_KINDS:
         return _stacked(trajectory.sample_intervals(k, s), trajectory.space)
     q, v, a, j = trajectory.jet_intervals(k, s, 3)
-    tau = rate = np.zeros_like(v)
-    if trajectory.scene is not None:
-        t = trajectory.t[k] + s * trajectory.grid.steps[k]
-        tau = trajectory.scene.inverse_dynamics(q, v, a, t)
-        if limits.bounded[KINDS.index("torque_rate")].any():
-            rate = TorqueRate(trajectory.scene.torques, q, v, a, j, trajectory.space).value()
-    q = q if trajectory.space is None else trajectory.space.coordinates(q)
-    return np.stack([q, v, a, tau, j, rate], axis=1)
+    first = _stacked(Sample(q, v, a, trajectory.torques(k, s, (q, v, a))), trajectory.space)
+    rate = np.zeros_like(v)
+    if trajectory.scene is not None and limits.on_torque_rate:
+        rate = TorqueRate(trajectory.scene.torques, q, v, a, j, trajectory.space).value()
+    return np.concatenate([first, j[:, None], rate[:, None]], axis=1)
 
 
 def _stacked(motion: Sample, space: ConfigurationSpace | None) -> Array:
