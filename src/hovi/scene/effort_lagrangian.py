@@ -153,9 +153,7 @@ class EffortLagrangian(Lagrangian):
 
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
         """Value, gradient and Hessian: see Lagrangian.evaluate."""
-        value, gradient, hessian, _, _ = self.expand(*jet, t=t)
-        points, n = len(value), self.nv
-        return value, gradient.reshape(points, 3, n), hessian.reshape(points, 3, n, 3, n)
+        return self.expand(*jet, t=t).by_derivative(self.nv)
 
     def expand(
         self,

@@ -135,9 +135,7 @@ class JerkLagrangian(Lagrangian):
 
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
         """Value, gradient and Hessian: see Lagrangian.evaluate."""
-        value, gradient, hessian, _, _ = self.expand(*jet, t=t)
-        points, n = len(value), self.nv
-        return value, gradient.reshape(points, 4, n), hessian.reshape(points, 4, n, 4, n)
+        return self.expand(*jet, t=t).by_derivative(self.nv)
 
     def expand(
         self,

@@ -56,6 +56,12 @@ class PointExpansion(NamedTuple):
     outputs: Array
     jacobian: Array
 
+    def by_derivative(self, nv: int) -> tuple[Array, Array, Array]:
+        """Value (P,), gradient (P, k+1, nv) and Hessian (P, k+1, nv, k+1, nv)."""
+        points, size = self.gradient.shape
+        shape = points, size // nv, nv
+        return self.value, self.gradient.reshape(shape), self.hessian.reshape(*shape, *shape[1:])
+
 
 class Lagrangian(ABC):
     """L on T^(k)Q with its derivatives.

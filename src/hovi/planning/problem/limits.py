@@ -177,6 +177,13 @@ class Limits:
                 f"expected the limits that `to_dict` returns, got data with {error!r}."
             ) from error
 
+    def without(self, *kinds: str) -> Limits:
+        """The same limits but for those of some kinds, which are unbounded."""
+        rows = [row for row, kind in enumerate(self.kinds) if kind in kinds]
+        lower, upper = self.lower.copy(), self.upper.copy()
+        lower[rows], upper[rows] = -np.inf, np.inf
+        return Limits(lower, upper, self.tolerance)
+
     def excess(self, outputs: Array) -> Array:
         """Distance of each output outside its range, as a share of the range; negative inside.
 
@@ -198,6 +205,16 @@ class Limits:
         if self.parts:
             return Limits.of_segments([p.with_margin(margin) for p in self.parts], self.ends)
         return Limits(self.lower + shift, self.upper - shift, self.tolerance)
+
+
+def limited_columns(order: int, nv: int) -> npt.NDArray[np.intp]:
+    """The columns of (q, q', ..., q^(k), outputs) of all entries of KINDS, (kinds nv,).
+
+    Jerk is the fourth of the jet, torques are the first outputs, and their rates the next.
+    order: k; below 3 there is no jerk.
+    """
+    blocks = np.array([0, 1, 2, order + 1, 3, order + 2])
+    return np.asarray((blocks[:, None] * nv + np.arange(nv)).ravel())
 
 
 def no_limits(coordinates: Coordinates) -> Limits:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
-from hovi.planning.problem.limits import KINDS, TOLERANCE
+from hovi.planning.problem.limits import TOLERANCE, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 
@@ -31,7 +31,7 @@ def cost_of_tolerance(solution: Solution) -> float:
     jet_range, output_range = _ranges(problem)
     change = 0.0
     for weights, terms in zip(problem.ld.point_weights, solution.forces, strict=True):
-        per_point = np.abs(terms.jet_gradient) @ jet_range[: terms.jet_gradient.shape[1]]
+        per_point = np.abs(terms.jet_gradient) @ jet_range
         per_point += np.abs(terms.output_gradient) @ output_range
         change += float(weights @ per_point)
     return SHIFT * tolerance * change / abs(solution.cost)
@@ -39,14 +39,13 @@ def cost_of_tolerance(solution: Solution) -> float:
 
 def _ranges(problem: TrajectoryProblem) -> tuple[Array, Array]:
     """Ranges of the jet, ((k + 1) nv,), and of the outputs; 0 where there is no limit."""
-    outputs = len(problem.ld.lagrangian.output_weight)
-    limits, nv = problem.limits, problem.coordinates.nv
-    ranges = np.zeros((len(KINDS), nv))
+    limits, nv, k = problem.limits, problem.coordinates.nv, problem.ld.k
+    jet, outputs = (k + 1) * nv, len(problem.ld.lagrangian.output_weight)
+    ranges = np.zeros(jet + 2 * nv)
     if limits is not None:
-        ranges[: len(limits.kinds)][limits.bounded] = limits.ranges[limits.bounded]
+        bounded = np.flatnonzero(limits.bounded)
+        ranges[limited_columns(k, nv)[bounded]] = limits.ranges.ravel()[bounded]
     if problem.distances is not None:
-        ranges[0] = np.maximum(ranges[0], DISTANCE_SCALE)
-    ranges[3, problem.passive] = 0.0  # whose multipliers are those of an equation
-    q, v, a, tau, jerk, rate = ranges
-    jet = np.concatenate([q, v, a, jerk, np.zeros(max(problem.ld.k - 3, 0) * nv)])
-    return jet, np.concatenate([tau, rate])[:outputs]
+        ranges[:nv] = np.maximum(ranges[:nv], DISTANCE_SCALE)
+    ranges[jet + problem.passive] = 0.0  # whose multipliers are those of an equation
+    return ranges[:jet], ranges[jet : jet + outputs]

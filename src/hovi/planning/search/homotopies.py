@@ -138,9 +138,7 @@ def _with_effect(scene: Scene, effect: Effect) -> Scene:
 
 
 def _without_torque_limits(job: Job) -> Job:
-    lower, upper = job.limits.lower.copy(), job.limits.upper.copy()
-    lower[3], upper[3] = -np.inf, np.inf
-    return job.with_options(limits=Limits(lower, upper, job.limits.tolerance))
+    return job.with_options(limits=job.limits.without("tau"))
 
 
 def _widened(limits: Limits, share: float) -> Limits:

@@ -14,7 +14,7 @@ from hovi.errors import InputError
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.interior_point import BoundedObjective, Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.clearance_outputs import PointOutputs
@@ -54,15 +54,13 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self._jet_size = (self.lagrangian.order + 1) * self.lagrangian.nv
         self._size = self._jet_size + len(self.lagrangian.output_weight)
         self._bounded = np.flatnonzero(limits.bounded.ravel())
-        self.columns = self._output_columns(self._bounded)
+        columns = limited_columns(self.lagrangian.order, self.lagrangian.nv)
+        self.columns = columns[self._bounded]
         if self.columns.max(initial=0) >= self._size:
-            kind = "the torque rate" if limits.on_torque_rate else "tau"
-            whose = (
-                "of one scene with a cost on the jerk"
-                if limits.on_torque_rate
-                else ("whose outputs are torques")
-            )
-            raise InputError(f"limits on {kind} need a Lagrangian {whose}; leave them out.")
+            needed = "tau need a Lagrangian whose outputs are torques"
+            if limits.on_torque_rate:
+                needed = "the torque rate need a Lagrangian of one scene with a cost on the jerk"
+            raise InputError(f"limits on {needed}; leave them out.")
         self.more = more
         self.bounds = self._bounds(margins)
         self._predicted: list[Array] | None = None
@@ -181,15 +179,6 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         jet, t = self.action.jets(x)[batch], self.ld.point_times[batch]
         outputs = self.ld.lagrangians[batch].output(*jet, t=t)
         return self.action.output_slope(outputs, batch)
-
-    def _output_columns(self, bounded: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-        """The columns of (q, q', ..., q^(k), outputs) of entries of the limits.
-
-        Jerk is the fourth of the jet, torques are the first outputs, and their rates the next.
-        """
-        n, jet = self.lagrangian.nv, self.lagrangian.order + 1
-        blocks = np.array([0, 1, 2, jet, 3, jet + 1])
-        return blocks[bounded // n] * n + bounded % n
 
     @cached_property
     def _ranges(self) -> Array:

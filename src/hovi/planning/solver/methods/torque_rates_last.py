@@ -23,7 +23,7 @@ from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline
 
 Solve = Callable[[TrajectoryProblem, DiscretePath, Options], MethodResult]
-TORQUE_RATE = KINDS.index("torque_rate")
+TORQUE_RATE = "torque_rate"
 NEAR_A_RATE = 0.02
 """Distance of a guess from the limits on the torque rate, as a share of their range, below which
 they are imposed at once where the guess is the motion of a similar problem."""
@@ -46,7 +46,7 @@ def with_torque_rates_last(
     deadline = Deadline(options.time_limit)
     without = dataclasses.replace(lagrangian, torque_rates=False)
     ld = DiscreteLagrangian(without, problem.grid)
-    loose = dataclasses.replace(problem, ld=ld, limits=_without_torque_rates(limits))
+    loose = dataclasses.replace(problem, ld=ld, limits=limits.without(TORQUE_RATE))
     if not loose.limited:
         return solve(problem, path, options)
     first = solve(loose, path, options)
@@ -63,16 +63,8 @@ def with_torque_rates_last(
 
 def _margin(problem: TrajectoryProblem, limits: Limits, path: DiscretePath) -> float:
     """Least distance of a path's torque rates from their limits, as a share of the range."""
-    lower, upper = np.full_like(limits.lower, -np.inf), np.full_like(limits.upper, np.inf)
-    lower[TORQUE_RATE], upper[TORQUE_RATE] = limits.lower[TORQUE_RATE], limits.upper[TORQUE_RATE]
-    alone = Limits(lower, upper, limits.tolerance)
-    return float(closeness(problem.trajectory(path), alone)[TORQUE_RATE].min())
-
-
-def _without_torque_rates(limits: Limits) -> Limits:
-    lower, upper = limits.lower.copy(), limits.upper.copy()
-    lower[TORQUE_RATE], upper[TORQUE_RATE] = -np.inf, np.inf
-    return Limits(lower, upper, limits.tolerance)
+    alone = limits.without(*(kind for kind in KINDS if kind != TORQUE_RATE))
+    return float(closeness(problem.trajectory(path), alone).min())
 
 
 def _with_rates(terms: PointTerms) -> PointTerms:
