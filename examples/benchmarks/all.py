@@ -21,11 +21,16 @@ SCRIPTS = (
     "kernel",
     "scenes",
     "replanning",
+    "limited_replanning",
+    "free_duration",
     "dimensions",
     "peers",
     "general_costs",
     "work_precision",
     "limits",
+    "limited_reaches",
+    "chains",
+    "obstacles",
     "effects",
     "random_reaches",
     "fuzz",
@@ -35,10 +40,15 @@ SCRIPTS = (
     "tolerance",
     "example_robots",
     "manifold_points",
+    "inverse_kinematics",
 )
 
-LONG = {"hard_cases_long": ("hard_cases.py", "long")}
-"""Benchmarks that take an hour, run only when named: script and arguments."""
+LONG = {
+    "hard_cases_long": ("hard_cases.py", "long"),
+    "limited_reaches_ipopt": ("limited_reaches.py", "--ipopt"),
+    "limited_reaches_rotors": ("limited_reaches.py", "kinova", "xarm7", "--armature", "0.1"),
+}
+"""Benchmarks that are run only when named: script and arguments."""
 
 
 def run(name: str) -> None:

@@ -2,155 +2,104 @@
 
 Both solvers have the same discrete problem, guess and thread in one run: q, v and tau are bounded
 at the quadrature points. hovi then continues until the limits hold between the points too. Ipopt
-has CasADi's exact Hessian, expanded to scalars; building it is not counted.
+has exact derivatives from compiled kernels; building it is not counted. The reaches of Kinova and
+xArm are the first of `limited_reaches.py`.
+
+    python limits.py [--kernels FOLDER]
 """
 
 from __future__ import annotations
 
-import casadi as ca
+import argparse
+import tempfile
+from pathlib import Path
+
 import numpy as np
-from measuring import alone, best_time, print_machine, print_table
-from transcription import IPOPT, Transcription
+from infeasible import print_cases
+from limited_ipopt import MORE_SAMPLES, IpoptRun, compiled_kernels, ipopt_solve
+from measuring import alone, print_machine, print_table
+from random_arms import (
+    arm_scene,
+    cold_point_solve,
+    largest_excess,
+    limited_problem,
+    random_reaches,
+    timed,
+)
 
 import hovi
-from hovi.dynamics.symbolic_dynamics import casadi_functions
-from hovi.optimize.interior_point import minimize_bounded
-from hovi.optimize.trust_region import Options
-from hovi.planning.problem.limits import Limits, as_limits
-from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.solver import guess_path
 
 SCENES = ("ur5_reach_limited", "panda_reach_limited")
+ARMS = ("kinova", "xarm7")
 SCHEME, INTERVALS = "galerkin-2", 16
+REPEATS = 2
 
 
-def reach(scene: str, **changes: object) -> hovi.TrajectoryProblem:
-    """The problem of a scene file, with other limits, start or duration."""
-    task = hovi.load_task(hovi.example(scene))
-    limits = as_limits(task.scene.robot, changes.get("limits", task.options.limits))
-    start = hovi.State(changes["start"]) if "start" in changes else task.start
-    return _problem(task.scene, start, task.goal, changes.get("duration", task.duration), limits)
+def problem_of(name: str) -> hovi.TrajectoryProblem:
+    """The problem of a scene file, or the first random reach of an arm."""
+    scheme = hovi.schemes.by_name(SCHEME)
+    if name in ARMS:
+        scene = arm_scene(name)
+        return limited_problem(scene, random_reaches(scene, 1, 0)[0], INTERVALS, scheme)
+    task = hovi.load_task(hovi.example(name))
+    grid = hovi.Grid.uniform(task.duration, INTERVALS, scheme)
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    limits = hovi.as_limits(task.scene.robot, task.options.limits)
+    return hovi.TrajectoryProblem(ld, task.start, task.goal, limits=limits)
 
 
-def held(torque: float | None) -> hovi.TrajectoryProblem:
-    """A two-link arm held horizontal within 0.05 rad, by at most this torque in [N m]."""
-    scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()])
-    given = {"base": "none", "q": 0.05} | ({} if torque is None else {"tau": torque})
-    rest = hovi.State(np.zeros(2))
-    return _problem(scene, rest, rest, 1.0, as_limits(scene.robot, given))
+def measure(name: str, folder: str) -> tuple[list[list[object]], str]:
+    """Solver, steps, processor time, cost and largest excess of each solver; hovi's message."""
+    problem = problem_of(name)
+    kernels = compiled_kernels(problem.scene, Path(folder))
+    points = [cold_point_solve(problem) for _ in range(REPEATS)]
+    status = "" if points[0].success else ", no minimum"
+    seconds, first = min(point.seconds for point in points), points[0]
+    rows = [[f"hovi, at the points{status}", first.steps, seconds, first.cost, np.nan]]
+    runs = [timed(lambda: hovi.solve(problem)) for _ in range(REPEATS)]
+    seconds, whole = min(runs, key=lambda run: run[0])
+    assert problem.limits is not None
+    excess = largest_excess(problem.scene, whole.trajectory, problem.limits)
+    rows.append([f"hovi, everywhere ({whole.status})", whole.nit, seconds, whole.cost, excess])
+    for text, samples in (("", ()), (f", {len(MORE_SAMPLES)} more samples", MORE_SAMPLES)):
+        solves = [ipopt_solve(problem, kernels, samples) for _ in range(REPEATS)]
+        rows.append(_row(text, min(solves, key=lambda run: run.seconds)))
+    motion = whole.trajectory
+
+    def near(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        x = motion.sample(t)
+        return x.q, x.v, x.a
+
+    rows.append(_row(", from hovi's motion", ipopt_solve(problem, kernels, guess=near)))
+    return rows, whole.message
 
 
-def _problem(
-    scene: hovi.Scene, start: hovi.State, goal: hovi.State, duration: float, limits: Limits
-) -> hovi.TrajectoryProblem:
-    grid = hovi.Grid.uniform(duration, INTERVALS, hovi.schemes.by_name(SCHEME))
-    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
-    return hovi.TrajectoryProblem(ld, start, goal, limits=limits)
-
-
-def measure(scene: str) -> list[dict[str, object]]:
-    """The interior point, the whole solve, and Ipopt."""
-    problem = reach(scene)
-    path = guess_path(problem, "cubic")
-
-    def first() -> object:
-        return minimize_bounded(BoundedAction(problem, problem.limits), path, Options())
-
-    outcome = first()
-    assert outcome.feasible, outcome.stop
-    assert outcome.stop == "stationary", outcome.stop
-    point = {"solver": "hovi, at the points", "steps": outcome.iterations}
-    point |= {"cost": outcome.outputs.value, "seconds": best_time(first, 1.0)}
-    solution = hovi.solve(problem)
-    whole = {"solver": "hovi, everywhere", "steps": solution.nit, "cost": solution.cost}
-    whole |= {"seconds": best_time(lambda: hovi.solve(problem), 1.0)}
-    whole |= {"message": solution.message}
-    transcription = Transcription(problem)
-    solver, bounds = ipopt(transcription)
-    arguments = transcription.arguments("cubic") | bounds
-    found = solver(**arguments)
-    stats = solver.stats()
-    peer = {"solver": f"Ipopt ({stats['return_status']})", "steps": stats["iter_count"]}
-    peer |= {"cost": float(found["f"]), "seconds": best_time(lambda: solver(**arguments), 0.5, 2)}
-    near = solver(**transcription.arguments(outcome.x) | bounds)
-    again = {"solver": "Ipopt, from hovi's motion", "steps": solver.stats()["iter_count"]}
-    return [point, whole, peer, again | {"cost": float(near["f"]), "seconds": None}]
-
-
-def ipopt(it: Transcription) -> tuple[ca.Function, dict[str, object]]:
-    """An Ipopt solver for a transcription with limits, and its bounds."""
-    n, P = it.n, len(it.weights)
-    x = ca.SX.sym("x", 3 * n)
-    rnea = casadi_functions(it.problem.scene.model).inverse_dynamics
-    torque = ca.Function("tau", [x], [ca.cse(rnea(x[:n], x[n : 2 * n], x[2 * n :]))])
-    w = ca.MX.sym("w", it.points.shape[1])
-    p = ca.reshape(ca.mtimes(it.points, w), 3 * n, P)
-    tau = torque.map(P)(p)
-    cost = ca.dot(ca.sum1(tau**2).T, ca.DM(it.weights)) / 2
-    outputs = ca.vec(ca.vertcat(p[: 2 * n, :], tau))
-    nlp = {"x": w, "f": cost, "g": ca.vertcat(ca.mtimes(it.defects, w), outputs)}
-    solver = ca.nlpsol("S", "ipopt", nlp, {"print_time": 0, "expand": True, "ipopt": IPOPT})
-    defects, rows = np.zeros(it.defects.shape[0]), [0, 1, 3]
-    limits = it.problem.limits
-    lower = np.concatenate([defects, np.tile(limits.lower[rows].ravel(), P)])
-    upper = np.concatenate([defects, np.tile(limits.upper[rows].ravel(), P)])
-    return solver, {"lbg": lower, "ubg": upper}
-
-
-def measure_infeasible() -> list[tuple[str, float, float, str, str]]:
-    """Per infeasible problem: its time, that of a similar feasible problem, status, reason."""
-    ur5 = "ur5_reach_limited"
-    feasible = reach(ur5)
-    outside = np.add(feasible.start.q, [7.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    weak = {"v": 3.14, "tau": [20.0, 20.0, 20.0, 5.0, 5.0, 5.0]}
-    cases = {
-        "UR5, start outside": (reach(ur5, start=outside), feasible),
-        "UR5, 0.3 s": (reach(ur5, duration=0.3), feasible),
-        "UR5, torques of 20 and 5 N m": (reach(ur5, limits=weak), feasible),
-        "two links held by 2 N m": (held(2.0), held(None)),
-    }
-    rows = []
-    for name, (problem, like) in cases.items():
-        possible = hovi.solve(like)
-        assert possible.success, possible.message
-        solution = hovi.solve(problem)
-        ours = min(solution.solve_seconds, hovi.solve(problem).solve_seconds)
-        other = best_time(lambda like=like: hovi.solve(like), 0.3)
-        rows.append((name, ours, other, str(solution.status), solution.message))
-    return rows
+def _row(text: str, run: IpoptRun) -> list[object]:
+    return [f"Ipopt{text} ({run.status})", run.steps, run.seconds, run.cost, run.excess]
 
 
 def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--kernels", metavar="FOLDER", help="where compiled kernels are kept")
+    given = parser.parse_args()
     print(f"`{SCHEME}` on {INTERVALS} intervals, from the cubic guess, one thread, when warm.\n")
     table, notes = [], []
-    for scene in SCENES:
-        runs = alone(measure, scene)
-        ours = runs[0]
-        for run in runs:
-            timed = run["seconds"] is not None
-            table.append(
-                [
-                    f"`{scene}`, {run['solver']}",
-                    run["steps"],
-                    f"{run['steps'] / ours['steps']:.2f}",
-                    f"{1e3 * run['seconds']:.1f}" if timed else "",
-                    f"{run['seconds'] / ours['seconds']:.1f}" if timed else "",
-                    f"{run['cost']:.10g}",
-                    f"{run['cost'] / ours['cost'] - 1:.1e}",
-                ]
-            )
-        notes.append(f"- `{scene}`, hovi everywhere: {runs[1]['message']}")
-    columns = ["scene, solver", "steps", "steps / hovi's", "ms", "time / hovi's", "cost"]
-    print_table([*columns, "cost / hovi's - 1"], table)
+    with tempfile.TemporaryDirectory() as fresh:
+        for name in (*SCENES, *ARMS):
+            rows, message = alone(measure, name, given.kernels or fresh)
+            _, steps, seconds, cost, _ = rows[0]
+            for solver, n, t, J, excess in rows:
+                compared = [f"{n / steps:.2f}", f"{1e3 * t:.3g}", f"{t / seconds:.1f}"]
+                costs = [f"{J:.10g}", f"{J / cost - 1:.1e}"]
+                held = "" if np.isnan(excess) else f"{excess:.0e}"
+                table.append([f"`{name}`, {solver}", n, *compared, *costs, held])
+            notes.append(f"- `{name}`, hovi everywhere: {message}")
+    columns = ["scene, solver", "steps", "steps / hovi's", "CPU ms", "time / hovi's", "cost"]
+    print_table([*columns, "cost / hovi's - 1", "largest excess, of the range"], table)
     print("\n".join(notes) + "\n")
     print("Problems without a motion, against one like it that has one:\n")
-    rows = alone(measure_infeasible)
-    columns = ["problem", "ms", "ms of a feasible one", "ratio", "status"]
-    print_table(
-        columns,
-        [[n, f"{1e3 * a:.1f}", f"{1e3 * b:.1f}", f"{a / b:.2g}", s] for n, a, b, s, _ in rows],
-    )
-    print("\n".join(f"- {name}: {message}" for name, *_, message in rows) + "\n")
+    print_cases()
     print_machine(threads=1)
 
 

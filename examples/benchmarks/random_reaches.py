@@ -25,7 +25,6 @@ ROBOTS = {
     "talos_arm": ["gripper_left_joint"],
 }
 PAIRS, SEED, STARTS = 20, 0, 4
-SCHEME, INTERVALS = "galerkin-2", 16
 HOLDING_SHARE = 0.9
 """Fraction of the torque limits allowed for holding start and goal."""
 TIME_LIMIT = 600.0  # [s], of one call of plan
@@ -52,8 +51,7 @@ def measure(name: str) -> list[dict[str, object]]:
     scene = hovi.Scene(hovi.load_robot(name, locked=ROBOTS[name]), [hovi.effects.Gravity()])
     rows: list[dict[str, object]] = []
     for number, (start, goal, duration) in enumerate(pairs(scene)):
-        settings = {"scheme": SCHEME, "intervals": INTERVALS, "limits": "urdf"}
-        settings |= {"processes": 1, "time_limit": TIME_LIMIT}
+        settings = {"limits": "urdf", "processes": 1, "time_limit": TIME_LIMIT}
         first = hovi.plan(scene, start, goal, duration, **settings)
         row = {"number": number, "solution": _result(first), "again": None}
         if not first.success:
@@ -78,7 +76,7 @@ def _result(solution: hovi.Solution) -> dict[str, object]:
 
 def main() -> None:
     print(
-        f"`{SCHEME}` on {INTERVALS} intervals, cubic guess, gravity, seed {SEED}, one thread, "
+        f"All defaults, cubic guess, gravity, seed {SEED}, one thread, "
         f"{PAIRS} reaches per robot, at most {TIME_LIMIT:.0f} s each. "
         "Medians and largest of those that end in a minimum.\n"
     )

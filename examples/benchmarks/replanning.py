@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -25,15 +26,20 @@ def solved(scene: str) -> tuple[hovi.Solution, Array]:
     return solution, np.asarray(task.goal.q, dtype=float)
 
 
+def goals(home: Array, move: float, count: int) -> Iterator[Array]:
+    """A walk of the goal: steps of length `move`, random but biased towards the original goal."""
+    random, goal = np.random.default_rng(0), home
+    for _ in range(count):
+        direction = random.standard_normal(len(home)) + 2 * (home - goal) / move
+        goal = goal + move * direction / np.linalg.norm(direction)
+        yield goal
+
+
 def measure(scene: str, move: float) -> list[float]:
     """Steps (most and mean), milliseconds (median) and Hz, over a walk of the goal."""
     solution, home = solved(scene)
-    random = np.random.default_rng(0)
-    goal, steps, times = home, [], []
-    for _ in range(LAPS):
-        # a step of this length in a random direction, biased towards the original goal
-        direction = random.standard_normal(len(home)) + 2 * (home - goal) / move
-        goal = goal + move * direction / np.linalg.norm(direction)
+    steps, times = [], []
+    for goal in goals(home, move, LAPS):
         began = time.perf_counter()
         solution = solution.replan(goal=hovi.State(goal))
         times.append(time.perf_counter() - began)

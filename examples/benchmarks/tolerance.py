@@ -21,7 +21,7 @@ from measuring import alone, print_machine, print_table
 from pontryagin import extremal_cost
 
 import hovi
-from hovi.discrete.motion_error import deviation
+from hovi.discrete.measures.motion_error import deviation
 from hovi.planning.solver.solver import solve_on_grid
 from hovi.schemes import galerkin
 

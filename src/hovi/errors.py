@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from typing import Any
 
 _MAX_COMPARED = 256  # characters of a name; the time of a comparison grows with their square
 _MAX_LISTED = 60  # names in a message
@@ -32,6 +33,18 @@ class InputError(HoviError):
 
 class ChartError(InputError):
     """An orientation turns too far within one interval for its chart."""
+
+
+class UnreachableError(HoviError):
+    """No configuration meets a goal; `q` is the one that comes nearest to it, shape (nq,)."""
+
+    def __init__(self, sentence: str = "", q: Any = None) -> None:
+        super().__init__(sentence)
+        self.q = q
+
+    def __reduce__(self) -> tuple[type[UnreachableError], tuple[str, Any]]:
+        """Pickled with its configuration."""
+        return type(self), (str(self), self.q)
 
 
 class ModelError(HoviError):

@@ -205,10 +205,10 @@ def test_info_names_the_sources_of_the_limits_of_an_arm(run: Run, tmp_path: Path
     assert "github.com/UniversalRobots" in out
 
 
-def test_split_intervals_are_counted(run: Run) -> None:
+def test_intervals_are_those_on_which_limits_hold(run: Run) -> None:
     fields = only_object(run("plan", "panda_reach_limited", "--json")[1])
     assert fields["success"]
-    assert fields["intervals"] > 16
+    assert f", on {fields['intervals']} intervals" in fields["message"]
 
 
 def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
@@ -612,3 +612,42 @@ def test_help_lists_every_command(run: Run) -> None:
 def test_every_bundled_scene_is_found_by_name(run: Run) -> None:
     for name in example_scenes():
         assert run("info", name)[0] == 0
+
+
+# Sequences
+
+
+def test_a_sequence_is_planned_saved_and_drawn(run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("plan", "two_link_pick", "--json", "--out", tmp_path / "pick.npz")
+    assert code == 0
+    report = only_object(out)
+    segments = report["segments"]
+    assert [each["name"] for each in segments] == ["reach", "carry", "return"]
+    assert [each["end"] for each in segments] == pytest.approx([0.6, 1.5, 2.3])
+    assert sum(each["cost"] for each in segments) == pytest.approx(report["cost"], rel=1e-12)
+    assert report["certificate"]["replay"] is not None
+    assert run("plot", tmp_path / "pick.npz", "--out", tmp_path / "pick.png")[0] == 0
+    assert run("replay", tmp_path / "pick.npz", "--html", tmp_path / "pick.html")[0] == 0
+
+
+def test_the_report_of_a_sequence_lists_its_segments(run: Run) -> None:
+    code, out, _ = run("plan", "two_link_pick", "--no-certificate")
+    assert code == 0
+    lines = [line for line in out.splitlines() if line.startswith("segment")]
+    assert [line.split("'")[1] for line in lines] == ["reach", "carry", "return"]
+    assert "from 0.6 to 1.5 s, cost" in lines[1]
+
+
+def test_info_names_the_segments_and_what_is_theirs(run: Run) -> None:
+    code, out, _ = run("info", "two_link_pick")
+    assert code == 0
+    assert "segment 'carry': 0.9 s, from 0.6 to 1.5 s\n  payload: 0.5 kg at tip" in out
+    assert "  goal q = [0.7, 0.9]" in out
+    assert "    position [-0.6, 0, 1.4] m" in out
+
+
+@pytest.mark.parametrize("command", ["simulate", "effects", "accuracy"])
+def test_what_takes_one_motion_refuses_a_sequence(run: Run, command: str) -> None:
+    code, _, err = run(command, "two_link_pick")
+    assert code == 2
+    assert "takes one motion, and task 'two_link_pick' has 3 segments" in err

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from hovi.cli.application import main
 from hovi.cli.reports import progress as reports
 from oracles.processes import wait_until
 
@@ -32,3 +33,15 @@ def test_quiet_progress_is_none(capfd: pytest.CaptureFixture[str]) -> None:
     with reports.progress(quiet=True) as report:
         assert report is None
     assert capfd.readouterr().err == ""
+
+
+def test_a_line_comes_every_five_seconds() -> None:
+    assert reports.LINE_PERIOD == 5.0
+
+
+def test_a_simulation_shows_that_it_runs(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reports, "LINE_PERIOD", 0.01)
+    assert main(["simulate", "two_link_reach", "--duration", "20", "--intervals", "2000"]) == 0
+    assert "  0 % simulating (" in capfd.readouterr().err

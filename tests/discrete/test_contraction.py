@@ -79,3 +79,20 @@ def test_all_kernels_agree(shape: Shape) -> None:
     native.contract(*batch, *slow, portable=True)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-14 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=str)
+def test_intervals_with_tables_of_their_own_are_contracted_one_by_one(shape: Shape) -> None:
+    """Steps are equal, so that a table that is kept from the interval before would be noticed."""
+    B, Q, R, m, _ = shape
+    _, _, _, gradient, hessian = random_batch(*shape)
+    random = np.random.default_rng(sum(shape))
+    table, weights = random.normal(size=(B * Q, R, m)), random.uniform(size=B * Q)
+    steps = np.full(B, 0.7)
+    together = contract(table, weights, steps, gradient, hessian)
+    for k in range(B):
+        at = slice(k * Q, k * Q + Q)
+        alone = table[at], weights[at], steps[k : k + 1], gradient[at], hessian[at]
+        for found, expected in zip(together, written_out(*alone), strict=True):
+            atol = 1e-13 * np.abs(expected).max()
+            np.testing.assert_allclose(found[k], expected[0], rtol=0, atol=atol)

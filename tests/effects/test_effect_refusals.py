@@ -106,8 +106,14 @@ CASES: dict[str, tuple[Effect, str]] = {
         EffortWeight({"panda_joint1": -1.0}),
         "weight of joint 'panda_joint1' must be finite and 0 or more",
     ),
-    "no effort weight": (EffortWeight(), "needs either weight or matrix; neither was given"),
-    "effort weights twice": (EffortWeight(1.0, ((1.0,),)), "weight or matrix; both were given"),
+    "no effort weight": (
+        EffortWeight(),
+        "needs one of weight, matrix and from_urdf = true; none was given",
+    ),
+    "effort weights twice": (
+        EffortWeight(1.0, ((1.0,),)),
+        "weight, matrix and from_urdf = true; two were given",
+    ),
     "flat matrix": (EffortWeight(matrix=((1.0, 0.0), (0.0, 1.0))), "needs 7 rows of 7, .* 2, 2"),
     "no matrix": (EffortWeight(matrix=()), "needs 7 rows of 7, .* got rows of nothing"),
     "a matrix of one sign": (EffortWeight(matrix=matrix({(1, 2): 0.5})), "symmetric.* 0.5 and 0"),

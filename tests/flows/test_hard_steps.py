@@ -14,17 +14,18 @@ from scipy.integrate import solve_ivp
 from hovi.effects import Gravity
 from hovi.errors import InputError
 from hovi.flows.charted_lagrangian import ChartedLagrangian
-from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian
+from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian, conjugate_time
 from hovi.flows.legendre_transforms import jet_at_momenta, legendre
 from hovi.flows.scheme_lagrangian import SchemeLagrangian
 from hovi.flows.step_guesses import continued_modes, joined_modes, taylor_modes
 from hovi.flows.stepper import flow
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
+from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.casadi_lagrangian import CasadiLagrangian
 from hovi.scene.effort_lagrangian import EffortLagrangian
 from hovi.scene.scene import Scene
-from hovi.scene.standard_lagrangians import mechanics
+from hovi.scene.standard_lagrangians import mechanics, spline
 from hovi.schemes import by_name, end_basis, galerkin
 from hovi.schemes.polynomials import legendre as legendre_polynomials
 from samples.manifold_robots import configurations, with_arm
@@ -294,3 +295,45 @@ class Counted(CasadiLagrangian):
     def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
         self.evaluations += 1
         return super().evaluate(*jet, t=t)
+
+
+@pytest.mark.parametrize("size", [1e160, 1e300])
+def test_an_action_that_is_no_number_is_refused(size: float) -> None:
+    """Squares of the states and momenta overflow: such steps are refused, if they are found."""
+    L = spline(2)
+    one, exact = SchemeLagrangian(L, galerkin(1), STEP), ExactDiscreteLagrangian(L, STEP)
+    x, p = np.zeros((1, 2, 2)), np.full((1, 2, 2), size)
+    for call in (
+        lambda: one.from_start(x, p),
+        lambda: one.from_end(x, p),
+        lambda: one.joining(x, p),
+        lambda: exact.from_start(x, p),
+        lambda: conjugate_time(L, x[0], p[0], 0.2),
+    ):
+        with pytest.raises(InputError, match=r"is not a finite number: use|no solution near"):
+            call()
+
+
+def test_an_action_is_a_number_up_to_the_largest_momenta() -> None:
+    """Its slopes are larger than itself, and may overflow alone."""
+    one, refused = SchemeLagrangian(spline(2), galerkin(1), STEP), 0
+    for size in np.geomspace(1e152, 1e156, 100):
+        try:
+            segment = one.from_start(np.zeros((1, 2, 2)), np.full((1, 2, 2), size))
+        except InputError:
+            refused += 1
+        else:
+            assert np.isfinite(segment.values).all()
+            assert np.isfinite(segment.step_rate).all()
+    assert 20 < refused < 80
+
+
+@pytest.mark.parametrize("h", [0.0, -0.1, 5e-324, 1e10, 1e300, np.inf, np.nan])
+def test_steps_on_groups_are_bounded_as_on_vector_spaces(h: float) -> None:
+    space = ConfigurationSpace(("SO(3)",))
+    q, v = ca.SX.sym("q", 4), ca.SX.sym("v", 3)
+    L = CasadiLagrangian([q, v], ca.sumsqr(v) / 2, space)
+    with pytest.raises(InputError, match="a step must be"):
+        ChartedLagrangian(L, space, galerkin(1, 1), h)
+    with pytest.raises(InputError, match="a step must be"):
+        SchemeLagrangian(spline(2), galerkin(1), h)

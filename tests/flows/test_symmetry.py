@@ -128,6 +128,13 @@ def test_noether_for_a_cart_under_gravity(cart: Robot) -> None:
     np.testing.assert_allclose(J, J[0], rtol=0, atol=1e-12 * np.abs(J).max())
 
 
+@pytest.mark.parametrize("size", [5e-324, 1e-160, 1e155, 1e308])
+def test_a_direction_of_the_world_may_have_any_length(cart: Robot, size: float) -> None:
+    x, p = np.random.default_rng(0).normal(size=(2, 3, 2, 2))
+    given, usual = (base_translation(Scene(cart), [s, 0, 0]) for s in (size, 1.0))
+    np.testing.assert_array_equal(given.momentum(x, p), usual.momentum(x, p))
+
+
 def test_motions_that_are_no_symmetries_are_refused(panda: Robot, cart: Robot) -> None:
     heavy = Scene(panda, [Gravity()])
     with pytest.raises(SceneError, match="changes under a rotation"):

@@ -6,10 +6,12 @@ the values of `NEVER` mean nothing anywhere: a call with one of them must be ref
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import io
 import json
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +33,9 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import by_name, galerkin
+from samples.meshes import WEDGE
 from samples.slider import SLIDER
+from samples.world_files import CUPBOARD, PLANNING_SCENE
 
 Q, N, H = 2, 4, 0.1
 
@@ -45,7 +49,10 @@ class Nothing:
 
 ITSELF: list[Any] = []
 ITSELF.append(ITSELF)
-NEVER: tuple[Any, ...] = (Nothing(), b"bytes", 1j, [Nothing()])
+NEVER: tuple[Any, ...] = (
+    *(Nothing(), b"bytes", 1j, [Nothing()], np.complex128(1.0), np.full(2, 1j)),
+    *(np.timedelta64(3, "ms"), np.array([1, 2], "m8[s]")),
+)
 WRONG: tuple[Any, ...] = (
     *NEVER,
     *({1: Nothing()}, {"elbow": Nothing()}),
@@ -72,6 +79,8 @@ WRONG: tuple[Any, ...] = (
         np.full(2, np.nan),
         np.array("x"),
     ),
+    *(np.full(3, 1e300), np.full(4, -1e308), np.full((2, 3), 1e300), np.full((3, 3), 1e200)),
+    *(np.full((4, 4), 1e300), np.full(2, 5e-324), np.full(3, 5e-324), np.full((2, 2), 1e300)),
     *(np.zeros((2, 2, 2, 2)), np.array([None, 1]), np.zeros(2, complex), range(3), ..., set()),
 )
 
@@ -143,6 +152,7 @@ def calls() -> dict[str, Call]:
         _plans,
         _orders,
         _segments_and_periods,
+        _sequences,
         _symbolic,
         _flows,
         _groups,
@@ -210,11 +220,13 @@ def _models() -> list[Call]:
             **{"package_dirs": (), "free_flyer": None, "locked": ("elbow",), "visual": None},
             **{"collision": None, "srdf": None, "mimic": False},
         ),
+        call(hovi.load_robot, hovi.example("two_link.urdf"), locked={"elbow": 0.3}),
         *(own(robot(), name, q, "q") for name in ("check_configuration", "check_velocity")),
         *(own(robot(), name, rows, rows) for name in ("integrate", "difference")),
         *(own(panda(), name, panda().neutral(), np.zeros(9)) for name in ("integrate",)),
         own(robot(), "frame_position", "tip", rows),
         own(robot(), "frame_positions", ("tip",), rows),
+        own(robot(), "frame_pose", "tip", rows),
         own(robot(), "check_frame_moves", "tip"),
         own(robot(), "measured_frames", "tip"),
         own(robot(), "hint", "tipp", ("tip",)),
@@ -241,6 +253,7 @@ def _scenes() -> list[Call]:
         ),
         build(e.CasadiCost, cost=_squared_torque()),
         build(e.EffortWeight, weight={"elbow": 2.0}),
+        build(e.EffortWeight, from_urdf=True),
         build(e.EffortWeight, matrix=[[2.0, "sin(t)"], ["sin(t)", 1.0]]),
         build(e.Gravity, acceleration=9.81, direction=(0.0, 0.0, -1.0)),
         build(e.JerkCost, weight={"shoulder": 1.0, "elbow": 2.0}),
@@ -258,6 +271,7 @@ def _scenes() -> list[Call]:
     return [
         *(call(_scene_with(each.function), **dict(each.keywords)) for each in effects),
         build(hovi.Scene, robot=robot(), effects=[], passive=("elbow",), compile=False),
+        build(hovi.Scene, robot=robot(), effects={"gravity": {"acceleration": 9.81}}),
         own(scene(), "effort_lagrangian", weight=[1.0, 2.0], regular=True),
         own(scene(), "inverse_dynamics", *[np.zeros((3, 2))] * 3, np.zeros(3)),
         own(scene(), "without", "gravity"),
@@ -362,6 +376,59 @@ def _state_on_robot(**fields: Any) -> object:
     return state.on(robot(), "start"), state.free_on(robot(), "start"), state.turns_on(robot(), "")
 
 
+@cache
+def _world_files() -> Path:
+    """A folder with a mesh and the files of a cupboard and of a planning scene."""
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    (folder / "channel.obj").write_text(WEDGE)
+    (folder / "cupboard.urdf").write_text(CUPBOARD)
+    (folder / "kitchen.yaml").write_text(PLANNING_SCENE)
+    return folder
+
+
+def _obstacles() -> list[Call]:
+    folder, at = _world_files(), {"position": [2.0] * 3, "rpy": [0.0] * 3}
+    corners = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]
+    return [
+        build(hovi.Cylinder, radius=0.1, length=0.3, **at, name="post"),
+        build(
+            hovi.ObstaclePath,
+            **{"times": [0.0, 1.0], "positions": corners[:2], "rpy": corners[:2]},
+        ),
+        call(hovi.ObstaclePath.of, {"times": [0.0, 1.0], "positions": corners[:2]}),
+        own(hovi.ObstaclePath([0.0, 1.0], corners[:2]), "poses", np.array([0.3])),
+        own(hovi.ObstaclePath([0.0, 1.0], corners[:2]), "pose", 0.3),
+        build(hovi.Sphere, position=[1.0, 0.0, 0.0], radius=0.1, path=None),
+        build(hovi.HalfSpace, normal=[0.0, 0.0, 1.0], position=[0.0, 0.0, -3.0], name="floor"),
+        build(hovi.ConvexHull, points=corners, **at, name="wedge"),
+        build(hovi.ConvexParts, parts=[corners, corners], radius=0.01, **at, name="parts"),
+        build(hovi.Mesh, file=folder / "channel.obj", **at, scale=1.0, convex_parts=False),
+        build(hovi.PointCloud, points=corners, radius=0.01, cell=0.0, **at, name="cloud"),
+        call(
+            hovi.load_obstacles,
+            folder / "cupboard.urdf",
+            **{"name": "a", **at, "joints": {"hinge": 0.3}, "package_dirs": ()},
+            **{"convex_parts": False, "path": None},
+        ),
+        call(hovi.load_obstacles, folder / "kitchen.yaml", **at),
+        build(
+            hovi.Grasped,
+            **{"shape": hovi.Sphere([0.0] * 3, 0.1), "frame": "forearm", "mass": 1.0, **at},
+            **{"center": [0.0] * 3, "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]},
+            **{"may_touch": ["ball"], "name": "apple"},
+        ),
+        call(hovi.holding, robot(), _apple()),
+        own(_apple(), "payload"),
+        build(hovi.Clearance, obstacles=(), may_touch=[("apple", "forearm")]),
+    ]
+
+
+@cache
+def _apple() -> hovi.Grasped:
+    return hovi.Grasped(hovi.Sphere([0.0] * 3, 0.1), "forearm", 1.0, "apple")
+
+
 def _problems() -> list[Call]:
     limits, task = problem().limits, _task()
     assert limits is not None
@@ -372,6 +439,7 @@ def _problems() -> list[Call]:
         build(hovi.Sphere, position=[1.0, 0.0, 0.0], radius=0.1, name="ball"),
         build(hovi.Capsule, ends=[[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]], radius=0.1, name="post"),
         build(hovi.Box, size=[1.0] * 3, position=[2.0] * 3, rpy=[0.0] * 3, name="box"),
+        *_obstacles(),
         build(hovi.Clearance, obstacles=(sphere,), margin=0.01, self_collision=False),
         call(hovi.Clearance.from_dict, hovi.Clearance((sphere,)).to_dict()),
         build(hovi.Limits, lower=limits.lower, upper=limits.upper, tolerance=1e-6),
@@ -387,6 +455,15 @@ def _problems() -> list[Call]:
         ),
         build(hovi.FrameGoal, frame="tip", axis=([1, 0, 0], [0, 0, 1])),
         build(hovi.FrameGoal, frame="tip", pose=np.eye(4)),
+        build(hovi.FrameGoal, frame="tip", rpy=[0.1, 0.2, 0.3]),
+        build(hovi.FrameGoal, frame="tip", quaternion_xyzw=[0.0, 0.0, 0.0, 1.0]),
+        build(hovi.FrameGoal, frame="tip", quaternion_wxyz=[1.0, 0.0, 0.0, 0.0]),
+        call(
+            hovi.inverse_kinematics,
+            *(panda(), _hand_goal()),
+            **{"near": np.zeros(9), "limits": "urdf", "obstacles": (sphere,), "margin": 0.01},
+            **{"self_collision": False, "most": 2, "seeds": 50},
+        ),
         own(frame_goal, "check", robot()),
         own(frame_goal, "condition", robot()),
         build(hovi.Via, time=0.5, goal=goal),
@@ -413,6 +490,16 @@ def _problems() -> list[Call]:
     ]
 
 
+@cache
+def _with_hand() -> hovi.Scene:
+    return hovi.Scene(panda(), [hovi.effects.Gravity()])
+
+
+@cache
+def _hand_goal() -> hovi.FrameGoal:
+    return hovi.FrameGoal("panda_hand", position=[0.4, 0.1, 0.4], axis=([0, 0, 1], [0, 0, -1]))
+
+
 def _task() -> hovi.Task:
     options = hovi.PlanOptions(intervals=N, processes=1, max_iterations=2, time_limit=1.0)
     return hovi.Task(scene(), hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7]), 1.0, options)
@@ -422,14 +509,35 @@ def _plans() -> list[Call]:
     quick = {"max_iterations": 2, "time_limit": 1.0, "intervals": N, "processes": 1, "starts": 1}
     options = {
         **{"time_weight": 0.0, "via": (), "scheme": "galerkin-2", "limits": "none", "seed": 0},
-        **{"tolerance": None, "obstacles": (), "margin": 0.01, "self_collision": False},
+        **{
+            "tolerance": None,
+            "obstacles": (),
+            "grasped": (),
+            "margin": 0.01,
+            "self_collision": False,
+        },
         **{"guess": "cubic", "turns": None, "weight": None, "continuation": False},
+        **{"group": None},
     }
     ends = [0.0, 0.0], [0.3, 0.7]
     return [
         call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
         call(hovi.plan, scene(), *ends, 1.0, smooth=True, **quick),
+        call(hovi.plan, _with_hand(), np.zeros(9), np.zeros(9), 1.0, group="arm", **quick),
+        call(
+            hovi.plan, scene(), hovi.FrameGoal("tip", position=[0.3, 0, -2]), ends[1], 1.0, **quick
+        ),
+        call(
+            *(hovi.plan, scene(), {"q": {"shoulder": 0.0, "elbow": 0.0}, "v": {"elbow": 0.1}}),
+            *({"frame": "tip", "position": [0.3, 0, -2]}, "1 s"),
+            via=[{"time": "300 ms", "q": {"shoulder": 0.1, "elbow": 0.2}}],
+            **quick,
+        ),
+        own(
+            hovi.State({"shoulder": 0.0, "elbow": 0.0}, {"elbow": 0.1}),
+            *("resolved", robot(), "start"),
+        ),
         build(hovi.PlanOptions, **quick, **options),
         call(hovi.plan_task, _task(), progress=None, intervals=2),
         call(
@@ -440,6 +548,8 @@ def _plans() -> list[Call]:
             method=None,
         ),
         own(solution(), "replan", [0.0, 0.0], [0.3, 0.6], None),
+        own(solution(), "replan", goal=[0.3, 0.6], time_limit=1.0, max_iterations=2),
+        own(solution(), "advance", 0.1, [0.05, 0.1], [0.3, 0.6], duration=0.8, time_limit=1.0),
         call(hovi.certify, solution(), "tip", estimate=False),
         call(hovi.estimate_error, solution(), "tip"),
     ]
@@ -463,6 +573,7 @@ def _orders() -> list[Call]:
         call(hovi.solve, third, found.trajectory, seek="minimum"),
         call(hovi.solve, hovi.TrajectoryProblem(first, *ends), "cubic", seek="stationary"),
         own(found, "replan", None, [0.3, 0.6]),
+        own(found, "advance", 0.1, rest, [0.3, 0.6], duration=None),
         own(found.trajectory, "jet", [0.0, 0.5], 3),
         own(found.trajectory, "jet_intervals", [0, 1], [0.0, 1.0], 3),
         build(
@@ -505,6 +616,36 @@ def _segments_and_periods() -> list[Call]:
         own(motion, "save", folder() / "segments.npz"),
         call(_period, displacement=[6.0, 0.0], held=("elbow",)),
         own(hovi.Periodic([6.0, 0.0]), "ends", ends[0], robot(), 2, False),
+    ]
+
+
+def _sequences() -> list[Call]:
+    """Segments, and their plans as one motion."""
+    load = hovi.effects.Payload(frame="tip", mass=0.5)
+    segments = [
+        hovi.Segment([0.3, 0.7], 0.5),
+        hovi.Segment([0.0, 0.0], 0.5, effects=[load], name="carry"),
+    ]
+    quick: dict[str, Any] = {"intervals": N, "processes": 1, "limits": "none"}
+    task = hovi.Task.of_segments(scene(), hovi.State([0.0, 0.0]), segments)
+    return [
+        build(
+            hovi.Segment,
+            **{"goal": [0.3, 0.7], "duration": 0.5, "effects": [load], "limits": "none"},
+            name="carry",
+        ),
+        call(
+            hovi.plan_sequence,
+            *(scene(), [0.0, 0.0], segments),
+            **{"progress": None, "options": None, **quick},
+        ),
+        call(
+            hovi.Task.of_segments,
+            *(scene(), hovi.State([0.0, 0.0]), segments),
+            **{"options": None, "name": "pick"},
+        ),
+        call(hovi.plan_task, task, progress=None, intervals=2),
+        call(hovi.save_task, task, folder() / "sequence.toml"),
     ]
 
 
@@ -646,6 +787,7 @@ def _files() -> list[Call]:
     task = hovi.Task(scene(), hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7]), 1.0)
     hovi.save_task(task, toml)
     return [
+        own(task, "require_one_motion", "a test"),
         own(trajectory, "save", npz),
         call(hovi.Trajectory.load, npz),
         call(hovi.load_task, toml),
@@ -666,7 +808,7 @@ def _files() -> list[Call]:
 
 def mutate(random: Random) -> Mutant:
     """A call: its name, where another argument is given, and which, as JSON."""
-    name = random.choice(list(calls()))
+    name = random.choice([name for name, each in calls().items() if each.places])
     place = random.choice(calls()[name].places)
     return Mutant(json.dumps([name, place, random.randrange(len(WRONG))]).encode())
 

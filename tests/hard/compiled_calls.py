@@ -17,15 +17,18 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
+import coal
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from hard.mutated_bytes import mutated_bytes
 from hard.verdict import Mutant, Verdict
-from hovi._native import band, dynamics, groups, intervals
+from hovi._native import band, barrier, distances, dynamics, groups, intervals, kinematics
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.dynamics.joint_tree import read_joint_tree
+from hovi.dynamics.kinematic_chain import KinematicChain, read_kinematic_chain
+from hovi.planning.clearance import compiled_distances
 from hovi.robot.bundled_models import example
 from hovi.robot.loading import load_robot
 
@@ -36,11 +39,15 @@ Sizes = dict[str, int]
 
 @dataclass(frozen=True)
 class Kind:
-    """What an array must be: its shape by letters, its type, and whether it is written to."""
+    """What an array must be: its shape by letters, its type, and whether it is written to.
+
+    output: it is written without being read. updated: it must be writable, and is read.
+    """
 
     shape: str
     dtype: str = "float64"
     output: bool = False
+    updated: bool = False
 
     def __call__(self, sizes: Sizes, random: np.random.Generator) -> Array:
         """A valid array: random numbers, zeros of integers and booleans."""
@@ -75,6 +82,10 @@ def _in(shape: str, dtype: str = "float64") -> Kind:
 
 def _out(shape: str) -> Kind:
     return Kind(shape, output=True)
+
+
+def _updated(shape: str) -> Kind:
+    return Kind(shape, updated=True)
 
 
 def _size(term: str, sizes: Sizes) -> int:
@@ -191,6 +202,64 @@ def _columns(arguments: Arguments, sizes: Sizes) -> None:
     arguments["table"] = np.resize(arguments["table"], (sizes["Q"], 3, columns))
 
 
+_TABLES = {"table": _in("T R m"), "weights": _in("T"), "steps": _in("B")}
+_SELECTION = {"selected": _in("K", "int64"), "scales": _in("K"), "jacobian": _in("P p R*n")}
+_ROWS_OF_INTERVALS = {"intervals": _in("E", "int64"), "joints": _in("E", "int64")}
+
+
+def _tables_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    """One table for all intervals, or one for each, and 2 to 5 rows at a point."""
+    tables, points, B = sizes["T"], sizes["P"], sizes["B"]
+    own = B > 1 and tables == points
+    return 2 <= sizes["R"] <= 5 and (points % B == 0 if own else points == B * tables)
+
+
+def _selection_fits(arguments: Arguments, sizes: Sizes) -> bool:
+    end = sizes["R"] * sizes["n"] + sizes["p"]
+    inside = all(0 <= column < end for column in arguments["selected"].tolist())
+    return inside and _tables_fit(arguments, sizes)
+
+
+def _selected(arguments: Arguments, sizes: Sizes) -> None:
+    """The first columns and the last ones, outputs among them."""
+    end = sizes["R"] * sizes["n"] + sizes["p"]
+    arguments["selected"][:] = np.arange(sizes["K"]) * 7 % end
+
+
+def _rows_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    intervals, joints = arguments["intervals"].tolist(), arguments["joints"].tolist()
+    return all(0 <= k < sizes["N"] for k in intervals) and all(0 <= i < sizes["n"] for i in joints)
+
+
+_SELECTED: dict[str, Any] = {
+    "letters": {"B": (0, 4), "R": (2, 5), "n": (1, 4), "m": (0, 6)},
+    "values": _selected,
+    "fits": _selection_fits,
+}
+_LINEAR: dict[str, Any] = {"letters": {"N": (1, 4), "n": (1, 4)}, "fits": _rows_fit}
+
+# Barrier
+
+_SLACKS = {name: _in("R") for name in ("lower", "upper", "s", "zl", "zu")}
+_NEWTON = {name: _updated("R") for name in ("ds", "dzl", "dzu")}
+
+
+def _outputs(*names: str) -> dict[str, Kind]:
+    return {name: _out("R") for name in names}
+
+
+def _inputs(*names: str) -> dict[str, Kind]:
+    return {name: _in("R") for name in names}
+
+
+_TARGETS = ("lower_targets", "upper_targets")
+_BARRIER: dict[str, Any] = {"letters": {"R": (0, 9)}}
+
+
+def _keeps_a_share(arguments: Arguments, sizes: Sizes) -> bool:
+    return bool(arguments["keep"] >= 0)
+
+
 # Dynamics
 
 
@@ -248,6 +317,59 @@ def _tree_fits(arguments: Arguments, sizes: Sizes) -> bool:
     return placed and ordered and based and 0 <= nq <= 2 * n
 
 
+# Kinematics
+
+MAX_SEEDS = 100_000
+
+
+@cache
+def chain() -> KinematicChain:
+    """Of the tool of a UR5."""
+    found = read_kinematic_chain(load_robot("ur5").model, "tool0")
+    assert found is not None
+    return found
+
+
+@cache
+def inverse_kinematics() -> kinematics.InverseKinematicsKernel:
+    """Of the same, within a turn."""
+    return chain().compiled(np.full(6, -np.pi), np.full(6, np.pi))
+
+
+def _search(needed: str, **arguments: Any) -> tuple[int, int]:
+    """A search for which one of the optional arguments is not optional."""
+    if arguments[needed] is None:
+        raise TypeError(f"{needed} must be given.")
+    return inverse_kinematics().search(**arguments)
+
+
+_SEARCH = {
+    "near": _in("n"),
+    "configurations": _out("K n"),
+    "best": _out("n"),
+}
+_SEARCH_REST: dict[str, Any] = {
+    "scalars": {"weight": 2.0, "apart": 1e-3, "seeds": 9, "patience": 4},
+    "letters": {"n": (6, 6), "K": (0, 9)},
+    "fits": lambda arguments, sizes: (
+        sizes["n"] == 6 and all(1 <= arguments[key] <= MAX_SEEDS for key in ("seeds", "patience"))
+    ),
+}
+_CHAIN_KINDS = {
+    **{"rotations": _in("n 3 3"), "translations": _in("n 3"), "angular": _in("n")},
+    **{"linear": _in("n"), "tip_rotation": _in("3 3"), "tip_translation": _in("3")},
+    **{"lower": _in("n"), "upper": _in("n")},
+}
+
+
+def _chain_values(arguments: Arguments, sizes: Sizes) -> None:
+    arguments["upper"] += 1.0  # the lower bounds are less than 1
+
+
+def _chain_fits(arguments: Arguments, sizes: Sizes) -> bool:
+    return 1 <= sizes["n"] <= 1000 and bool((arguments["lower"] <= arguments["upper"]).all())
+
+
 def _frame_placement(archive: str, frame: int) -> str:
     return SymbolicModel(archive).frame_placement(frame)
 
@@ -263,6 +385,88 @@ def pendulum_archive() -> str:
     """Pinocchio's archive of it."""
     return archive(pendulum())
 
+
+# Distances
+
+
+@cache
+def _pairs() -> dict[str, Any]:
+    """What the pairs of a cart-pole with five shapes are built from."""
+    model = load_robot(example("cart_pole.urdf")).model
+    corners = coal.StdVec_Vec3s()
+    corners.extend([np.zeros(3), *np.eye(3)])
+    hull = coal.Convex.convexHull(corners, True, "Qt")
+    shapes = [hull, coal.Cylinder(0.1, 0.3), coal.Sphere(0.1), coal.Capsule(0.1, 0.2), hull]
+    return compiled_distances.arguments_of(
+        model,
+        [
+            pin.GeometryObject(f"s{i}", i % model.njoints, 0, pin.SE3.Random(), shape)
+            for i, shape in enumerate(shapes)
+        ],
+        [(0, 1), (1, 2), (3, 4), (0, 4)],
+    )
+
+
+@cache
+def pair_distances() -> distances.PairDistances:
+    """Those pairs."""
+    return distances.PairDistances(**_pairs())
+
+
+def _pair_values(arguments: Arguments, sizes: Sizes) -> None:
+    arguments |= {
+        name: value.copy() if isinstance(value, np.ndarray) else value
+        for name, value in _pairs().items()
+    }
+
+
+_JOINT_SIZES = ((1, 1), (2, 1), (7, 6), (4, 3), (4, 3))
+"""nq and nv by the number of a kind."""
+
+
+def _pairs_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    lists = {k: v.tolist() for k, v in arguments.items() if isinstance(v, np.ndarray)}
+    nq, nv, kinds = arguments["nq"], arguments["nv"], lists["kinds"]
+    if not all(0 <= kind < len(_JOINT_SIZES) for kind in kinds):
+        return False
+    used = [_JOINT_SIZES[kind] for kind in kinds]
+    rows = zip(used, lists["coordinates"], lists["columns"], strict=True)
+    inside = all(0 <= i <= nq - a and 0 <= j <= nv - b for (a, b), i, j in rows)
+    sums = [sum(each[i] for each in used) for i in range(2)] == [nq, nv]
+    ordered = all(-1 <= parent < k for k, parent in enumerate(lists["parents"]))
+    shapes, joints = len(lists["shape_joints"]), len(kinds)
+    moved = all(-1 <= joint < joints for joint in lists["shape_joints"])
+    moved &= all(0 <= kind < 3 for kind in lists["shape_kinds"])
+    paired = all(0 <= end < shapes for pair in lists["pairs"] for end in pair)
+    return inside and sums and ordered and moved and paired and _hulls_fit(lists)
+
+
+def _hulls_fit(lists: dict[str, list[Any]]) -> bool:
+    points, neighbors = len(lists["points"]), len(lists["neighbors"])
+    counts, near = lists["point_counts"], lists["neighbor_counts"]
+    if min(counts + near, default=0) < 0 or (sum(counts), sum(near)) != (points, neighbors):
+        return False
+    if any(
+        kind == 0 and not count for kind, count in zip(lists["shape_kinds"], counts, strict=True)
+    ):
+        return False
+    owners = [count for count in counts for _ in range(count)]
+    limits = [owner for owner, size in zip(owners, near, strict=True) for _ in range(size)]
+    return all(0 <= k < end for k, end in zip(lists["neighbors"], limits, strict=True))
+
+
+_CHOSEN = {
+    **{"q": _in("P q"), "chosen": _in("k", "int64")},
+    **{"distances": _out("P k"), "known": Kind("P k", "int64", output=True)},
+}
+_PAIRS = {
+    "letters": {"P": (0, 9)},
+    "fits": lambda arguments, sizes: (
+        sizes["q"] == pair_distances().nq
+        and sizes.get("n", pair_distances().nv) == pair_distances().nv
+        and all(0 <= k < pair_distances().size for k in arguments["chosen"].tolist())
+    ),
+}
 
 ENTRIES: dict[str, Entry] = {
     "band.assemble": Entry(
@@ -358,12 +562,44 @@ ENTRIES: dict[str, Entry] = {
     "intervals.contract": Entry(
         intervals.contract,
         {
-            **{"table": _in("Q R m"), "weights": _in("Q"), "steps": _in("B")},
+            **_TABLES,
             **{"columns_gradient": _out("B m n"), "columns_hessian": _out("B m m n n")},
-            **{"gradient": _in("B*Q R*n"), "hessian": _in("B*Q R*n R*n")},
+            **{"gradient": _in("P R*n"), "hessian": _in("P R*n R*n")},
         },
         _PORTABLE,
-        letters={"n": (0, 12), "m": (0, 6), "R": (2, 5)},
+        letters={"B": (0, 4), "n": (0, 12), "m": (0, 6), "R": (2, 5)},
+        fits=_tables_fit,
+    ),
+    "intervals.push": Entry(
+        intervals.push,
+        {**_TABLES, "step": _in("B m n"), **_SELECTION, "out": _out("P K")},
+        **_SELECTED,
+    ),
+    "intervals.pull": Entry(
+        intervals.pull,
+        {**_TABLES, "forces": _in("P K"), **_SELECTION, "out": _out("B m n")},
+        **_SELECTED,
+    ),
+    "intervals.push_rows": Entry(
+        intervals.push_rows,
+        {**_ROWS_OF_INTERVALS, "rows": _in("E m"), "step": _in("N m n"), "out": _out("E")},
+        **_LINEAR,
+    ),
+    "intervals.pull_rows": Entry(
+        intervals.pull_rows,
+        {
+            **{**_ROWS_OF_INTERVALS, "rows": _in("E m"), "forces": _in("E")},
+            "sums": _updated("N m n"),
+        },
+        **_LINEAR,
+    ),
+    "intervals.add_squares": Entry(
+        intervals.add_squares,
+        {
+            **{**_ROWS_OF_INTERVALS, "rows": _in("E m"), "weights": _in("E")},
+            "sums": _updated("N m m n n"),
+        },
+        **_LINEAR,
     ),
     "intervals.interpolate": Entry(
         intervals.interpolate,
@@ -413,6 +649,60 @@ ENTRIES: dict[str, Entry] = {
         intervals.predict,
         {**_RESIDUALS, "jacobian": _in("P n k"), "change": _in("P k"), "out": _out("P n")},
     ),
+    "barrier.condense": Entry(
+        barrier.condense,
+        {**_SLACKS, **_inputs("y"), **_outputs("sigma", "rho", "force")},
+        {"mu": 0.1},
+        **_BARRIER,
+    ),
+    "barrier.shift": Entry(
+        barrier.shift,
+        {**_SLACKS, **_inputs(*_TARGETS), **_outputs("out")},
+        {"mu": 0.1},
+        **_BARRIER,
+    ),
+    "barrier.aim": Entry(
+        barrier.aim,
+        {**_SLACKS, **_inputs("y", "dy", *_TARGETS), **_outputs("ds", "dzl", "dzu")},
+        {"matched": 1e-9, "keep": 0.99},
+        **_BARRIER,
+        fits=_keeps_a_share,
+    ),
+    "barrier.mean_product": Entry(
+        barrier.mean_product, {**_SLACKS, **_NEWTON}, {"primal": 0.9, "dual": 0.8}, **_BARRIER
+    ),
+    "barrier.largest_miss": Entry(barrier.largest_miss, _SLACKS, {"mu": 0.1}, **_BARRIER),
+    "barrier.correct": Entry(
+        barrier.correct,
+        {**_SLACKS, **_inputs("y"), **_NEWTON, **_outputs(*_TARGETS)},
+        {"mu": 0.1, "matched": 1e-9},
+        **_BARRIER,
+    ),
+    "barrier.centre": Entry(
+        barrier.centre,
+        {**_SLACKS, **_inputs("y"), **_NEWTON, **{name: _updated("R") for name in _TARGETS}},
+        {"primal": 0.9, "dual": 0.8, "mu": 0.1, "matched": 1e-9},
+        **_BARRIER,
+    ),
+    "barrier.merit": Entry(
+        barrier.merit,
+        {**_SLACKS, **_inputs("weights", "y", "dy", "ds")},
+        {"share": 0.5, "keep": 0.99, "mu": 0.1, "penalty": 2.0},
+        **_BARRIER,
+        fits=_keeps_a_share,
+    ),
+    "barrier.move": Entry(
+        barrier.move,
+        {**_SLACKS, **_inputs("y"), **_NEWTON, **_outputs("new_s", "new_zl", "new_zu")},
+        {
+            **{"primal": 0.9, "dual": 0.8, "keep": 0.99, "mu": 0.1},
+            **{"penalty": 2.0, "ratio": 1e8},
+        },
+        **_BARRIER,
+        fits=lambda arguments, sizes: (
+            _keeps_a_share(arguments, sizes) and arguments["mu"] >= 0 and arguments["ratio"] >= 1
+        ),
+    ),
     "dynamics.torque": Entry(
         lambda **arguments: kernel().torque(**arguments),
         {**_POINTS, "tau": _out("P n")},
@@ -444,6 +734,53 @@ ENTRIES: dict[str, Entry] = {
         values=_tree_values,
         fits=_tree_fits,
     ),
+    "kinematics.InverseKinematicsKernel": Entry(
+        kinematics.InverseKinematicsKernel,
+        _CHAIN_KINDS,
+        letters={"n": (1, 8)},
+        values=_chain_values,
+        fits=_chain_fits,
+    ),
+    "kinematics.search": Entry(
+        lambda **arguments: _search("rotation", axis=None, **arguments),
+        {"position": _in("3"), "rotation": _in("3 3"), **_SEARCH},
+        optional=("position",),
+        **_SEARCH_REST,
+    ),
+    "kinematics.search_along_axis": Entry(
+        lambda **arguments: _search("position", rotation=None, **arguments),
+        {"position": _in("3"), "axis": _in("2 3"), **_SEARCH},
+        optional=("axis",),
+        **_SEARCH_REST,
+    ),
+    "distances.PairDistances": Entry(
+        distances.PairDistances,
+        {
+            **{name: _in("j", "int64") for name in ("parents", "kinds", "coordinates", "columns")},
+            **{"rotations": _in("j 3 3"), "translations": _in("j 3"), "axes": _in("j 6")},
+            **{name: _in("s", "int64") for name in ("shape_joints", "shape_kinds")},
+            **{"shape_rotations": _in("s 3 3"), "shape_translations": _in("s 3")},
+            **{"shape_sizes": _in("s 3"), "shape_spheres": _in("s 4"), "points": _in("v 3")},
+            **{"point_counts": _in("s", "int64"), "neighbor_counts": _in("v", "int64")},
+            **{"neighbors": _in("e", "int64"), "pairs": _in("k 2", "int64")},
+        },
+        {"nq": 0, "nv": 0, "portable": False},
+        values=_pair_values,
+        fits=_pairs_fit,
+    ),
+    "distances.values": Entry(
+        lambda **arguments: pair_distances().values(**arguments), _CHOSEN, {"reach": 0.5}, **_PAIRS
+    ),
+    "distances.expand": Entry(
+        lambda **arguments: pair_distances().expand(**arguments),
+        {
+            **{**_CHOSEN, "force": _in("P k")},
+            **{"jacobian": _out("P k n"), "curvature": _out("P n n")},
+        },
+        {"reach": 0.5},
+        optional=("force",),
+        **_PAIRS,
+    ),
     "symbolic.frame_placement": Entry(
         _frame_placement,
         {},
@@ -471,6 +808,12 @@ def valid_call(name: str, seed: int) -> Arguments:
         sizes |= {"l": len(layout), "q": nq, "n": nv}
     if name.startswith("dynamics.") and "q" in entry.kinds:
         sizes |= {"q": kernel().nq, "n": kernel().n}
+    if "T" in sizes:
+        Q = sizes["T"]
+        sizes["P"] = sizes["B"] * Q
+        sizes["T"] = int(random.choice([Q, sizes["P"]])) if sizes["B"] else Q
+    if name.startswith("distances.") and "q" in entry.kinds:
+        sizes |= {"q": pair_distances().nq, "n": pair_distances().nv}
     if "p" in sizes:
         sizes["k"] = PANEL * sizes["p"] - int(random.integers(PANEL))
     if "c" in sizes and "table" in entry.kinds:
@@ -520,7 +863,7 @@ def _is_kind(value: object, kind: Kind) -> bool:
         and value.ndim == len(kind.shape.split())
         and value.flags.c_contiguous
         and value.flags.aligned
-        and (value.flags.writeable or not kind.output)
+        and (value.flags.writeable or not (kind.output or kind.updated))
     )
 
 
@@ -674,7 +1017,7 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
     try:
         name, seed, changes = json.loads(mutant.content)
         arguments = changed(name, abs(int(seed)) % 2**63, int(changes) % 9)
-    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+    except (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError):
         return Verdict.REFUSED, "not a call"
     return verdict_on(name, arguments)
 
@@ -708,11 +1051,15 @@ def _written(entry: Entry, arguments: Arguments, outputs: list[str], fill: float
     for key in outputs:
         if isinstance(call[key], np.ndarray) and call[key].flags.writeable:
             call[key][...] = fill
+    updated = [key for key, kind in entry.kinds.items() if kind.updated]
+    for key in updated:
+        if _is_kind(call[key], entry.kinds[key]):
+            call[key] = call[key].copy()
     result = entry.function(**call)
     if result is False:  # a factorisation that failed leaves its output incomplete
         return []
     told = repr(result) if isinstance(result, bool | float | str | tuple) else ""
-    return [told.encode(), *_bytes(call, outputs)]
+    return [told.encode(), *_bytes(call, outputs + updated)]
 
 
 def _bytes(call: Arguments, outputs: list[str]) -> list[bytes]:

@@ -29,6 +29,7 @@ INSIDE = ("in.png", "./in.png", "sub/in.png", "sub/../in.png", "inner.png", "in.
 OUTSIDE = (
     *("../outside/secret.png", "sub/../../outside/secret.png", "{outside}/secret.png"),
     *("link.png", "links/secret.png", "./links/../links/secret.png", "sub/../link.png"),
+    *("gone/link.png", "gone/sub/link.png"),
 )
 NAMED = b"mesh named "
 """Start of an input that is the name of a mesh in the URDF, and not its content."""

@@ -18,10 +18,13 @@ import tomlkit
 
 from hard.mutated_bytes import mutated_bytes
 from hard.verdict import Mutant, Verdict, judge
+from hovi.discrete.state import State
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example, example_scenes
+from hovi.robot.robot import Robot
 
 MAX_PLANNED_INTERVALS = 64  # larger scenes are loaded only
 TOKENS = (
@@ -44,6 +47,7 @@ TOKENS = (
 NOT_NUMBERS = (float("nan"), float("inf"), -float("inf"), "1", "", True, [], {})
 UNUSUAL_VALUES = (
     *(*NOT_NUMBERS, 0, -1, 1, 2, 3, 10**6, 10**9, 10**30, -0.0, 1e308, -1e308, 1e-308, 5e-324),
+    *([1e308] * 3, [-1e308, 1e308, 1.0], [5e-324] * 3, [1e308] * 2, [[1e308] * 3] * 2),
     *([0.0], [0.0, 0.0], [[0.0, 0.0]], [0.0, "x"], {"elbow": 1.0}, {"elbow": [0.0, 1.0]}, "none"),
     *(
         "urdf",
@@ -84,7 +88,8 @@ def mutate(random: Random) -> Mutant:
         for _ in range(random.randint(1, 3)):
             random.choice(_CHANGES)(scene, random)
         return Mutant(_written(scene))
-    change = random.choice(_INVALIDATING_CHANGES)
+    sequence = "segments" in scene
+    change = random.choice(_SEGMENT_CHANGES if sequence else _INVALIDATING_CHANGES)
     change(scene, random)
     return Mutant(_written(scene), (change.__doc__ or "").split("\n")[0])
 
@@ -103,7 +108,7 @@ def verdict(mutant: Mutant, folder: Path) -> tuple[Verdict, str]:
 def error_in(task: Task) -> str:
     """The error in a loaded task; "" if there is none."""
     robot = task.scene.robot
-    ends = [x for state in (task.start, task.goal) for x in state.on(robot, "end")]
+    ends = [x for end in (task.start, task.goal) for x in _numbers_of(end, robot)]
     if not all(np.isfinite(x).all() for x in (*ends, task.duration)):
         return "it holds numbers that are not finite"
     intervals, starts = task.options.interval_count, task.options.starts
@@ -117,6 +122,14 @@ def error_in(task: Task) -> str:
     if solution.success and not np.isfinite(solution.cost):
         return f"a minimum of cost {solution.cost} was reported"
     return "" if solution.message else "its plan says nothing"
+
+
+def _numbers_of(end: State | FrameGoal, robot: Robot) -> list[Any]:
+    """The numbers of a state, or of a frame's target."""
+    if isinstance(end, State):
+        return [*end.on(robot, "end")]
+    parts = (end.position, end.rotation, *(end.axis or ()))
+    return [np.asarray(part) for part in parts if part is not None]
 
 
 def _written(scene: dict[str, Any]) -> bytes:
@@ -186,6 +199,35 @@ def _passed(scene: dict[str, Any], random: Random) -> None:
         scene["via"].pop()
 
 
+def _framed(scene: dict[str, Any], random: Random) -> None:
+    """An end by the target of a frame: few of them are within reach."""
+    numbers = (0.0, 0.3, -0.5, 1.0, 1e308, float("nan"), "1")
+    sizes = {"position": 3, "rpy": 3, "quaternion_xyzw": 4, "quaternion_wxyz": 4, "q": 2}
+    chosen = random.sample([*sizes], random.randint(1, 3))
+    end: dict[str, Any] = {"frame": random.choice(("tip", "tip", "tip", "world", ""))}
+    for key in chosen:
+        plain = random.choice(([0.6, 0.8, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], [0.5] * 4))
+        some = [random.choice(numbers) for _ in range(random.choice((sizes[key], 1)))]
+        end[key] = plain[: sizes[key]] if random.random() < 0.7 else some
+    scene[random.choice(("start", "goal"))] = end
+
+
+def _held(scene: dict[str, Any], random: Random) -> None:
+    """Joints that are locked at positions, and a group that no example has."""
+    joint = random.choice(("elbow", "shoulder", "slide", "wrist", ""))
+    scene["locked"] = {joint: random.choice((0, 0.0, 0.3, -9.0, 1e308, float("nan"), "1", True))}
+    if random.random() < 0.2:
+        scene["group"] = random.choice(("arm", "", 1, [], "a" * 1_000))
+
+
+def _spelled(scene: dict[str, Any], random: Random) -> None:
+    """Options that few files have, and a scheme by its name alone."""
+    strange = (0, 1, 2, True, "", "1 s", "cubic", "minimum-jerk", "galerkin-2", -1.0, 1e300, [])
+    keys = ("time_limit", "max_iterations", "continuation", "guess", "scheme", "intervals")
+    for key in random.sample(keys, random.randint(1, 3)):
+        scene[key] = random.choice(strange)
+
+
 def _cost(scene: dict[str, Any], random: Random) -> None:
     """Random formulas and weights: few of them are valid."""
     text = "".join(random.choice(FORMULA_PARTS) for _ in range(random.randint(1, 9)))
@@ -200,7 +242,7 @@ def _cost(scene: dict[str, Any], random: Random) -> None:
 
 _CHANGES: tuple[Change, ...] = (
     *(_value, _value, _remove, _rename, _swap, _settings, _passed),
-    _cost,
+    *(_cost, _framed, _held, _spelled),
 )
 
 # Changes that make the file invalid; the docstring is the reason
@@ -251,6 +293,38 @@ def _lacking(scene: dict[str, Any], random: Random) -> None:
     scene.pop(random.choice(("robot", "duration", "start", "goal")))
 
 
+def _segment_duration(scene: dict[str, Any], random: Random) -> None:
+    """a segment's duration is not a positive number"""
+    wrong = (*NOT_NUMBERS[:6], 0, -1, -1e-9, 0.0, "2 parsecs", "-1 s", [1.0, 2.0])
+    random.choice(scene["segments"])["duration"] = random.choice(wrong)
+
+
+def _segment_lacking(scene: dict[str, Any], random: Random) -> None:
+    """a segment lacks its duration, or the last one its goal"""
+    if random.random() < 0.5:
+        random.choice(scene["segments"]).pop("duration")
+    else:
+        scene["segments"][-1].pop("goal")
+
+
+def _segment_unknown(scene: dict[str, Any], random: Random) -> None:
+    """a segment has an unknown key, or one of the whole motion"""
+    key = random.choice(("start", "via", "intervals", "tolerance", "durration"))
+    random.choice(scene["segments"])[key] = 1.0
+
+
+def _beside_segments(scene: dict[str, Any], random: Random) -> None:
+    """a file with segments has a duration or a goal, too"""
+    key = random.choice(("duration", "goal"))
+    scene[key] = 1.0 if key == "duration" else dict(scene["start"])
+
+
+_SEGMENT_CHANGES: tuple[Change, ...] = (
+    _segment_duration,
+    _segment_lacking,
+    _segment_unknown,
+    _beside_segments,
+)
 _INVALIDATING_CHANGES: tuple[Change, ...] = (
     _duration,
     _intervals,

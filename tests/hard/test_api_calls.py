@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from random import Random
+
 import numpy as np
 import pytest
 
 import hovi
-from hard.api_calls import WRONG, calls, problem, robot, scene, solution, verdict_on
+from hard.api_calls import WRONG, calls, mutate, problem, robot, scene, solution, verdict_on
 from hard.verdict import Verdict
 from hovi.errors import HoviError, InputError
 
@@ -101,3 +104,8 @@ def test_intervals_that_are_no_number_are_refused() -> None:
 def test_a_joint_that_does_not_exist_is_refused() -> None:
     with pytest.raises(InputError, match="v has entries 0 to 1, not 2"):
         robot().joint_at(2)
+
+
+def test_the_fuzzer_changes_an_argument_of_every_call_that_has_one() -> None:
+    chosen = {json.loads(mutate(Random(i)).content)[0] for i in range(5_000)}
+    assert chosen == {name for name, each in calls().items() if each.places}

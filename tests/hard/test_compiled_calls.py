@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
+from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hard import compiled_calls
-from hard.compiled_calls import ENTRIES, changed, error_in, valid_call, verdict_on
-from hard.verdict import Verdict
+from hard import api_calls, compiled_calls
+from hard.compiled_calls import ENTRIES, Kind, changed, error_in, valid_call, verdict_on
+from hard.verdict import Mutant, Verdict
 from hovi._native import intervals
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.robot.bundled_models import example
@@ -56,6 +57,10 @@ def full_call(name: str) -> dict[str, Any]:
     raise AssertionError(f"no seed gives a full call of {name}")
 
 
+def written(kind: Kind) -> bool:
+    return kind.output or kind.updated
+
+
 CASES = [(name, key) for name, entry in ENTRIES.items() for key in entry.kinds]
 
 
@@ -84,7 +89,7 @@ def test_an_argument_that_is_wrong_is_refused_and_named(name: str, key: str) -> 
 
 
 @pytest.mark.parametrize(
-    ("name", "key"), [case for case in CASES if ENTRIES[case[0]].kinds[case[1]].output]
+    ("name", "key"), [(name, key) for name, key in CASES if written(ENTRIES[name].kinds[key])]
 )
 def test_an_output_that_is_read_only_is_refused(name: str, key: str) -> None:
     call = full_call(name)
@@ -101,20 +106,23 @@ def test_random_changes_are_refused_where_they_contradict_the_rest(name: str) ->
 
 
 def test_every_compiled_function_is_among_the_entries() -> None:
-    from hovi._native import band, dynamics, groups
+    from hovi._native import band, barrier, distances, dynamics, groups
 
     functions = {
         f"{module.__name__.rpartition('.')[2]}.{name}"
-        for module in (band, groups, intervals)
+        for module in (band, barrier, groups, intervals)
         for name in dir(module)
         if callable(getattr(module, name)) and not name.startswith("_")
     }
+    classes = {"dynamics": dynamics.InverseDynamicsKernel, "distances": distances.PairDistances}
     methods = {
-        f"dynamics.{name}"
-        for name in dir(dynamics.InverseDynamicsKernel)
-        if not name.startswith("_") and callable(getattr(dynamics.InverseDynamicsKernel, name))
+        f"{module}.{name}"
+        for module, each in classes.items()
+        for name in dir(each)
+        if not name.startswith("_") and callable(getattr(each, name))
     }
-    assert functions | methods | {"dynamics.InverseDynamicsKernel"} <= ENTRIES.keys()
+    built = {f"{module}.{each.__name__}" for module, each in classes.items()}
+    assert functions | methods | built <= ENTRIES.keys()
 
 
 def test_a_damaged_archive_of_a_model_is_refused() -> None:
@@ -150,3 +158,42 @@ def test_a_layout_whose_parts_overlap_or_leave_gaps_is_refused() -> None:
         layout = np.array([[4, 0, 0, 6], second])
         with pytest.raises(ValueError, match="row 1 of layout is no part"):
             compiled_calls.groups.integrate(layout, q, v, np.zeros((1, 14)))
+
+
+@pytest.mark.parametrize("wrong", [4, -1, 2**40])
+def test_a_neighbor_that_is_no_point_of_its_hull_is_refused(wrong: int) -> None:
+    call = full_call("distances.PairDistances")
+    assert call["point_counts"][0] == 4
+    call["neighbors"][0] = wrong
+    with pytest.raises(ValueError, match="neighbors must be"):
+        compiled_calls.distances.PairDistances(**call)
+
+
+@pytest.mark.parametrize("name", ["barrier.aim", "barrier.merit", "barrier.move"])
+@pytest.mark.parametrize("keep", [-1.0, -5e-324, -np.inf, np.nan])
+def test_a_negative_share_of_a_gap_is_refused(name: str, keep: float) -> None:
+    """Steps were clamped between bounds in the wrong order, which is undefined."""
+    with pytest.raises(ValueError, match="keep must be a share of the gaps, 0 or more"):
+        ENTRIES[name].function(**(full_call(name) | {"keep": keep}))
+
+
+@pytest.mark.parametrize("wrong", [{"mu": -1e-9}, {"mu": np.nan}, {"ratio": 0.99}])
+def test_a_range_of_multipliers_that_is_empty_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="mu must be 0 or more, and ratio 1 or more"):
+        ENTRIES["barrier.move"].function(**(full_call("barrier.move") | wrong))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b'["band.factor", 1e999, 1]',
+        b'["band.factor", 1, 1e999]',
+        b'["x", 1, 1]',
+        b"[]",
+        b"\xff",
+        b"1",
+    ],
+)
+def test_bytes_that_are_no_call_are_nothing_to_judge(content: bytes) -> None:
+    for module in (compiled_calls, api_calls):
+        assert module.verdict(Mutant(content), Path()) == (Verdict.REFUSED, "not a call")

@@ -219,7 +219,7 @@ def test_ctrl_c_ends_every_command_without_a_traceback(
 SEVERAL_SOLVES: dict[str, Sequence[str]] = {
     "rounds among obstacles": ("plan", "{scene}"),
     "grids to a tolerance": (
-        *("plan", "two_link_elbow_limited", "--starts", "1", "--tolerance", "1e-9"),
+        *("plan", "panda_reach_rich", "--starts", "1", "--tolerance", "1e-8"),
     ),
 }
 BALL_AT_GOAL = """

@@ -16,6 +16,7 @@ from hard import (
     compiled_calls,
     mutated_mesh,
     mutated_motion,
+    mutated_obstacles,
     mutated_scene,
     mutated_segments,
     mutated_urdf,
@@ -28,6 +29,7 @@ MUTATED = (
     mutated_motion,
     mutated_segments,
     mutated_mesh,
+    mutated_obstacles,
     compiled_calls,
     api_calls,
 )

@@ -64,11 +64,11 @@ def test_limits_hold_for_continuous_joints(kinova: Robot) -> None:
     scene = Scene(kinova, [Gravity(), Armature(0.1)])
     q0 = kinova.integrate(kinova.neutral(), np.array([0.0, 2.5, 2.0, 0.0, 1.0, 0.0]))
     q1 = kinova.integrate(q0, np.array([1.5, 0.4, -0.5, 2.0, 0.5, -2.5]))
-    solution = plan(scene, q0, q1, 5.0, intervals=10)
+    solution = plan(scene, q0, q1, 5.0, intervals=14)
     assert solution.success, solution.message
     limits = as_limits(kinova, "urdf")
     assert excess_along(solution.trajectory, limits).worst <= limits.tolerance
-    free = plan(scene, q0, q1, 5.0, intervals=10, limits="none")
+    free = plan(scene, q0, q1, 5.0, intervals=14, limits="none")
     assert excess_along(free.trajectory, limits).worst > 0.01
     assert solution.cost > free.cost
 

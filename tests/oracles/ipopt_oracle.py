@@ -32,7 +32,8 @@ def least_action(
     cost: instead of 1/2 |tau|^2 of the active joints.
 
     Each unknown of the guess is first moved at random, by `move` or so. The problem's limits hold
-    at the quadrature points, and r + 2 moments of every passive joint's torque vanish per interval.
+    at the quadrature points, r + 2 moments of every passive joint's torque vanish per interval, and
+    what its seams hold is fixed.
     """
     grid, n = problem.grid, problem.robot.nv
     N, r = grid.intervals, grid.inner_modes
@@ -61,6 +62,13 @@ def least_action(
             each = np.broadcast_to(bound, (N, *bound.shape[1:])).reshape(N, -1)
             bounds[name] = np.append(bounds[name], np.tile(each, points).ravel())
     solver = ca.nlpsol("least_action", "ipopt", program, quiet)
+    fixed = np.full((N - 1, 2, n), np.nan)
+    for each in problem.holds:
+        fixed[each.node - 1] = np.where(each.fixed, [each.q, each.v], np.nan)
+    known = np.append(fixed.ravel(), np.full(modes.numel(), np.nan))
+    bounds["lbx"], bounds["ubx"] = (
+        np.where(np.isnan(known), free, known) for free in (-np.inf, np.inf)
+    )
     inner = np.concatenate([np.hstack([guess.q, guess.v])[1:-1].ravel(), guess.inner.ravel()])
     start = inner + move * np.random.default_rng(seed).standard_normal(inner.shape)
     result = solver(x0=start, **bounds)

@@ -35,11 +35,13 @@ INSIDE = {
     "discrete": [{""}, {"measures"}],
     "flows": [{""}, {"execution"}],
     "planning": [
+        {"obstacles"},
         {"clearance"},
         {"problem"},
         {"solver"},
         {"refinement"},
         {"search"},
+        {"sequence"},
         {"task_file"},
     ],
     "accuracy": [{""}, {"effect_study", "peers"}],

@@ -83,3 +83,22 @@ def mesh_arm(folder: Path, mesh: str) -> Path:
     path = folder / "arm.urdf"
     path.write_text(_ARM.format(mesh=mesh))
     return path
+
+
+WEDGE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+"""An OBJ file of a tetrahedron."""
+
+
+def channel(size: float = 0.1) -> str:
+    """An OBJ file of a U-shaped channel, 3 x 2 sizes in x and y and 1 in z, closed all around.
+
+    Its volume is 5 of the 6 cubes of its hull; the missing one is at 1 < x < 2, 1 < y.
+    """
+    outline = [(0, 0), (3, 0), (3, 2), (2, 2), (2, 1), (1, 1), (1, 2), (0, 2)]
+    caps = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 5), (0, 5, 7), (5, 6, 7)]
+    lines = [f"v {x * size} {y * size} {z * size}" for z in (0, 1) for x, y in outline]
+    faces = [(c, b, a) for a, b, c in caps] + [(a + 8, b + 8, c + 8) for a, b, c in caps]
+    for i in range(8):
+        j = (i + 1) % 8
+        faces += [(i, j, j + 8), (i, j + 8, i + 8)]
+    return "\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]) + "\n"

@@ -178,7 +178,7 @@ def test_a_scene_survives_pickling(two_link: Robot, panda: Robot) -> None:
 
 def test_an_unknown_effect_of_a_stored_scene_is_refused(two_link: Robot) -> None:
     data = Scene(two_link).to_dict() | {"effects": {"gravitiy": {}}}
-    with pytest.raises(SceneError, match="no effect 'gravitiy': did you mean 'gravity'"):
+    with pytest.raises(SceneError, match="no effect 'gravitiy'; did you mean 'gravity'"):
         Scene.from_dict(data)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from math import factorial
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hovi.errors import SchemeError
+from hovi.errors import InputError, SchemeError
 from hovi.schemes import (
     CLASSIC,
     FAMILIES,
@@ -23,7 +24,14 @@ from hovi.schemes import (
     regularity_matrix,
     require_regular,
 )
-from hovi.schemes.interval_curve import end_basis, end_weights, gamma, inverse_gamma, jet_rows
+from hovi.schemes.interval_curve import (
+    MAX_POSITION,
+    end_basis,
+    end_weights,
+    gamma,
+    inverse_gamma,
+    jet_rows,
+)
 from hovi.schemes.polynomials import interval_rows
 from samples.paper_arm import effort
 
@@ -485,3 +493,14 @@ def test_a_member_of_a_family_has_its_name(family: str, r: int) -> None:
     scheme = by_name(f"{family}-{r}")
     assert (scheme.name, scheme.inner_modes) == (f"{family}-{r}", r)
     np.testing.assert_array_equal(scheme.table, FAMILIES[family](r).table)
+
+
+@pytest.mark.parametrize("s", [1e300, -1e308, -1e9, float("nan")])
+def test_positions_far_from_the_interval_are_refused(s: float) -> None:
+    """Powers of 20 and more would overflow; up to MAX_POSITION none does."""
+    calls: list[Callable[[Array], Array]] = [by_name(name).rows for name in ALL]
+    calls += [lambda s: end_basis(s, 20), galerkin(3, 4).rows]
+    for call in calls:
+        with pytest.raises(InputError, match=re.escape(f"up to 1000, got {s:g}: give the time")):
+            call(np.array([0.5, s]))
+        assert np.isfinite(call(np.array([0.0, -MAX_POSITION, MAX_POSITION]))).all()

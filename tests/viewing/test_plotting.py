@@ -13,6 +13,7 @@ from PIL import Image
 
 import hovi
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.measures.segment_spans import SEGMENT_NAMES, segment_spans
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
 from hovi.errors import DisplayError
@@ -259,3 +260,40 @@ def test_the_torque_of_a_taylor_scheme_is_drawn_without_zigzag() -> None:
     variation = [np.abs(np.diff(each, axis=0)).sum() for each in (true, drawn, interpolated)]
     assert variation[1] == pytest.approx(variation[0], rel=0.05)
     assert variation[2] > 2 * variation[0]
+
+
+def test_seams_of_a_sequence_are_marked_and_its_segments_named() -> None:
+    robot = hovi.load_robot(hovi.example("two_link.urdf"))
+    given = [
+        hovi.Segment([0.7, 0.9], 0.6, name="reach for $5$"),
+        hovi.Segment([0.0, 0.0], 0.9, effects=[hovi.effects.Payload(frame="tip", mass=0.5)]),
+    ]
+    found = hovi.plan_sequence(
+        hovi.Scene(robot), [0.0, 0.0], given, limits="none", scheme="galerkin-2", intervals=6
+    )
+    figure = plotting.motion_figure(found.trajectory)
+    figure.canvas.draw()
+    for ax in figure.axes:
+        seams = [line for line in ax.lines if line.get_linestyle() == ":"]
+        assert [line.get_xdata()[0] for line in seams] == pytest.approx([0.6])
+    assert [text.get_text() for text in figure.axes[0].texts] == ["reach for $5$", "segment 2"]
+    assert [text.xy[0] for text in figure.axes[0].texts] == pytest.approx([0.3, 1.05])
+
+
+def test_names_of_segments_from_a_file_that_do_not_fit_are_numbers() -> None:
+    motion = _two_segments()
+    for names in (["a"], ["a", 3], "ab", None, {"a": 1}):
+        spans = segment_spans(dataclasses.replace(motion, metadata={SEGMENT_NAMES: names}))
+        assert [each.name for each in spans] == ["segment 1", "segment 2"]
+        assert [(each.begin, each.end) for each in spans] == [(0.0, 1.0), (1.0, 2.0)]
+    named = dataclasses.replace(motion, metadata={SEGMENT_NAMES: ["a", "b"]})
+    assert [each.name for each in segment_spans(named)] == ["a", "b"]
+
+
+def _two_segments() -> hovi.Trajectory:
+    scene = hovi.Scene(hovi.load_robot(hovi.example("two_link.urdf")))
+    grid = hovi.Grid.uniform(1.0, 2, hovi.schemes.by_name("galerkin-2"))
+    ld = hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid)
+    ends = hovi.State([0.0, 0.0]), hovi.State([0.3, 0.7])
+    problem = hovi.TrajectoryProblem.of_segments([ld, ld], *ends)
+    return problem.trajectory(problem.guess("cubic"))

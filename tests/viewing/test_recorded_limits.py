@@ -9,14 +9,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+import umsgpack
 
 import hovi
 from hovi.cli.reports.limit_margins import least_distance
 from hovi.discrete.trajectory import Trajectory
+from hovi.errors import InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.obstacles import Box, Capsule, Sphere
 from hovi.viewing.plotting import motion_figure
 from hovi.viewing.recorded_limits import imposed_clearance, with_obstacles
+from hovi.viewing.replay_session import write_html
 
 BALL = Sphere([0.7, 0.0, -1.65], 0.15, name="ball")
 OBSTACLES = [
@@ -40,6 +43,40 @@ def test_the_clearance_is_saved_with_the_motion(motion: Trajectory, tmp_path: Pa
     loaded = imposed_clearance(Trajectory.load(tmp_path / "motion.npz"))
     assert loaded is not None
     assert loaded.to_dict() == motion.metadata["clearance"]
+
+
+WEDGE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+KINDS = [
+    *OBSTACLES,
+    hovi.Cylinder(0.1, 0.4, [1, 0, 0]),
+    hovi.HalfSpace([0, 0, 1], [0, 0, -3]),
+    hovi.ConvexHull(WEDGE),
+    hovi.ConvexParts([WEDGE, WEDGE], 0.01, [2, 0, 0]),
+    hovi.PointCloud([[3, 0, 0], [3, 1, 0]], 0.1),
+]
+
+
+def test_every_kind_of_obstacle_is_on_the_page(motion: Trajectory, tmp_path: Path) -> None:
+    """By the messages to the browser; those of hulls and capsules are triangles."""
+    data = Clearance(KINDS).to_dict()
+    shown = dataclasses.replace(motion, metadata={**motion.metadata, "clearance": data})
+    page = write_html(shown, tmp_path / "page.html").page
+    drawn = {
+        message.path: umsgpack.unpackb(message.packed)["object"]["geometries"][0]["type"]
+        for message in page.messages.all()
+        if message.kind == "set_object" and "obstacle" in message.path
+    }
+    balls, boxes = ["SphereGeometry"] * 2, ["BoxGeometry"]
+    assert list(drawn.values()) == [
+        *("SphereGeometry", "BoxGeometry", "BufferGeometry", "CylinderGeometry"),
+        *(*boxes, *["BufferGeometry"] * 3, *balls),
+    ]
+
+
+def test_a_recorded_clearance_opens_no_files(motion: Trajectory) -> None:
+    mesh = {"kind": "mesh", "file": "/etc/passwd", "name": "stolen"}
+    with pytest.raises(InputError, match="names no files"):
+        Clearance.from_dict({"obstacles": [mesh], "margin": 0.0, "self_collision": False})
 
 
 @pytest.mark.parametrize("data", [None, 3, {}, {"obstacles": [1]}, {"obstacles": [{"kind": 2}]}])

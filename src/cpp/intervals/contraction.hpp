@@ -26,18 +26,19 @@ std::size_t workspace_size(const Contraction& shape) {
   return (R * R + terms * m + m * (m + 1) / 2) * tile_size(shape.dof) + 2 * terms * m;
 }
 
-// The table of one interval, by its length: A = table / (1, h, h^2, ...) and h w A, (Q, R, m) each.
+// The table of interval k, by its length: A = table / (1, h, h^2, ...) and h w A, (Q, R, m) each.
 template <std::size_t R>
-inline void scale_table(const Contraction& shape, double h, double* A, double* weighted) {
-  const std::size_t m = shape.columns;
+inline void scale_table(const Contraction& shape, std::size_t k, double* A, double* weighted) {
+  const std::size_t m = shape.columns, first = shape.own_tables ? k * shape.points : 0;
+  const double h = shape.steps[k];
   double powers[R], power = 1.0;
   for (std::size_t r = 0; r < R; ++r, power *= h) powers[r] = 1.0 / power;
   for (std::size_t q = 0; q < shape.points; ++q)
     for (std::size_t r = 0; r < R; ++r)
       for (std::size_t j = 0; j < m; ++j) {
         const std::size_t at = (R * q + r) * m + j;
-        A[at] = shape.table[at] * powers[r];
-        weighted[at] = h * shape.weights[q] * A[at];
+        A[at] = shape.table[R * first * m + at] * powers[r];
+        weighted[at] = h * shape.weights[first + q] * A[at];
       }
 }
 
@@ -143,8 +144,8 @@ void contract_rows(const Contraction& shape, const double* gradient, const doubl
   double *A = sums + m * (m + 1) / 2 * size, *weighted = A + terms * m;
   std::fill(tile, tile + R * R * size, 0.0);
   for (std::size_t k = 0; k < shape.intervals; ++k) {
-    if (k == 0 || shape.steps[k] != shape.steps[k - 1])
-      scale_table<R>(shape, shape.steps[k], A, weighted);
+    if (k == 0 || shape.own_tables || shape.steps[k] != shape.steps[k - 1])
+      scale_table<R>(shape, k, A, weighted);
     contract_gradient(shape, weighted, gradient + k * terms * n, columns_gradient + k * m * n);
     for (std::size_t first = 0; first < n; first += rows) {
       const std::size_t count = std::min(rows, n - first);

@@ -8,12 +8,13 @@ namespace hovi::intervals {
 // Rows of a table at each point, k + 1 for Lagrangians of order k, that `contract` knows.
 constexpr std::size_t least_rows = 2, most_rows = 5;
 
-// A scheme's table over a batch of intervals.
+// Tables over a batch of intervals: one for all of them, or one for each.
 struct Contraction {
   std::size_t intervals, points, rows, columns, dof;  // B, Q, R, m, n
-  const double* table;                                // (Q, R, m)
-  const double* weights;                              // (Q)
-  const double* steps;                                // (B)
+  bool own_tables;
+  const double* table;    // (Q, R, m), (B, Q, R, m) with own tables
+  const double* weights;  // (Q), (B, Q) with own tables
+  const double* steps;    // (B)
 };
 
 struct Kernels {

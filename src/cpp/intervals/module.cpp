@@ -7,6 +7,7 @@
 #include <string>
 
 #include "kernels.hpp"
+#include "limited_outputs.hpp"
 #include "paths.hpp"
 #include "prefix_sums.hpp"
 #include "simd/arrays.hpp"
@@ -16,9 +17,12 @@
 namespace nb = nanobind;
 using namespace nb::literals;
 using namespace hovi::arrays;
+using hovi::intervals::Contraction;
 using hovi::intervals::IntervalPath;
 using hovi::intervals::Kernels;
+using hovi::intervals::LinearRows;
 using hovi::intervals::Residuals;
+using hovi::intervals::Selection;
 
 namespace {
 
@@ -42,30 +46,130 @@ Residuals residuals_of(const Input<2>& values, const Input<1>& metric) {
   return {values.shape(0), values.shape(1), values.data(), metric.data()};
 }
 
-void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
-              const Input<2>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
-              const Output<5>& columns_hessian, bool portable) {
+// Tables over intervals with P points in all: one for each interval, or one for all of them.
+Contraction tables_of(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
+                      std::size_t P, std::size_t n) {
   table.require_kind("table");
   steps.require_kind("steps");
-  columns_gradient.require_kind("columns_gradient");
-  const std::size_t Q = table.shape(0), R = table.shape(1), m = table.shape(2);
-  const std::size_t B = steps.shape(0), n = columns_gradient.shape(2);
+  const std::size_t tables = table.shape(0), R = table.shape(1), m = table.shape(2);
+  const std::size_t B = steps.shape(0);
   using hovi::intervals::least_rows, hovi::intervals::most_rows;
   if (R < least_rows || R > most_rows)
     refuse("table must have " + std::to_string(least_rows) + " to " + std::to_string(most_rows) +
            " rows at a point, got " + std::to_string(R) + ".");
-  weights.require("weights", {Q});
-  gradient.require("gradient", {B * Q, R * n});
-  hessian.require("hessian", {B * Q, R * n, R * n});
+  weights.require("weights", {tables});
+  const bool own = B > 1 && tables == P;
+  const std::size_t Q = own ? P / B : tables;
+  return {B, Q, R, m, n, own, table.data(), weights.data(), steps.data()};
+}
+
+void contract(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
+              const Input<2>& gradient, const Input<3>& hessian, const Output<3>& columns_gradient,
+              const Output<5>& columns_hessian, bool portable) {
+  columns_gradient.require_kind("columns_gradient");
+  gradient.require_kind("gradient");
+  const std::size_t n = columns_gradient.shape(2);
+  const Contraction shape = tables_of(table, weights, steps, gradient.shape(0), n);
+  const std::size_t B = shape.intervals, P = B * shape.points, R = shape.rows, m = shape.columns;
+  gradient.require("gradient", {P, R * n});
+  hessian.require("hessian", {P, R * n, R * n});
   columns_gradient.require("columns_gradient", {B, m, n});
   columns_hessian.require("columns_hessian", {B, m, m, n, n});
   if (B == 0 || n == 0) return;
-  const hovi::intervals::Contraction shape{B, Q,           R, m, n, table.data(), weights.data(),
-                                           steps.data()};
   const nb::gil_scoped_release released;
   const auto work = allocate(kernels(portable).workspace_size(shape));
   kernels(portable).contract(shape, gradient.data(), hessian.data(), work.get(),
                              columns_gradient.data(), columns_hessian.data());
+}
+
+// What is selected at P points, of R n numbers and p outputs.
+Selection selection_of(const Contraction& shape, const Index& selected, const Input<1>& scales,
+                       const Input<3>& jacobian) {
+  jacobian.require_kind("jacobian");
+  selected.require_kind("selected");
+  const std::size_t p = jacobian.shape(1), size = shape.rows * shape.dof, K = selected.shape(0);
+  jacobian.require("jacobian", {shape.intervals * shape.points, p, size});
+  scales.require("scales", {K});
+  for (std::size_t c = 0; c < K; ++c) {
+    const std::int64_t column = selected.data()[c];
+    if (column < 0 || std::size_t(column) >= size + p)
+      refuse("there is no column " + std::to_string(column) + " of " + std::to_string(size + p) +
+             ".");
+  }
+  return {K, p, selected.data(), scales.data(), jacobian.data()};
+}
+
+void push(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
+          const Input<3>& step, const Index& selected, const Input<1>& scales,
+          const Input<3>& jacobian, const Output<2>& out) {
+  step.require_kind("step");
+  out.require_kind("out");
+  const std::size_t n = step.shape(2);
+  const Contraction shape = tables_of(table, weights, steps, out.shape(0), n);
+  const Selection of = selection_of(shape, selected, scales, jacobian);
+  step.require("step", {shape.intervals, shape.columns, n});
+  out.require("out", {shape.intervals * shape.points, of.count});
+  const nb::gil_scoped_release released;
+  const auto work = allocate(shape.rows * (shape.columns + n));
+  hovi::intervals::push(shape, of, step.data(), work.get(), out.data());
+}
+
+void pull(const Input<3>& table, const Input<1>& weights, const Input<1>& steps,
+          const Input<2>& forces, const Index& selected, const Input<1>& scales,
+          const Input<3>& jacobian, const Output<3>& out) {
+  forces.require_kind("forces");
+  out.require_kind("out");
+  const std::size_t n = out.shape(2);
+  const Contraction shape = tables_of(table, weights, steps, forces.shape(0), n);
+  const Selection of = selection_of(shape, selected, scales, jacobian);
+  forces.require("forces", {shape.intervals * shape.points, of.count});
+  out.require("out", {shape.intervals, shape.columns, n});
+  const nb::gil_scoped_release released;
+  const auto work = allocate(shape.rows * (shape.columns + n));
+  hovi::intervals::pull(shape, of, forces.data(), work.get(), out.data());
+}
+
+LinearRows rows_of(const Index& intervals, const Index& joints, const Input<2>& rows,
+                   std::size_t N, std::size_t m, std::size_t n) {
+  intervals.require_kind("intervals");
+  const std::size_t E = intervals.shape(0);
+  joints.require("joints", {E});
+  rows.require("rows", {E, m});
+  for (std::size_t e = 0; e < E; ++e) {
+    const std::int64_t k = intervals.data()[e], i = joints.data()[e];
+    if (k < 0 || std::size_t(k) >= N || i < 0 || std::size_t(i) >= n)
+      refuse("there is no joint " + std::to_string(i) + " of " + std::to_string(n) +
+             " in interval " + std::to_string(k) + " of " + std::to_string(N) + ".");
+  }
+  return {E, m, n, intervals.data(), joints.data(), rows.data()};
+}
+
+void push_rows(const Index& intervals, const Index& joints, const Input<2>& rows,
+               const Input<3>& step, const Output<1>& out) {
+  step.require_kind("step");
+  const LinearRows of =
+      rows_of(intervals, joints, rows, step.shape(0), step.shape(1), step.shape(2));
+  out.require("out", {of.count});
+  hovi::intervals::push_rows(of, step.data(), out.data());
+}
+
+void pull_rows(const Index& intervals, const Index& joints, const Input<2>& rows,
+               const Input<1>& forces, const Output<3>& sums) {
+  sums.require_kind("sums");
+  const LinearRows of =
+      rows_of(intervals, joints, rows, sums.shape(0), sums.shape(1), sums.shape(2));
+  forces.require("forces", {of.count});
+  hovi::intervals::pull_rows(of, forces.data(), sums.data());
+}
+
+void add_squares(const Index& intervals, const Index& joints, const Input<2>& rows,
+                 const Input<1>& weights, const Output<5>& sums) {
+  sums.require_kind("sums");
+  const std::size_t N = sums.shape(0), m = sums.shape(1), n = sums.shape(3);
+  sums.require("sums", {N, m, m, n, n});
+  const LinearRows of = rows_of(intervals, joints, rows, N, m, n);
+  weights.require("weights", {of.count});
+  hovi::intervals::add_squares(of, weights.data(), sums.data());
 }
 
 void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,
@@ -167,6 +271,13 @@ void predict(const Input<2>& residuals, const Input<1>& metric, const Input<3>& 
 NB_MODULE(intervals, m) {
   m.def("contract", &contract, "table"_a, "weights"_a, "steps"_a, "gradient"_a, "hessian"_a,
         "columns_gradient"_a, "columns_hessian"_a, "portable"_a = false);
+  m.def("push", &push, "table"_a, "weights"_a, "steps"_a, "step"_a, "selected"_a, "scales"_a,
+        "jacobian"_a, "out"_a);
+  m.def("pull", &pull, "table"_a, "weights"_a, "steps"_a, "forces"_a, "selected"_a, "scales"_a,
+        "jacobian"_a, "out"_a);
+  m.def("push_rows", &push_rows, "intervals"_a, "joints"_a, "rows"_a, "step"_a, "out"_a);
+  m.def("pull_rows", &pull_rows, "intervals"_a, "joints"_a, "rows"_a, "forces"_a, "sums"_a);
+  m.def("add_squares", &add_squares, "intervals"_a, "joints"_a, "rows"_a, "weights"_a, "sums"_a);
   m.def("interpolate", &interpolate, "table"_a, "steps"_a, "intervals"_a, "q"_a, "v"_a, "z"_a,
         "inner"_a, "out"_a);
   m.def("misfit", &misfit, "steps"_a, "q"_a, "v"_a, "z"_a, "inner"_a);

@@ -50,3 +50,28 @@ def expand_squares(
 def predict(
     residuals: Array, metric: Array, jacobian: Array, change: Array, out: Array
 ) -> None: ...
+def push(
+    table: Array,
+    weights: Array,
+    steps: Array,
+    step: Array,
+    selected: Index,
+    scales: Array,
+    jacobian: Array,
+    out: Array,
+) -> None: ...
+def pull(
+    table: Array,
+    weights: Array,
+    steps: Array,
+    forces: Array,
+    selected: Index,
+    scales: Array,
+    jacobian: Array,
+    out: Array,
+) -> None: ...
+def push_rows(intervals: Index, joints: Index, rows: Array, step: Array, out: Array) -> None: ...
+def pull_rows(intervals: Index, joints: Index, rows: Array, forces: Array, sums: Array) -> None: ...
+def add_squares(
+    intervals: Index, joints: Index, rows: Array, weights: Array, sums: Array
+) -> None: ...

@@ -14,7 +14,7 @@ from hovi.accuracy.variational_method import LIMITED_SCHEMES, SCHEMES
 from hovi.accuracy.work_precision import Peer, Setting, work_precision
 
 if TYPE_CHECKING:
-    from hovi.discrete.motion_error import MotionError as MotionError
+    from hovi.discrete.measures.motion_error import MotionError as MotionError
 
 __all__ = [
     "LIMITED_SCHEMES",
@@ -35,7 +35,7 @@ def _deprecated(name: str) -> Any:
     """The deprecated name `MotionError`, to be removed in the next version."""
     if name != "MotionError":
         raise AttributeError(f"module 'hovi.accuracy' has no attribute {name!r}")
-    from hovi.discrete.motion_error import MotionError
+    from hovi.discrete.measures.motion_error import MotionError
 
     warnings.warn(
         "hovi.accuracy.MotionError is now hovi.MotionError, with the tip in metres; pass "

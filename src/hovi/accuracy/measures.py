@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 
 _SIZES: dict[str, Callable[[MotionError], float]] = {
     "cost": lambda error: error.cost,

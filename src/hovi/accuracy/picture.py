@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator
 
 from hovi.accuracy import MEASURES, Choice, Diagram, Run
 from hovi.accuracy.measures import shown_size
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.robot.tip_frame import names_in_words
 from hovi.viewing.figures import write_figure
 

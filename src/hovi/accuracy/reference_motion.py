@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.motion_error import MotionError, relative_difference
+from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.robot import Robot
 

@@ -134,7 +134,9 @@ def _from_rotors(task: Task, budget: Budget) -> Solution:
         task.duration, ROTOR_INTERVALS, galerkin_with_more_points(4, task.scene.order)
     )
     options = task.options.on(task.scene)
-    job = split_for_charts(Job(task.scene, grid, task.start, task.goal, options), options.guess)
+    job = split_for_charts(
+        Job(task.held_scene, grid, task.start_state, task.goal, options), options.guess
+    )
     guess: str | Trajectory = options.guess
     for stage in lighter_rotors(job):
         left = budget.left_of(SEARCH_SHARE)

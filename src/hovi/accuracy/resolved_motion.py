@@ -12,7 +12,7 @@ from hovi.accuracy.measures import Thresholds
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.variational_method import on_grid
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import UnmeasurableError
 from hovi.planning.problem.limits import no_limits

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hovi.accuracy.measures import shown_size, size
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 
 MAX_JOINT_ERROR = 0.1
 """Joint error in [rad] or [m] beyond which the run found another motion."""

@@ -15,7 +15,7 @@ from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.run import MAX_JOINT_ERROR
 from hovi.accuracy.variational_method import on_grid
 from hovi.discrete.guess import Curve
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.discrete.state import Periodic
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Tolerance

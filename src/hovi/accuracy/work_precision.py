@@ -96,6 +96,7 @@ def work_precision(
     Raises InputError and the errors of `plan` for invalid input, UnmeasurableError when no motion
     can be resolved or the budget ends before a scheme is measured.
     """
+    task.require_one_motion("a work-precision diagram")
     if task.options.via:
         raise InputError(
             f"{task.name} has via points, but a diagram needs a motion between two states; remove "

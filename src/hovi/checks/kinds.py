@@ -108,19 +108,34 @@ def _simple(annotation: Any) -> Kind | None:
     return _protocol(annotation) if is_protocol else _instance(annotation)
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value is an integer or a float of Python or NumPy, and no bool.
+
+    NumPy's complex numbers and its times are numbers only by name: float() drops their imaginary
+    part or their unit, or fails.
+    """
+    known = isinstance(value, float | int | np.floating | np.integer)
+    return known and not isinstance(value, bool | np.timedelta64)
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value is an integer of Python or NumPy, and no bool."""
+    return is_number(value) and isinstance(value, int | np.integer)
+
+
 def _number(value: Any) -> Any:
     if type(value) is float:
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if not isinstance(value, numbers.Real) or isinstance(value, bool):
+    if not isinstance(value, numbers.Real) or isinstance(value, bool | np.timedelta64):
         raise MismatchError
     try:
         double = float(value)
     except OverflowError as error:
         raise MismatchError from error
     # NumPy refuses what no machine word holds, and fractions
-    known = isinstance(value, int | float | np.number) and abs(double) < 2**53
+    known = is_number(value) and abs(double) < 2**53
     return value if known else double
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
+from hovi.discrete.instants import InstantBatch, InstantCharts
+from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import Charts
+from hovi.scene.lagrangian import PointExpansion
 
 Array = npt.NDArray[np.float64]
+AnyCharts = Charts | InstantCharts
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,18 +30,37 @@ class Expansion:
     outputs: y and its Jacobian at the quadrature points, one pair per batch, for lifted Newton
         steps; they have no rows if the Lagrangian has no outputs.
     charts: of the intervals, one per batch; None if the chart is the identity.
+    points: of the Lagrangian at the quadrature points, one per batch; None if they were not kept.
     """
 
     values: Array
     gradient: Array
     hessian: Array
     outputs: list[tuple[Array, Array]]
-    charts: list[Charts] | None = None
+    charts: list[AnyCharts] | None = None
+    points: list[PointExpansion] | None = None
 
     @property
     def action(self) -> float:
         """The discrete action, the sum of all L_d."""
         return float(np.sum(self.values))
+
+
+def joined(
+    batches: Sequence[IntervalBatch | InstantBatch], parts: list[Expansion], N: int, m: int
+) -> Expansion:
+    """The expansion of all N intervals, with m columns, from those of their batches."""
+    n = parts[0].gradient.shape[2]
+    values, gradient, hessian = np.zeros(N), np.zeros((N, m, n)), np.zeros((N, m, m, n, n))
+    for batch, part in zip(batches, parts, strict=True):
+        own = part.gradient.shape[1]
+        batch.add(part.values, values)
+        batch.add(part.gradient, gradient[:, :own])
+        batch.add(part.hessian, hessian[:, :own, :own])
+    outputs = [pair for part in parts for pair in part.outputs]
+    charts = [each for part in parts for each in part.charts or ()] or None
+    points = [point for part in parts for point in part.points or ()] or None
+    return Expansion(values, gradient, hessian, outputs, charts, points)
 
 
 def contract(
@@ -48,12 +72,13 @@ def contract(
     sums of h w_q A_q^T g_q and h w_q A_q^T H_q A_q with the derivatives g_q, H_q of L there. Tables
     of order k have R = k + 1 rows at each point.
 
-    table: shape (Q, R, m). weights: w, shape (Q,). steps: h of the intervals, shape (B,).
+    table: shape (Q, R, m), or for intervals with tables of their own (B Q, R, m). weights: w, shape
+        (Q,) or (B Q,). steps: h of the intervals, shape (B,).
     gradient: of L at the B Q points, R n entries each. hessian: symmetric, (R n)^2 entries each.
     Returns gradient (B, m, n) and hessian (B, m, m, n, n).
     """
-    Q, rows, m = table.shape
-    P = len(steps) * Q
+    rows, m = table.shape[1:]
+    P = len(hessian)
     g = np.ascontiguousarray(gradient.reshape(P, -1))
     n = g.shape[1] // rows
     H = np.ascontiguousarray(hessian.reshape(P, rows * n, rows * n))

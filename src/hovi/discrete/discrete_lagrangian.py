@@ -15,19 +15,21 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.discrete.contraction import Expansion, contract
+from hovi.discrete.contraction import AnyCharts, Expansion, contract, joined
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.instants import InstantBatch, Instants, instant_batches
 from hovi.discrete.interval_batch import Coordinates, IntervalBatch, Jet, interval_batches
-from hovi.discrete.interval_charts import Charts, charts_on, jet_on
+from hovi.discrete.interval_charts import charts_on, jet_on
 from hovi.errors import InputError, SchemeError
 from hovi.robot.space.chart import Chart
-from hovi.scene.lagrangian import Lagrangian, PointTerms
+from hovi.scene.lagrangian import Lagrangian, NoCost, PointTerms
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes.scheme import regular_from_nodal
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Batch = IntervalBatch | InstantBatch
 
 
 @check_arguments
@@ -39,11 +41,14 @@ class DiscreteLagrangian:
 
     lagrangian: L on T^(k)Q.
     grid: the intervals and their schemes, which are tables for the same k.
+    instants: further points of the motion, at which L counts as zero and has no outputs, and only
+        `terms` act; they are in the last batches.
     Raises SchemeError if the orders differ, InputError for k > 2 on noncommutative groups.
     """
 
     lagrangian: Lagrangian
     grid: Grid
+    instants: Instants | None = None
 
     def __post_init__(self) -> None:
         if self.grid.order != self.lagrangian.order:
@@ -83,8 +88,9 @@ class DiscreteLagrangian:
         """
         self._check(path, jets)
         values = np.empty(self.grid.intervals)
-        parts = zip(self.lagrangians, self.batches, jets or self.jets(path), strict=True)
-        for lagrangian, batch, jet in parts:
+        for lagrangian, batch, jet in zip(
+            self.lagrangians, self.interval_batches, jets or self.jets(path), strict=False
+        ):
             values[batch.index] = batch.sums(lagrangian.value(*jet, t=batch.t))
         return values
 
@@ -92,7 +98,7 @@ class DiscreteLagrangian:
         """The discrete action sum_k L_d(q_k, v_k, q_{k+1}, v_{k+1}); jets as for `values`."""
         self._check(path, jets)
         known, weights = jets or self.jets(path), self.point_weights
-        parts = zip(self.lagrangians, self.batches, known, weights, strict=True)
+        parts = zip(self.lagrangians, self.interval_batches, known, weights, strict=False)
         return sum(float(w @ L.value(*jet, t=batch.t)) for L, batch, jet, w in parts)
 
     def expand(
@@ -102,13 +108,14 @@ class DiscreteLagrangian:
         multipliers: list[Array] | None = None,
         terms: list[PointTerms] | None = None,
         jets: list[Jet] | None = None,
+        keep_points: bool = False,
     ) -> Expansion:
         """Value, gradient and Hessian of every L_d: see Expansion.
 
         multipliers: weights of the outputs' curvature, one array per batch, from `predict`; R y
             when None.
         terms: contributions of limits at the points, one per batch; they do not affect values.
-        jets: as for `values`.
+        jets: as for `values`. keep_points: whether the expansion has those at the points.
         """
         self._check(path, jets)
         self._check_terms(terms)
@@ -117,9 +124,7 @@ class DiscreteLagrangian:
                 f"multipliers must be {len(self.batches)} arrays, one per batch, got "
                 f"{len(multipliers)}."
             )
-        parts = []
-        known = jets or self.jets(path)
-        charts = self._charts(path)
+        parts, known, charts = [], jets or self.jets(path), self._charts(path)
         for i, batch in enumerate(self.batches):
             if i > 0:
                 raise_if_late()
@@ -128,16 +133,16 @@ class DiscreteLagrangian:
             jet, L = known[i], self.lagrangians[i]
             point = L.expand(*jet, t=batch.t, multiplier=multiplier, terms=term)
             value, outputs = batch.sums(point.value), [(point.outputs, point.jacobian)]
+            kept = [point] if keep_points else None
             if charts is not None:
                 gradient, hessian = charts[i].expand(point.gradient, point.hessian)
-                parts.append(Expansion(value, gradient, hessian, outputs, [charts[i]]))
+                parts.append(Expansion(value, gradient, hessian, outputs, [charts[i]], kept))
                 continue
-            table = batch.tables[coordinates]
-            gradient, hessian = contract(
-                table, batch.scheme.weights, batch.h, point.gradient, point.hessian
-            )
-            parts.append(Expansion(value, gradient, hessian, outputs))
-        return parts[0] if len(parts) == 1 else self._joined(parts)
+            table, weights = batch.tables[coordinates], batch.contraction_weights
+            gradient, hessian = contract(table, weights, batch.h, point.gradient, point.hessian)
+            parts.append(Expansion(value, gradient, hessian, outputs, None, kept))
+        whole = self.grid.intervals, self.columns
+        return parts[0] if len(parts) == 1 else joined(self.batches, parts, *whole)
 
     def gradient(
         self,
@@ -157,24 +162,9 @@ class DiscreteLagrangian:
             if self.chart is None:
                 part = batch.contracted(point_gradient, coordinates)
             else:
-                part = charts_on(self.chart, batch, path).nodal_gradient(point_gradient)
-            gradient[batch.index, : part.shape[1]] = part
+                part = self._charts_of(batch, path).nodal_gradient(point_gradient)
+            batch.add(part, gradient[:, : part.shape[1]])
         return gradient
-
-    def _joined(self, parts: list[Expansion]) -> Expansion:
-        """The expansion of all intervals from those of the batches."""
-        N, m, n = self.grid.intervals, self.columns, self.lagrangian.nv
-        values = np.empty(N)
-        gradient = np.zeros((N, m, n))
-        hessian = np.zeros((N, m, m, n, n))
-        for batch, part in zip(self.batches, parts, strict=True):
-            own = part.gradient.shape[1]
-            values[batch.index] = part.values
-            gradient[batch.index, :own] = part.gradient
-            hessian[batch.index, :own, :own] = part.hessian
-        outputs = [pair for part in parts for pair in part.outputs]
-        charts = [each for part in parts for each in part.charts or ()] or None
-        return Expansion(values, gradient, hessian, outputs, charts)
 
     def predict(self, expansion: Expansion, step: Array, coordinates: Coordinates) -> list[Array]:
         """R (y + J dx) at the quadrature points after a step: multipliers for `expand`.
@@ -215,7 +205,7 @@ class DiscreteLagrangian:
             )
         steps = []
         for i, batch in enumerate(self.batches):
-            columns = step[batch.index, : 2 * self.k + batch.scheme.inner_modes]
+            columns = step[batch.index, : 2 * self.k + batch.modes]
             if expansion.charts is not None:
                 moved = expansion.charts[i].point_steps(columns)
             else:
@@ -231,12 +221,12 @@ class DiscreteLagrangian:
     def turns(self, path: DiscretePath) -> Array:
         """The largest rotation angle in the chart of every interval, shape (N,), in [rad].
 
-        At its quadrature points and its end; zero without charts.
+        At its quadrature points and its end; zero without charts, infinite far beyond them.
         """
         self._check(path)
         turns = np.zeros(self.grid.intervals)
         for batch, charts in zip(self.batches, self._charts(path) or (), strict=False):
-            turns[batch.index] = charts.turns
+            np.maximum.at(turns, batch.numbers, charts.turns)
         return turns
 
     @cached_property
@@ -252,8 +242,7 @@ class DiscreteLagrangian:
     @cached_property
     def point_intervals(self) -> list[Index]:
         """Number of the interval of every quadrature point, shape (P,), per batch."""
-        numbers = np.arange(self.grid.intervals)
-        return [np.repeat(numbers[b.index], len(b.scheme.weights)) for b in self.batches]
+        return [np.repeat(batch.numbers, batch.points) for batch in self.batches]
 
     def momenta(self, path: DiscretePath, forces: list[PointTerms] | None = None) -> Array:
         """Momenta (p, p~) at the nodes, shape (N + 1, k, nv).
@@ -281,14 +270,14 @@ class DiscreteLagrangian:
         jets: as for `values`.
         """
         N, n = self.grid.intervals, self.lagrangian.nv
-        g = np.empty((N, 2 * self.k, n))
+        g = np.zeros((N, 2 * self.k, n))
         gradients = self.point_gradients(path, forces, jets)
         for batch, gradient in zip(self.batches, gradients, strict=True):
             if self.chart is not None:
-                g[batch.index] = charts_on(self.chart, batch, path).end_gradient(gradient)
+                batch.add(self._charts_of(batch, path).end_gradient(gradient), g)
                 continue
             regular = batch.contracted(gradient, "regular")
-            g[batch.index] = regular[:, : 2 * self.k]
+            batch.add(regular[:, : 2 * self.k], g)
         return np.asarray(np.matmul(self._end_columns, g))
 
     @cached_property
@@ -361,20 +350,35 @@ class DiscreteLagrangian:
         if given != points:
             raise InputError(f"terms must be one per batch, at {points} points, got {given}.")
 
-    def _jet(self, batch: IntervalBatch, path: DiscretePath) -> Jet:
-        """The jet at the quadrature points of a batch, each of shape (B * Q, n)."""
+    def _jet(self, batch: Batch, path: DiscretePath) -> Jet:
+        """The jet at the points of a batch, each of shape (P, n)."""
         space = self.lagrangian.space
-        return batch.jet(path) if space is None else jet_on(space, batch, path)
+        if space is None:
+            return batch.jet(path)
+        if isinstance(batch, InstantBatch):
+            return batch.jet_on(space, path)
+        return jet_on(space, batch, path)
 
-    def _charts(self, path: DiscretePath) -> list[Charts] | None:
-        if self.chart is None:
-            return None
-        return [charts_on(self.chart, batch, path) for batch in self.batches]
+    def _charts(self, path: DiscretePath) -> list[AnyCharts] | None:
+        all_flat = self.chart is None
+        return None if all_flat else [self._charts_of(batch, path) for batch in self.batches]
+
+    def _charts_of(self, batch: Batch, path: DiscretePath) -> AnyCharts:
+        assert self.chart is not None
+        if isinstance(batch, InstantBatch):
+            return batch.charts(self.chart, path)
+        return charts_on(self.chart, batch, path)
 
     @cached_property
-    def batches(self) -> list[IntervalBatch]:
+    def interval_batches(self) -> list[IntervalBatch]:
         """The intervals in batches of one scheme and segment, which are evaluated together."""
         return list(interval_batches(self.grid, self.segments))
+
+    @cached_property
+    def batches(self) -> list[Batch]:
+        """Those of the intervals, then those of the further instants."""
+        instants = instant_batches(self.grid, self.instants, self.segments)
+        return [*self.interval_batches, *instants]
 
     @cached_property
     def segments(self) -> Index | None:
@@ -385,7 +389,11 @@ class DiscreteLagrangian:
     @cached_property
     def lagrangians(self) -> list[Lagrangian]:
         """The Lagrangian of every batch."""
+        of, first = [self._lagrangian_of(b) for b in self.batches], len(self.interval_batches)
+        return of[:first] + [NoCost(L) for L in of[first:]]
+
+    def _lagrangian_of(self, batch: Batch) -> Lagrangian:
         L = self.lagrangian
         if self.segments is None or not isinstance(L, SegmentedLagrangian):
-            return [L] * len(self.batches)
-        return [L.lagrangians[self.segments[batch.numbers[0]]] for batch in self.batches]
+            return L
+        return L.lagrangians[int(self.segments[batch.numbers[0]])]

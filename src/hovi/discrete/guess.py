@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -167,6 +167,18 @@ def named_curve(name: str, coordinates: Coordinates, boundary: Boundary, duratio
     if name not in NAMED:
         raise InputError(f"there is no guess {name!r}: {nearest(name, NAMED)}")
     return NAMED[name](coordinates, boundary, duration)
+
+
+def joined(pieces: Sequence[Curve], times: Array) -> Curve:
+    """Curves one after the other. times: at which they begin, ascending, shape (P,), in [s]."""
+
+    def curve(t: Array) -> tuple[Array, ...]:
+        number = np.clip(np.searchsorted(times, t, side="right") - 1, 0, len(pieces) - 1)
+        jets = [piece(np.asarray(t) - begin) for piece, begin in zip(pieces, times, strict=True)]
+        known, rows = min(map(len, jets)), np.arange(len(number))
+        return tuple(np.stack([jet[j] for jet in jets])[number, rows] for j in range(known))
+
+    return curve
 
 
 def stretched(trajectory: Trajectory, duration: float, order: int = 2) -> Curve:

@@ -39,6 +39,25 @@ class IntervalBatch:
     h: Array
     t: Array
 
+    @property
+    def points(self) -> int:
+        """Q, the number of quadrature points of an interval."""
+        return len(self.scheme.weights)
+
+    @property
+    def modes(self) -> int:
+        """r, the number of inner modes of an interval."""
+        return self.scheme.inner_modes
+
+    @property
+    def contraction_weights(self) -> Array:
+        """w_j, shape (Q,)."""
+        return self.scheme.weights
+
+    def add(self, parts: Array, sums: Array) -> None:
+        """Write what belongs to these intervals into what belongs to all, which is zero there."""
+        sums[self.index] = parts
+
     @cached_property
     def tables(self) -> dict[Coordinates, Array]:
         """The scheme's table for both kinds of coordinates, (Q, k + 1, m)."""

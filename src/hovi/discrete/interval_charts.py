@@ -42,14 +42,18 @@ class IntervalCharts:
 
     @property
     def turns(self) -> Array:
-        """The largest rotation angle in every chart, at points and ends, (B,), in [rad]."""
+        """The largest rotation angle in every chart, at points and ends, (B,), in [rad].
+
+        Infinite where the chart holds NaN, as it does far beyond the turns that it covers.
+        """
         points = self.x[0].reshape(len(self.h), -1, self.x.shape[2])
         x = np.concatenate([points, self.ends[:, :1]], axis=1)
         turns = [
             np.linalg.norm(x[..., [f.v.start + i for i in f.group.angular]], axis=-1).max(axis=1)
             for f in self.chart.space.curved
         ]
-        return np.asarray(np.max(turns, axis=0))
+        largest = np.max(turns, axis=0)
+        return np.where(np.isnan(largest), np.inf, largest)
 
     def expand(self, gradient: Array, hessian: Array) -> tuple[Array, Array]:
         """Gradient (B, m, n) and Hessian (B, m, m, n, n) of L_d in nodal columns.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from hovi.errors import HoviWarning, InputError, nearest
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.space.joint_table import configuration_of, rates_of
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -21,6 +23,10 @@ Mask = npt.NDArray[np.bool_]
 MAX_TURNS = 1_000_000
 """Largest number of full turns of an initial guess."""
 _FREE = "free", "free_velocity", "free_acceleration", "free_jerk"
+Positions = npt.ArrayLike | str | Mapping[str, Any]
+"""A configuration (nq,), the name of a pose, or a table of joints."""
+Rates = npt.ArrayLike | Mapping[str, Any]
+"""A velocity, acceleration or jerk (nv,), or a table of joints."""
 ALL = "all"
 """Stands for all joints in a list of joint names."""
 
@@ -33,9 +39,10 @@ class State:
     For Lagrangians of order k it is a point (q, q', ..., q^(k-1)): with an acceleration for k = 3,
     and with a jerk for k = 4; for k = 1 it has no velocity.
 
-    q: configuration, shape (nq,), in [rad] or [m].
+    q: configuration, shape (nq,), in [rad] or [m]; or the name of a pose of the robot, or a table
+        of all joints, in which a continuous joint takes its angle.
     v, a, jerk: velocity, acceleration and its rate, shape (nv,), per [s], [s^2], [s^3]; zero by
-        default.
+        default; or tables of joints, of which those that are left out have zero.
     free, free_velocity, free_acceleration, free_jerk: joints whose configuration, velocity, ... is
         optimized, by name; what is given is the initial guess. ALL stands for all joints,
         "joint[i]" for one coordinate: 0 to 2 of a floating base translate it along its own axes, 3
@@ -46,14 +53,14 @@ class State:
     Raises InputError for turns that are not given by joint.
     """
 
-    q: npt.ArrayLike
-    v: npt.ArrayLike | None = None
+    q: Positions
+    v: Rates | None = None
     _: KW_ONLY
     free: Sequence[str] = ()
     free_velocity: Sequence[str] = ()
-    a: npt.ArrayLike | None = None
+    a: Rates | None = None
     free_acceleration: Sequence[str] = ()
-    jerk: npt.ArrayLike | None = None
+    jerk: Rates | None = None
     free_jerk: Sequence[str] = ()
     turns: Mapping[str, int | Sequence[int]] = field(default_factory=dict)
 
@@ -73,9 +80,25 @@ class State:
         name: of the state in messages, such as "start".
         Raises InputError for wrong shapes and numbers that are not finite.
         """
-        q = coordinates.check_configuration(self.q, name)
-        v = np.zeros(coordinates.nv) if self.v is None else self.v
-        return q, coordinates.check_velocity(v, f"{name}.v")
+        given = configuration_of(self.q, coordinates, f"{name}.q")
+        q = coordinates.check_configuration(given, name)
+        return q, self._rate("v", coordinates, name)
+
+    def _rate(self, key: str, coordinates: Coordinates, name: str) -> Array:
+        """v, a or jerk as a checked array, zero if it is not given."""
+        given = rates_of(getattr(self, key), coordinates, f"{name}.{key}")
+        rate = np.zeros(coordinates.nv) if given is None else given
+        return coordinates.check_velocity(rate, f"{name}.{key}")
+
+    def resolved(self, coordinates: Coordinates, name: str) -> State:
+        """The state with arrays in place of tables and names of poses. Raises as `on` does."""
+        if not any(isinstance(x, str | Mapping) for x in (self.q, self.v, self.a, self.jerk)):
+            return self
+        rates = {
+            key: None if getattr(self, key) is None else self._rate(key, coordinates, name)
+            for key in ("v", "a", "jerk")
+        }
+        return replace(self, q=self.on(coordinates, name)[0], **rates)  # type: ignore[arg-type]
 
     def require_order(self, order: int, name: str) -> None:
         """Raise InputError for derivatives that an end of a motion of this order does not have."""
@@ -92,12 +115,7 @@ class State:
 
         Raises InputError as `on` does.
         """
-        given = {"a": self.a, "jerk": self.jerk}
-        zero = np.zeros(coordinates.nv)
-        rates = [
-            coordinates.check_velocity(zero if x is None else x, f"{name}.{key}")
-            for key, x in given.items()
-        ]
+        rates = [self._rate(key, coordinates, name) for key in ("a", "jerk")]
         return [*self.on(coordinates, name), *rates]
 
     def free_on(self, coordinates: Coordinates, name: str, order: int = 2) -> Mask:
@@ -254,14 +272,14 @@ def _chosen_coordinates(
     return chosen
 
 
-def as_state(state: State | npt.ArrayLike | str, coordinates: Coordinates) -> State:
-    """A configuration at rest or the name of a pose of the robot as a State; a State unchanged.
+def as_state(state: State | Positions, coordinates: Coordinates, name: str = "state") -> State:
+    """A State: of a configuration at rest, the name of a pose, or a table of joints.
 
-    Raises InputError for an unknown pose.
+    name: of the state in messages, such as "start".
+    Raises InputError for an unknown pose or joint.
     """
-    if isinstance(state, str):
-        return State(coordinates.pose(state))
-    return state if isinstance(state, State) else State(state)
+    whole = state if isinstance(state, State) else State(state)
+    return whole.resolved(coordinates, name)
 
 
 def warn_of_degrees(robot: Robot, configurations: Sequence[Array]) -> None:

@@ -22,6 +22,7 @@ from pathlib import Path
 import casadi as ca
 
 from hovi.errors import HoviError
+from hovi.system.cache_home import cache_home
 from hovi.system.deadline import OutOfTimeError, time_left
 from hovi.system.files import reason, whole_file
 from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
@@ -99,12 +100,9 @@ def library_folder() -> Path:
 
 
 def _cache_home() -> Path:
-    """$XDG_CACHE_HOME if that is an absolute path, else ~/.cache."""
-    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    if named.is_absolute():
-        return named
+    """The folder of all caches. Raises CompilationError for a user without a home folder."""
     try:
-        return Path.home() / ".cache"
+        return cache_home()
     except RuntimeError as error:
         raise CompilationError(
             "compile=True keeps libraries in the user's cache folder, but there is no home "

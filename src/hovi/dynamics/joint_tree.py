@@ -96,7 +96,7 @@ def read_joint_tree(model: pin.Model) -> JointTree:
     parents = np.array([row.parent for row in rows], dtype=np.int64)
     axes = np.array([row.axis for row in rows]).reshape(-1, 6)
     rotating = np.any(np.abs(axes[:, 3:]) > 1e-12, axis=1)
-    frames = _frames_along(np.where(rotating[:, None], axes[:, 3:], axes[:, :3]))
+    frames = frames_along(np.where(rotating[:, None], axes[:, 3:], axes[:, :3]))
     twist_indices = base.se3_indices if base else ()
     frames[: len(twist_indices)] = np.eye(3)
     parent_frames = np.concatenate([frames, np.eye(3)[None]])[parents]
@@ -139,7 +139,7 @@ def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
     for index in range(1, model.njoints):
         joint = model.joints[index]
         is_base = index == 1 and base is not None
-        axes = np.zeros((joint.nv, 6)) if is_base else _axes(joint)
+        axes = np.zeros((joint.nv, 6)) if is_base else axes_of(joint)
         parent, placement = last[model.parents[index]], model.jointPlacements[index]
         continuous = kind_of(joint).group is SO2
         for k, axis in enumerate(axes):
@@ -151,14 +151,14 @@ def _rows(model: pin.Model, base: Group | None) -> list[_Row]:
     return rows
 
 
-def _axes(joint: pin.JointModel) -> Array:
+def axes_of(joint: pin.JointModel) -> Array:
     """One row (linear, angular) for each coordinate, shape (nv, 6), at any configuration."""
     data = joint.createData()
     joint.calc(data, np.zeros(joint.idx_q + joint.nq))
     return np.asarray(data.S, dtype=np.float64).reshape(6, -1).T
 
 
-def _frames_along(axes: Array) -> Array:
+def frames_along(axes: Array) -> Array:
     """Rotations that map z to each axis, shape (n, 3, 3): permutations if that is x, y or z."""
     z = _normalized(axes)
     least = np.argmin(np.abs(z), axis=1)

@@ -12,7 +12,12 @@ import numpy.typing as npt
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.formula import Number, expression
 from hovi.effects.expressions.formula_symbols import joint_symbols
-from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
+from hovi.effects.expressions.joint_values import (
+    JointValues,
+    in_words,
+    joint_values,
+    of_urdf,
+)
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
 
@@ -36,25 +41,35 @@ class EffortWeight(Effect):
         out have weight 1.
     matrix: R instead, nv rows of nv numbers or formulas of q["joint"], v["joint"], a["joint"] and
         t; symmetric, and positive semidefinite.
+    from_urdf: use R = 1 / limit^2 of the URDF's effort limits instead, which makes torques and
+        forces comparable: each counts as a share of its limit. A joint without a limit has weight
+        0.
     """
 
     weight: JointValues | None = None
     matrix: tuple[tuple[Number, ...], ...] | None = None
+    from_urdf: bool = False
     key: ClassVar[str] = "effort_weight"
     touches: ClassVar[tuple[Touch, ...]] = (Touch.COST,)
 
     def check(self, robot: Robot) -> None:
         """Raise SceneError for unknown joints, negative weights and what is no such matrix."""
-        if (self.weight is None) == (self.matrix is None):
-            count = "neither was" if self.weight is None else "both were"
+        sources = [self.weight is not None, self.matrix is not None, self.from_urdf]
+        if sum(sources) != 1:
+            count = {0: "none was", 2: "two were"}.get(sum(sources), "all were")
             raise SceneError(
-                f"effect 'effort_weight' needs either weight or matrix; {count} given."
+                "effect 'effort_weight' needs one of weight, matrix and from_urdf = true; "
+                f"{count} given."
             )
         self.effort_weight(robot)
         self._check_matrix(robot)
 
     def effort_weight(self, robot: Robot) -> Array:
         """The diagonal of R, shape (nv,); zeros if a matrix is given, which is a running cost."""
+        if self.from_urdf:
+            limits = of_urdf(robot, self.key, "effort limits", robot.effort_limit)
+            known = (limits > 0) & np.isfinite(limits)
+            return np.where(known, 1 / np.where(known, limits, 1.0) ** 2, 0.0)
         if self.weight is None:
             return np.zeros(robot.nv)
         given = self.weight
@@ -70,6 +85,8 @@ class EffortWeight(Effect):
 
     def describe(self) -> str:
         """One line for the description of a scene."""
+        if self.from_urdf:
+            return "effort_weight: squares of torques and forces relative to their URDF limits"
         if self.matrix is None:
             return f"effort_weight: {in_words(self.weight, 'times the squared torque')}"
         rows = ", ".join(f"[{', '.join(map(_shown, row))}]" for row in self.matrix)

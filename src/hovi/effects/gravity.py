@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from hovi.checks.directions import unit_vector
 from hovi.effects.effect import Effect, Touch
 from hovi.errors import SceneError
 
@@ -41,7 +42,8 @@ class Gravity(Effect):
                 f"effect 'gravity': acceleration must be 0 or more, got {self.acceleration} m/s^2, "
                 "which pulls upwards; set the `direction` instead, (0, 0, -1) by default."
             )
-        if len(self.direction) != 3 or not 0 < np.linalg.norm(self.direction) < np.inf:
+        finite = len(self.direction) == 3 and np.isfinite(self.direction).all()
+        if not finite or not any(self.direction):
             raise SceneError(
                 f"effect 'gravity': direction must be three finite numbers that are not all zero, "
                 f"got {list(self.direction)}."
@@ -49,8 +51,7 @@ class Gravity(Effect):
 
     def configure(self, model: pin.Model, robot: Robot) -> None:
         """Set the gravity of the model, which RNEA includes."""
-        along = np.array(self.direction) / np.linalg.norm(self.direction)
-        model.gravity.linear = self.acceleration * along
+        model.gravity.linear = self.acceleration * unit_vector(np.array(self.direction))
 
     def describe(self) -> str:
         """One line for the description of a scene."""

@@ -28,7 +28,7 @@ from hovi.errors import InputError, SchemeError
 from hovi.flows.charted_interval import ChartedInterval, root_of
 from hovi.flows.charted_segment import ChartedSegment, NodalExpansion, joined
 from hovi.flows.legendre_transforms import jet_at_momenta
-from hovi.flows.scheme_lagrangian import uniform_grid
+from hovi.flows.scheme_lagrangian import check_step, uniform_grid
 from hovi.flows.segment import IntervalLagrangian
 from hovi.flows.step_guesses import (
     DOUBTFUL,
@@ -65,8 +65,7 @@ class ChartedLagrangian(IntervalLagrangian):
     h: float
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.h) and self.h > 0):
-            raise InputError(f"a step must be positive and finite, got {self.h} s.")
+        check_step(self.h)
         if self.k not in (1, 2) or self.scheme.derivatives != self.k:
             raise SchemeError(
                 "flows on groups need a Lagrangian of order 1 or 2 and a scheme of the same "

@@ -188,12 +188,19 @@ class SchemeLagrangian(SegmentLagrangian):
         _, gradient, hessian = self._evaluate(self.jet(x0, w, inner), t0)
         return self._contract(gradient), flat(self._contract_twice(hessian))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def _segment(self, x0: Array, w: Array, inner: Array, t0: float) -> Segment:
+        """The segment with these modes. Raises InputError for an action that is not finite."""
         jet = self.jet(x0, w, inner)
         value, gradient, hessian = self._evaluate(jet, t0)
         values = value.reshape(len(x0), -1) @ self.scheme.weights
         slopes = [j * np.sum(x * gradient[:, j], axis=1) for j, x in enumerate(jet)]
         scaled = (value - np.sum(slopes, axis=0)).reshape(len(x0), -1) @ self.scheme.weights
+        if not np.isfinite([values, scaled]).all():
+            raise InputError(
+                f"the action of a segment of h = {self.h:g} s is not a finite number: use smaller "
+                "states and momenta."
+            )
         G, H = self._contract(gradient), self._contract_twice(hessian)
         return Segment(self.scheme, self.h, x0, w, inner, self.h * values, G, H, scaled)
 

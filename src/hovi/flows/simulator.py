@@ -146,7 +146,7 @@ def simulate(
         ld = SchemeLagrangian(forced, table, h)
     else:
         ld = ChartedLagrangian(forced, free.space, table, h)
-    q, v = as_state(start, scene.robot).on(scene.robot, "start")
+    q, v = as_state(start, scene.robot, "start").on(scene.robot, "start")
     warn_of_degrees(scene.robot, [q])
     x, p = legendre(free, q, v)
     return Simulation(scene, free, flow(ld, x, p, intervals, force=True))

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments
+from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.dynamics.point_function import PointFunction
 from hovi.dynamics.symbolic_dynamics import casadi_functions
@@ -157,9 +158,9 @@ def base_translation(scene: Scene, direction: npt.ArrayLike) -> Symmetry:
 
 def _unit(vector: npt.ArrayLike) -> Array:
     array = numbers_of("a direction of the world", vector, 3)
-    if not 0 < np.linalg.norm(array) < np.inf:
+    if not (array.any() and np.isfinite(array).all()):
         raise InputError(f"a direction of the world is three numbers, not all zero; got {array}.")
-    return array / np.linalg.norm(array)
+    return unit_vector(array)
 
 
 def _base_motion(scene: Scene, twist: Array) -> Symmetry:

@@ -49,6 +49,15 @@ class Runs:
             entries[first], positions[first], lengths, None if scales is None else scales[first]
         )
 
+    def unrolled(self) -> tuple[Index, Index, Array | None]:
+        """The entries, their positions, and the factor of each; None where all are one."""
+        first = np.cumsum(self.lengths) - self.lengths
+        inside = np.arange(int(self.lengths.sum())) - np.repeat(first, self.lengths)
+        entries = np.repeat(self.starts, self.lengths) + inside
+        positions = np.repeat(self.positions, self.lengths) + inside
+        scales = None if self.scales is None else np.repeat(self.scales, self.lengths)
+        return entries, positions, scales
+
 
 @dataclass(frozen=True, eq=False)
 class BandLayout:
@@ -93,6 +102,18 @@ class BandLayout:
         return cls(unknowns, size, rows, runs, scales)
 
     @cached_property
+    def flat_runs(self) -> Runs:
+        """As `runs`, for Hessians of shape (N, m, n, m, n)."""
+        _, m, n = self.unknowns.shape
+        entries, positions, scales = self.runs.unrolled()
+        # where (m, m, n, n) is stored as (m, n, m, n)
+        moved = np.arange((m * n) ** 2).reshape(m, n, m, n).transpose(0, 2, 1, 3).ravel()
+        interval, inside = np.divmod(entries, (m * n) ** 2)
+        entries = interval * (m * n) ** 2 + moved[inside]
+        order = np.argsort(entries)
+        return Runs.of(entries[order], positions[order], None if scales is None else scales[order])
+
+    @cached_property
     def slots(self) -> Index:
         """1 + the unknown of every column of an interval, flat; 0 where it is fixed."""
         return self.unknowns.ravel() + 1
@@ -109,8 +130,14 @@ class BandLayout:
         the last panel is padded. Shape (4 panels, maximum rows of a panel).
         hessian: symmetric, shape (N, m, m, n, n).
         """
+        return self._assembled(hessian, self.runs)
+
+    def assemble_flat(self, hessian: Array) -> Array:
+        """As `assemble`, for shape (N, m, n, m, n)."""
+        return self._assembled(hessian, self.flat_runs)
+
+    def _assembled(self, hessian: Array, runs: Runs) -> Array:
         band = np.empty(self.shape)
-        runs = self.runs
         native.assemble(hessian, runs.starts, runs.positions, runs.lengths, runs.scales, band)
         return band
 
@@ -191,16 +218,22 @@ class BandModel(QuadraticModel):
         )
         return BandFactor(factor, rows) if definite else None
 
-    def negative_eigenvalues(self) -> int:
+    def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
         """Number of negative eigenvalues of H, by elimination of blocks as wide as the band.
 
         The counts of the pivot blocks add up: Haynsworth's inertia additivity.
+        border: a further row b and its diagonal entry c; the count is that of [H b; b^T c].
         """
         bands = self.layout.assemble(self.intervals.hessian)
         size, block = self.layout.size, max(bands.shape[1], 1)
         count = 0
         schur = np.zeros((0, 0))
         coupling = np.zeros((0, 0))
+        column: Array = np.zeros(0)
+        solved: Array = np.zeros(0)
+        corner = 1.0
+        if border is not None:
+            column, corner = border[0].copy(), border[1]
         for first in range(0, size, block):
             last = min(first + block, size)
             pivot = _dense(bands, range(first, last), range(first, last))
@@ -208,9 +241,14 @@ class BandModel(QuadraticModel):
             if first:
                 coupling = _dense(bands, range(first, last), range(first - block, first))
                 pivot -= coupling @ np.linalg.solve(schur, coupling.T)
+                if border is not None:
+                    column[first:last] -= coupling @ solved
             schur = (pivot + pivot.T) / 2
+            if border is not None:
+                solved = np.asarray(np.linalg.solve(schur, column[first:last]), dtype=np.float64)
+                corner -= float(column[first:last] @ solved)
             count += int(np.sum(np.linalg.eigvalsh(schur) < 0))
-        return count
+        return count + int(corner < 0)
 
 
 def _dense(bands: Array, rows: range, columns: range) -> Array:

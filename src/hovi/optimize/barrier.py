@@ -1,4 +1,4 @@
-"""The logarithmic barrier of slacks between bounds, and their multipliers."""
+"""The logarithmic barrier of slacks between bounds, their multipliers, and Newton directions."""
 
 from __future__ import annotations
 
@@ -8,31 +8,42 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hovi._native import barrier as native
+
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
+Pair = tuple[Array, Array]
 
 INITIAL_MARGIN = 1e-2
 """Minimum distance of an initial slack from its bounds, relative to the range."""
+MOST_MARGIN = 0.25
+"""The largest margin, as a share of the distance of the bounds."""
 WARM_START_MARGIN = 1e-5
-"""The same for a warm start."""
+"""Minimum distance of the slack of a warm start, unless it says otherwise."""
+ADDED_MARGIN = 0.3
+"""Minimum distance of a slack that is added, relative to mu over the scale of the multipliers."""
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
-MIN_GAP = 1e-16
-"""Minimum gap between a slack and its bound: the rounding unit at a bound of one."""
 FRACTION_TO_BOUNDARY = 0.99
 """Largest share of the distance to a bound in one step while mu is large."""
+SLACK_MATCHED = 1e-9
+"""Largest |y - s| at which the slack has reached its output and limits the length of a step."""
 
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """lower <= y <= upper for outputs in units of their ranges; infinite where unbounded.
+    """lower <= y <= upper for R outputs in units of their ranges; infinite where unbounded.
 
-    lower, upper: shape (P, K). weights: of the points, shape (P, 1).
+    lower, upper: shape (R,). weights: of the outputs in the barrier, shape (R,).
+    measure: of what the objective is an integral over, such as a duration; its mean density is
+        the objective over this.
     """
 
     lower: Array
     upper: Array
     weights: Array
+    measure: float = 1.0
 
     @property
     def has_lower(self) -> Mask:
@@ -46,10 +57,28 @@ class Bounds:
 
 
 @dataclass(frozen=True, eq=False)
+class Direction:
+    """A direction of the outputs, the slacks and the multipliers, (R,) each.
+
+    primal, dual: the largest shares of it, up to 1, that slacks and multipliers may take.
+    largest_force: the largest |zu - zl| at its end. largest_residual: the largest |y - s| before.
+    """
+
+    dy: Array
+    ds: Array
+    dzl: Array
+    dzu: Array
+    primal: float
+    dual: float
+    largest_force: float
+    largest_residual: float
+
+
+@dataclass(frozen=True, eq=False)
 class Barrier:
     """-mu sum weights (log(s - lower) + log(upper - s)), with multipliers zl, zu of the slacks.
 
-    s, zl, zu: shape (P, K); a multiplier is zero where there is no bound.
+    s, zl, zu: shape (R,); a multiplier is zero where there is no bound.
     scale: the objective's mean density, to which mu is compared.
     """
 
@@ -61,97 +90,156 @@ class Barrier:
     scale: float
 
     @classmethod
-    def central(cls, bounds: Bounds, y: Array, mu: float) -> Barrier:
+    def central(
+        cls,
+        bounds: Bounds,
+        y: Array,
+        mu: float,
+        scale: float | None = None,
+        margin: float = INITIAL_MARGIN,
+    ) -> Barrier:
         """Slacks at y, clipped to a margin inside the bounds; multipliers on the central path."""
-        s = np.clip(y, *_interior(bounds, INITIAL_MARGIN))
-        below, above = _gaps(bounds, s)
-        return cls(bounds, s, mu / below, mu / above, mu, 10.0 * mu)._clipped()
+        inside = np.minimum(margin, MOST_MARGIN * (bounds.upper - bounds.lower))
+        s = np.clip(y, bounds.lower + inside, bounds.upper - inside)
+        return cls._at(bounds, s, mu, 10.0 * mu if scale is None else scale)
 
-    def warm(self, bounds: Bounds, y: Array, mu: float) -> Barrier:
-        """A warm start from this solution, for bounds that changed little."""
-        s = np.clip(y, *_interior(bounds, WARM_START_MARGIN))
+    @classmethod
+    def _at(cls, bounds: Bounds, s: Array, mu: float, scale: float) -> Barrier:
+        below, above = _gaps(bounds, s)
+        return cls(bounds, s, mu / below, mu / above, mu, scale)._clipped()
+
+    @classmethod
+    def inactive(cls, bounds: Bounds, y: Array) -> Barrier:
+        """Without forces, at outputs that may be outside: those of a point that is no solution."""
+        none = np.zeros_like(y)
+        return cls(bounds, y, none, none, 0.0, 1.0)
+
+    def warm(
+        self, bounds: Bounds, y: Array, mu: float, margin: float = WARM_START_MARGIN
+    ) -> Barrier:
+        """A warm start from this solution, for bounds or outputs that changed little.
+
+        margin: least distance of the slacks from their bounds, relative to the range.
+        """
+        s = np.clip(y, bounds.lower + margin, bounds.upper - margin)
         below, above = _gaps(bounds, s)
         zl, zu = np.maximum(self.zl, mu / below), np.maximum(self.zu, mu / above)
         return dataclasses.replace(self, bounds=bounds, s=s, zl=zl, zu=zu, mu=mu)._clipped()
 
-    @property
-    def sigma(self) -> Array:
-        """zl/(s - lower) + zu/(upper - s)."""
-        below, above = _gaps(self.bounds, self.s)
-        return self.zl / below + self.zu / above
+    def refined(self, bounds: Bounds, y: Array, kept: Index, origin: Index) -> Barrier:
+        """The barrier after some outputs were replaced: see Refinement.
 
-    @property
-    def gradient(self) -> Array:
-        """mu/(upper - s) - mu/(s - lower)."""
-        below, above = _gaps(self.bounds, self.s)
-        return self.mu * (1 / above - 1 / below)
+        New slacks are at their outputs, as far as these are inside, and on the central path, or
+        with the multiplier of the output at whose place they are if that is larger.
+        y: all outputs, (R,).
+        """
+        old, known = len(kept), origin >= 0
+        margin = float(np.clip(ADDED_MARGIN * self.mu / self.scale, 1e-10, INITIAL_MARGIN))
+        inside = np.where(np.arange(len(y)) >= old, margin, 0.0)
+        s = np.append(self.s[kept], y[old:])
+        whole = Barrier._at(
+            bounds, np.clip(s, bounds.lower + inside, bounds.upper - inside), self.mu, self.scale
+        )
+        for z, former in ((whole.zl, self.zl), (whole.zu, self.zu)):
+            z[:old] = former[kept]
+            z[old:] = np.maximum(z[old:], np.where(known, former[origin], 0.0))
+        return whole._clipped()
+
+    def of(self, chosen: Index) -> Barrier:
+        """The slacks and multipliers of some outputs; without force for the number -1."""
+        bounds, known = self.bounds, chosen >= 0
+        lower, upper, weights = (x[chosen] for x in (bounds.lower, bounds.upper, bounds.weights))
+        some = Bounds(lower, upper, weights, bounds.measure)
+        zl, zu = (np.where(known, z[chosen], 0.0) for z in (self.zl, self.zu))
+        return dataclasses.replace(self, bounds=some, s=self.s[chosen], zl=zl, zu=zu)
 
     @property
     def multipliers(self) -> Array:
-        """zu - zl, the force that the bounds exert on the outputs."""
+        """zu - zl."""
         return self.zu - self.zl
 
-    def value(self, weights: Array, s: Array | None = None) -> float:
-        """The barrier function at its own or other slacks."""
-        below, above = _gaps(self.bounds, self.s if s is None else s)
-        finite = _log(below) + _log(above)
-        return -self.mu * float(np.sum(weights * finite))
+    @property
+    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
+        """lower, upper, s, zl and zu."""
+        return self.bounds.lower, self.bounds.upper, self.s, self.zl, self.zu
 
-    def merit(self, weights: Array, y: Array, penalty: float) -> float:
-        """The barrier plus penalty sum weights |y - s|."""
-        return self.value(weights) + penalty * float(np.sum(weights * np.abs(y - self.s)))
+    def condensed(self, y: Array) -> tuple[Array, Array, Array]:
+        """sigma, rho and zu - zl: see hovi.optimize.interior_point."""
+        sigma, rho, force = (np.empty_like(y) for _ in range(3))
+        native.condense(*self.arrays, y, self.mu, sigma, rho, force)
+        return sigma, rho, force
 
-    def dual_step(self, ds: Array) -> tuple[Array, Array]:
-        """The Newton step of zl and zu that belongs to a step ds of the slacks."""
-        below, above = _gaps(self.bounds, self.s)
-        dzl = (self.mu - self.zl * ds) / below - self.zl
-        dzu = (self.mu + self.zu * ds) / above - self.zu
-        return np.where(self.zl > 0, dzl, 0.0), np.where(self.zu > 0, dzu, 0.0)
+    def central_targets(self) -> Pair:
+        """mu, the target of every product of a multiplier and its gap."""
+        return np.full_like(self.s, self.mu), np.full_like(self.s, self.mu)
 
-    def max_share(self, ds: Array) -> float:
-        """Largest share of ds, at most 1, within the fraction to the boundary of every gap."""
-        below, above = _gaps(self.bounds, self.s)
-        return min(
-            1.0, self._boundary_fraction() * min(_max_share(below, ds), _max_share(above, -ds))
-        )
+    def shift(self, mu: float, targets: Pair) -> Array:
+        """Change of rho, as condensed with mu, where the products aim at targets instead."""
+        change = np.empty_like(self.s)
+        native.shift(*self.arrays, mu, *targets, change)
+        return change
 
-    def moved(self, ds: Array, dzl: Array, dzu: Array, share: float) -> Barrier:
-        """Slacks moved by a share of ds, multipliers as far as they stay positive."""
-        keep = self._boundary_fraction()
-        dual = min(1.0, keep * min(_max_share(self.zl, dzl), _max_share(self.zu, dzu)))
-        zl, zu = self.zl + dual * dzl, self.zu + dual * dzu
-        return dataclasses.replace(self.with_slacks(ds, share), zl=zl, zu=zu)._clipped()
+    def aim(self, y: Array, dy: Array, targets: Pair) -> Direction:
+        """The Newton direction that belongs to a change dy, with products that aim at targets."""
+        ds, dzl, dzu = (np.empty_like(y) for _ in range(3))
+        limits = SLACK_MATCHED, self.boundary_fraction
+        ends = native.aim(*self.arrays, y, dy, *targets, *limits, ds, dzl, dzu)
+        return Direction(dy, ds, dzl, dzu, *ends)
 
-    def with_slacks(self, ds: Array, share: float) -> Barrier:
-        """Slacks moved by a share of ds, each within the fraction to the boundary."""
-        below, above = _gaps(self.bounds, self.s)
-        keep = self._boundary_fraction()
-        step = np.clip(share * ds, -keep * below, keep * above)
-        return dataclasses.replace(self, s=self.s + step)
+    def mean_product(self, along: Direction | None = None) -> float:
+        """The mean product of multipliers and gaps, here or after a direction's longest shares."""
+        if along is None:
+            still = np.zeros_like(self.s)
+            return native.mean_product(*self.arrays, still, still, still, 0.0, 0.0)
+        d = along
+        return native.mean_product(*self.arrays, d.ds, d.dzl, d.dzu, d.primal, d.dual)
 
-    def with_reset_slacks(self, y: Array, penalty: float) -> Barrier:
-        """s = y wherever y is inside the bounds and the merit function decreases."""
-        below, above = _gaps(self.bounds, y)
-        inside = (below > MIN_GAP) & (above > MIN_GAP)
-        here_below, here_above = _gaps(self.bounds, self.s)
-        here = penalty * np.abs(y - self.s) - self.mu * (_log(here_below) + _log(here_above))
-        there = -self.mu * (_log(np.where(inside, below, 1)) + _log(np.where(inside, above, 1)))
-        s = np.where(inside & (there < here), y, self.s)
-        return dataclasses.replace(self, s=s)._clipped()
+    def corrected_targets(self, y: Array, of: Direction, mu: float) -> Pair:
+        """Targets at which a direction's second-order terms leave the products at mu."""
+        lower, upper = np.empty_like(y), np.empty_like(y)
+        d = (of.ds, of.dzl, of.dzu)
+        native.correct(*self.arrays, y, *d, mu, SLACK_MATCHED, lower, upper)
+        return lower, upper
+
+    def centred_targets(self, y: Array, of: Direction, mu: float, targets: Pair) -> Pair:
+        """Targets that bring outliers among the products nearer to mu, for longer shares."""
+        lower, upper = targets[0].copy(), targets[1].copy()
+        primal, dual = (min(1.0, 1.08 * share + 0.18) for share in (of.primal, of.dual))
+        d = (of.ds, of.dzl, of.dzu)
+        native.centre(*self.arrays, y, *d, primal, dual, mu, SLACK_MATCHED, lower, upper)
+        return lower, upper
+
+    def merit(self, y: Array, penalty: float, along: Direction, share: float) -> float:
+        """The barrier plus penalty sum weights |y - s| after a share of a direction."""
+        w, d = self.bounds.weights, along
+        keep = self.boundary_fraction
+        return native.merit(*self.arrays, w, y, d.dy, d.ds, share, keep, self.mu, penalty)
+
+    def moved(self, y: Array, along: Direction, share: float, penalty: float) -> Barrier:
+        """Slacks after a share of a direction, multipliers as far as they stay positive.
+
+        y: the outputs there. A slack becomes its output where that is inside the bounds and lowers
+        the merit.
+        """
+        s, zl, zu = (np.empty_like(y) for _ in range(3))
+        keep = self.boundary_fraction
+        dual = min(1.0, keep * along.dual)
+        d = (along.ds, along.dzl, along.dzu)
+        numbers = (share, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
+        native.move(*self.arrays, y, *d, *numbers, s, zl, zu)
+        return dataclasses.replace(self, s=s, zl=zl, zu=zu)
 
     def with_mu(self, mu: float) -> Barrier:
         """The barrier with another mu."""
         return dataclasses.replace(self, mu=mu)
 
     def complementarity(self) -> float:
-        """The largest |z s - mu|."""
-        below, above = _gaps(self.bounds, self.s)
-        has = np.stack([self.bounds.has_lower, self.bounds.has_upper])
-        gaps = np.where(has, np.stack([below, above]), 0.0)
-        products = np.stack([self.zl, self.zu]) * gaps
-        return float(np.max(np.abs(products - self.mu), where=has, initial=0.0))
+        """The largest |z gap - mu|."""
+        return native.largest_miss(*self.arrays, self.mu)
 
-    def _boundary_fraction(self) -> float:
+    @property
+    def boundary_fraction(self) -> float:
+        """Largest share of a gap that one step takes."""
         return max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale)
 
     def _clipped(self) -> Barrier:
@@ -163,22 +251,6 @@ class Barrier:
         return dataclasses.replace(self, zl=zl, zu=zu)
 
 
-def _gaps(bounds: Bounds, s: Array) -> tuple[Array, Array]:
-    """(s - lower, upper - s), at least MIN_GAP; infinite where there is no bound."""
-    return np.maximum(s - bounds.lower, MIN_GAP), np.maximum(bounds.upper - s, MIN_GAP)
-
-
-def _interior(bounds: Bounds, share: float) -> tuple[Array, Array]:
-    return bounds.lower + share, bounds.upper - share
-
-
-def _log(gap: Array) -> Array:
-    """log of a gap; 0 where there is no bound."""
-    return np.asarray(np.log(np.where(np.isfinite(gap), gap, 1.0)))
-
-
-def _max_share(gap: Array, change: Array) -> float:
-    """Largest share of a change that keeps all gaps nonnegative."""
-    falling = change < 0
-    ratio = np.where(falling, gap, np.inf) / np.where(falling, -change, 1.0)
-    return float(ratio.min(initial=np.inf))
+def _gaps(bounds: Bounds, s: Array) -> Pair:
+    """(s - lower, upper - s), at least the rounding unit; infinite where there is no bound."""
+    return np.maximum(s - bounds.lower, 1e-16), np.maximum(bounds.upper - s, 1e-16)

@@ -7,134 +7,69 @@ initial point may violate every bound. With zl, zu the multipliers of s, Newton'
 
 condenses into the block system of the unconstrained problem: per output the Hessian gains
 sigma = z_l/(s-l) + z_u/(u-s), and the gradient rho = mu/(u-s) - mu/(s-l) + sigma (y - s).
-Progress is measured by the action, the logarithmic barrier and an exact penalty of |y - s|; the
-model keeps the barrier as it is and linearises y alone. [WaechterBiegler2006; NocedalWright2006,
-chapter 19]
+
+Where the model is convex, a step that aims at mu = 0 predicts how far mu can fall, its second-order
+terms are corrected, and so are outliers among the products z gap, all with one factorisation
+[Mehrotra1992; Gondzio1996]. Progress is measured by the action, the logarithmic barrier and an
+exact penalty of |y - s|; the model keeps the barrier as it is and linearises y alone. Where such a
+step fails, mu stays until its problem is solved. [WaechterBiegler2006; NocedalWright2006, chapter
+19]
+
+An objective may replace outputs by looser ones as mu falls: bounds that hold at all times are
+imposed on outputs close to the motion, the closer the smaller mu.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from hovi.optimize.barrier import Barrier, Bounds
-from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.trust_region import (
-    Iteration,
-    Options,
-    Stop,
-    Trial,
-    decrease_ratio,
-    next_radius,
-    next_shift,
-    solve_subproblem,
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.bounded_objective import (
+    FEASIBILITY_TOLERANCE,
+    BoundedObjective,
+    BoundedOutcome,
 )
+from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.step_control import decrease_ratio, next_radius, next_shift
+from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
-Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
 INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
-FINAL_MU = 1e-10
-"""Last barrier parameter, relative to the mean density of the objective."""
-STEP_FRACTIONS = np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.05, 0.02, 0.01, 1e-3])
-"""Candidate fractions of the longest step inside the bounds; the model chooses among them."""
+WHOLE_STEP = 0.9
+"""Share of a step above which it may be the last."""
+FIRST_REFINEMENT = 1e-2
+"""Mean product z gap, relative to the mean density, below which outputs are first refined."""
+NEXT_REFINEMENT = 0.1
+"""The next one, relative to the last."""
+MAX_REFINEMENTS = 40
+"""Maximum number of refinements."""
+SHORT_SHARE = 0.1
+"""Share of a step at the radius below which it was too long for the bounds that cut it."""
+MATCHED = 1e-4
+"""Largest |y - s| at which the radius follows such steps."""
+CUT_RADIUS = 10.0
+"""The largest radius after such a step, relative to what was left of it."""
+LEAST_CUT_RADIUS = 1e-3
+"""The least radius after such a step."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
-FEASIBILITY_TOLERANCE = 1e-8
-"""Largest |y - s| of a solution, relative to the range of a bound."""
-SLACK_MATCHED = 1e-9
-"""Largest |y - s| at which the slack has reached its output and limits the length of a step."""
+MAX_FORCE = 1e12
+"""Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
-
-
-@dataclass(frozen=True, eq=False)
-class Outputs:
-    """The objective and the bounded outputs at a point.
-
-    value: the objective. y: outputs in units of their ranges, shape (P, K).
-    """
-
-    value: float
-    y: Array
-
-
-class BoundedObjective(ABC, Generic[X]):
-    """An objective with bounded outputs at weighted points."""
-
-    bounds: Bounds
-
-    @abstractmethod
-    def outputs(self, x: X) -> Outputs:
-        """The objective and the outputs at x."""
-
-    @abstractmethod
-    def model(self, x: X, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
-        """The objective's quadratic model plus sum of weights (rho dy + sigma dy^2/2).
-
-        multipliers: weights of the outputs' curvature, shape (P, K).
-        """
-
-    @abstractmethod
-    def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
-        """First-order change of the objective and of the outputs in a step of the model."""
-
-    @abstractmethod
-    def apply_fraction(self, fraction: float) -> None:
-        """Apply a fraction of the last step of `linear_outputs` to lifted variables, if any."""
-
-    @abstractmethod
-    def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
-        """The point that a step of a model leads to."""
-
-
-@dataclass(eq=False)
-class BoundedOutcome(Generic[X]):
-    """The final point, its multipliers, and why the iteration ended.
-
-    violation: |y - s| at the end, shape (P, K), in units of the ranges.
-    """
-
-    x: X
-    outputs: Outputs
-    barrier: Barrier
-    stop: Stop
-    iterations: int = 0
-    history: list[Iteration] = field(default_factory=list)
-    model: QuadraticModel | None = None
-
-    @property
-    def violation(self) -> Array:
-        """|y - s|, shape (P, K)."""
-        return np.abs(self.outputs.y - self.barrier.s)
-
-    @property
-    def feasible(self) -> bool:
-        """Whether the outputs equal their slacks to tolerance, and so satisfy the bounds."""
-        return bool(self.violation.max(initial=0.0) <= FEASIBILITY_TOLERANCE)
-
-
-@dataclass(frozen=True, eq=False)
-class _Step:
-    """A step of the primal-dual system, shortened such that the slacks stay inside.
-
-    fraction: share of the trial step taken. decrease: predicted decrease of the merit function.
-    """
-
-    trial: Trial
-    fraction: float
-    ds: Array
-    dzl: Array
-    dzu: Array
-    decrease: float
+MAX_SLOW_STEPS = 40
+"""Steps after which it ends as diverged if |y - s| is still large and has hardly fallen."""
+SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
+"""The least relative decrease of |y - s| in these steps, and the |y - s| above which it counts."""
 
 
 def minimize_bounded(
@@ -143,13 +78,15 @@ def minimize_bounded(
     options: Options,
     report: Callable[[int, float], None] | None = None,
     start: Barrier | None = None,
+    plain: bool = False,
 ) -> BoundedOutcome[X]:
     """Minimise from x, which may violate the bounds; Ctrl-C ends it with the current point.
 
     start: slacks and multipliers of a nearby solution, for a warm start.
+    plain: take plain steps alone, each mu until its problem is solved: slower, and more robust.
     """
     outputs = objective.outputs(x)
-    density = abs(outputs.value) / float(np.sum(objective.bounds.weights))
+    density = abs(outputs.value) / objective.bounds.measure
     if density < DENSITY_FLOOR:
         density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
@@ -157,11 +94,13 @@ def minimize_bounded(
     if not np.isfinite(outputs.value):
         outcome.stop = Stop.DIVERGED
         return outcome
+    outcome.keep_best(objective.bounds)
     try:
         with Deadline(options.time_limit).in_force():
-            _Iteration(objective, outcome, options, density, report).run()
+            _Iteration(objective, outcome, options, density, report, plain).run()
     except OutOfTimeError:
         outcome.stop = Stop.TIME_LIMIT
+        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
     except KeyboardInterrupt:
         record_interrupt()
         outcome.stop = Stop.INTERRUPTED
@@ -170,18 +109,8 @@ def minimize_bounded(
     return outcome
 
 
-def _until_falling(decrease: Callable[[float], float], shares: Array) -> list[float]:
-    """The decreases of descending shares, up to the second in a row that is smaller."""
-    known: list[float] = []
-    for share in shares:
-        known.append(decrease(float(share)))
-        if len(known) > 2 and known[-1] < known[-2] < known[-3]:
-            break
-    return known
-
-
-class _Iteration(Generic[X]):
-    """The main loop: solve a subproblem, accept or reject its step, reduce mu when converged."""
+class _Iteration(BoundedSteps[X]):
+    """The main loop: solve a subproblem, accept or reject its step, reduce mu."""
 
     def __init__(
         self,
@@ -190,123 +119,106 @@ class _Iteration(Generic[X]):
         options: Options,
         density: float,
         report: Callable[[int, float], None] | None,
+        plain: bool,
     ) -> None:
-        self.objective = objective
-        self.outcome = outcome
-        self.options = options
-        self.density = density
+        super().__init__(objective, outcome, options, density)
+        self.plain = self.cautious = plain
         self.report = report
-        self.radius = options.radius
-        self.shift = 0.0
-        self.penalty = 0.0
         self.stalled = 0
+        self.violations: list[float] = []
+        self.level = FIRST_REFINEMENT
+        self.refinements = 0
+        self.marks = outcome.marks
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
         raise_if_interrupted()
         raise_if_late()
-        model = self._model()
+        model = self.model()
         while self.outcome.iterations < self.options.max_iterations:
             raise_if_interrupted()
             raise_if_late()
-            step = self._step(model)
+            step = self.step(model)
             accepted = self._try(step, model)
-            if accepted and self._reduce_mu(step):
+            if accepted and self._finished(step) and not self._refined(at_end=True):
                 self.outcome.stop = Stop.STATIONARY
-                self.outcome.model = self._model()
+                self.outcome.model = self.model()
                 return
-            if self.stalled >= MAX_STALLED_STEPS:
+            if self._is_hopeless():
                 self.outcome.stop = Stop.DIVERGED
                 return
             if accepted:
-                model = self._model()
+                self._refined(at_end=False)
+                model = self.model()
 
-    def _model(self) -> QuadraticModel:
-        outcome, barrier = self.outcome, self.outcome.barrier
-        residual = outcome.outputs.y - barrier.s
-        return self.objective.model(
-            outcome.x,
-            barrier.sigma,
-            barrier.gradient + barrier.sigma * residual,
-            barrier.multipliers,
-        )
-
-    def _step(self, model: QuadraticModel) -> _Step:
-        barrier = self.outcome.barrier
-        weights = self.objective.bounds.weights
-        residual = self.outcome.outputs.y - barrier.s
-        trial = solve_subproblem(model, self.radius, self.shift)
-        slope, dy = self.objective.linear_outputs(trial.step, model)
-        ds = dy + residual
-        dzl, dzu = barrier.dual_step(ds)
-        if np.max(np.abs(residual)) > 1e-12:
-            largest = float(np.max(np.abs(barrier.multipliers + dzu - dzl)))
-            self.penalty = max(self.penalty, 1.2 * largest)
-        square = -float(np.vdot(model.gradient, trial.step)) - trial.shift * trial.norm**2
-        square -= float(np.sum(weights * barrier.sigma * dy**2))
-        y = self.outcome.outputs.y
-        matched = np.abs(residual) <= SLACK_MATCHED
-        before = barrier.merit(weights, y, self.penalty)
-
-        def decrease(share: float) -> float:
-            smooth = share * slope + 0.5 * share**2 * square
-            after = barrier.with_slacks(ds, share).merit(weights, y + share * dy, self.penalty)
-            return before - after - smooth
-
-        shares = barrier.max_share(np.where(matched, ds, 0.0)) * STEP_FRACTIONS
-        decreases = np.array(_until_falling(decrease, shares))
-        # the largest share whose decrease equals the best up to rounding
-        noise = 1e-13 * self._scale()
-        best = int(np.argmax(decreases >= np.max(decreases) - noise))
-        return _Step(trial, float(shares[best]), ds, dzl, dzu, float(decreases[best]))
-
-    def _try(self, step: _Step, model: QuadraticModel) -> bool:
-        outcome, barrier = self.outcome, self.outcome.barrier
-        weights = self.objective.bounds.weights
-        x = self.objective.retract(outcome.x, step.fraction * step.trial.step, model)
+    def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
+        outcome, trial, along = self.outcome, step.trial, step.along
+        barrier = outcome.barrier.with_mu(step.mu)
+        moved_step = step.share * trial.step
+        x = self.objective.retract(outcome.x, moved_step, model)
         outputs = self.objective.outputs(x)
-        moved = barrier.moved(step.ds, step.dzl, step.dzu, step.fraction)
-        moved = moved.with_reset_slacks(outputs.y, self.penalty)
-        old = outcome.outputs.value + barrier.merit(weights, outcome.outputs.y, self.penalty)
-        new = outputs.value + moved.merit(weights, outputs.y, self.penalty)
-        ratio = decrease_ratio(old - new, step.decrease, 1e-13 * abs(old))
+        old = outcome.outputs.value + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
+        new, moved = math.inf, barrier
+        if np.isfinite(outputs.value):
+            moved = barrier.moved(outputs.y, along, step.share, self.penalty)
+            new = outputs.value + moved.merit(outputs.y, self.penalty, along, 0.0)
+        ratio = decrease_ratio(old - new, step.decrease, self.noise)
         outcome.iterations += 1
-        trial = step.trial
         outcome.history.append(
             Iteration(outputs.value, step.decrease, ratio, trial.shift, self.radius)
         )
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
-        length = trial.norm * step.fraction
-        radius = next_radius(self.radius, length, ratio)
+        length = trial.norm * step.share
+        before, radius = self.radius, next_radius(self.radius, length, ratio)
+        matched = outcome.violation.max(initial=0.0) <= MATCHED
+        if matched and not trial.newton and step.share < SHORT_SHARE:
+            radius = min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
         stalled = ratio <= 1e-4 or (length < 1e-4 * max(1.0, radius) and not outcome.feasible)
         self.stalled = self.stalled + 1 if stalled else 0
         if ratio <= 1e-4:
+            if not self.cautious:  # the same again, as a plain step
+                self.radius = before
+            self.cautious = True
             return False
-        self.objective.apply_fraction(step.fraction)
+        self.objective.accept(moved_step, model)
         outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
+        outcome.keep_best(self.objective.bounds)
+        if self.cautious:
+            self._reduce_mu(step)
+        self.cautious = self.plain
+        self.product = outcome.barrier.mean_product()
+        self.violations.append(float(outcome.violation.max(initial=0.0)))
+        if not self.marks or self.product < 0.5 * self.marks[-1][0]:
+            self.marks.append((self.product, x))
         return True
 
-    def _scale(self) -> float:
-        """Magnitude of the objective, to which decreases are relative; positive."""
-        total = float(np.sum(self.objective.bounds.weights))
-        return max(abs(self.outcome.outputs.value), FINAL_MU * self.density * total)
+    def _is_hopeless(self) -> bool:
+        """Whether the bounds seem impossible to meet from here."""
+        slow = False
+        if len(self.violations) > MAX_SLOW_STEPS:
+            before, now = self.violations[-MAX_SLOW_STEPS - 1], self.violations[-1]
+            slow = now > max(LARGE_VIOLATION, (1 - SLOW_DECREASE) * before)
+        stalled = self.stalled >= MAX_STALLED_STEPS
+        return stalled or slow or self.penalty > MAX_FORCE * self.density
 
-    def _reduce_mu(self, step: _Step) -> bool:
-        """Reduce mu once its problem is solved; True once the last one is."""
+    def _finished(self, step: BoundedStep) -> bool:
+        """Whether the last step was a whole one of the last mu, and predicted next to nothing."""
+        whole = step.trial.newton and step.share >= WHOLE_STEP and self.outcome.feasible
+        small = step.decrease <= self.options.decrease * self.scale()
+        last = step.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
+        enough = step.remaining <= self.options.enough * self.scale() and self.outcome.feasible
+        return last and ((whole and small) or (step.trial.newton and enough))
+
+    def _reduce_mu(self, step: BoundedStep) -> None:
+        """Reduce mu after a plain step once its problem is solved."""
         outcome, barrier = self.outcome, self.outcome.barrier
-        total = float(np.sum(self.objective.bounds.weights))
-        last = FINAL_MU * self.density
-        newton = step.trial.newton and step.fraction == 1.0
-        scale = self._scale()
-        if barrier.mu <= last:
-            return newton and outcome.feasible and step.decrease <= self.options.decrease * scale
-        share = barrier.mu / self.density
+        last, share = self.final_mu, barrier.mu / self.density
         solved = (
             step.trial.newton
-            and step.decrease <= 10 * barrier.mu * total
+            and step.decrease <= 10 * barrier.mu * self._measure
             and outcome.violation.max(initial=0.0) <= max(FEASIBILITY_TOLERANCE, 0.1 * share)
             and barrier.complementarity() <= 10 * barrier.mu
         )
@@ -314,4 +226,26 @@ class _Iteration(Generic[X]):
             mu = max(last, min(0.1 * barrier.mu, self.density * share**1.5))
             outcome.barrier = barrier.with_mu(mu)
             self.penalty = 0.0
-        return False
+
+    def _refined(self, at_end: bool) -> bool:
+        """Whether outputs were replaced by others, which bound less."""
+        level, outcome = self.product / self.density, self.outcome
+        early = level > self.level or outcome.violation.max(initial=0.0) > level
+        if self.refinements >= MAX_REFINEMENTS or (early and not at_end):
+            return False
+        self.level = NEXT_REFINEMENT * min(level, self.level)
+        found = self.objective.refine(outcome.x, level)
+        if found is None:
+            return False
+        self.refinements += 1
+        outcome.outputs = self.objective.outputs(outcome.x)
+        barrier = outcome.barrier.refined(
+            self.objective.bounds, outcome.outputs.y, found.kept, found.origin
+        )
+        self.product = barrier.mean_product()
+        outcome.barrier = barrier.with_mu(max(barrier.mu, self.product))
+        self.penalty, self.radius = 0.0, max(self.radius, 1.0)
+        if outcome.kept is not None:
+            kept, _ = outcome.kept
+            outcome.kept = kept, self.objective.outputs(kept)
+        return True

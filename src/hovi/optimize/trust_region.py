@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.optimize.step_control import decrease_ratio, next_radius, next_shift
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
@@ -83,6 +84,9 @@ class Options:
     exact: stop only after a Newton step of an exact model, one not updated from an earlier model,
         after which only rounding errors remain.
     near: whether the first iterate is near a solution, so that a barrier begins small.
+    barrier: last barrier parameter, relative to the mean density of the objective.
+    enough: with a barrier, stop within the bounds where a whole Newton step predicts a smaller
+        decrease, relative to the value, even if it would be cut short.
     """
 
     decrease: float = 1e-11
@@ -93,6 +97,8 @@ class Options:
     escape_saddles: bool = True
     exact: bool = False
     near: bool = False
+    barrier: float = 1e-10
+    enough: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -141,6 +147,7 @@ class Trial(NamedTuple):
     shift: float
     norm: float
     along_negative_curvature: bool = False
+    factor: Factor | None = None
 
     @property
     def newton(self) -> bool:
@@ -258,34 +265,6 @@ def _is_last(
     return before < math.inf and decrease * (decrease / before) ** 2 <= REMAINING_DECREASE * size
 
 
-def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
-    """Actual over predicted decrease; 1 where both are rounding noise, -1 where not finite."""
-    if not math.isfinite(actual):
-        return -1.0
-    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
-        return 1.0
-    return actual / predicted if predicted > 0 else -1.0
-
-
-def next_shift(shift: float, norm: float, radius: float) -> float:
-    """Initial shift for a new radius: it decreases slightly faster than the radius grows."""
-    return float(shift * (norm / radius) ** 1.2)
-
-
-def next_radius(radius: float, norm: float, ratio: float) -> float:
-    """The radius after a step: larger where the model was good and the radius limited the step.
-
-    Where the model failed: the minimum of a parabola along the step, within bounds.
-    norm: length of the step. ratio: actual over predicted decrease.
-    """
-    if ratio < 0.25:
-        share = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
-        return max(0.25, share) * min(radius, norm)
-    if ratio > 0.75 and norm > 0.7 * radius:
-        return (2.0 if ratio > 0.9 else 1.4) * radius
-    return radius
-
-
 def solve_subproblem(model: QuadraticModel, radius: float, guess: float) -> Trial:
     """A step with |s| within a quarter of the radius, or a shorter Newton step.
 
@@ -340,7 +319,7 @@ class _ShiftSearch:
         decrease = -0.5 * slope + 0.5 * shift * norm2
         if not math.isfinite(decrease) or (decrease == 0.0 and self.model.gradient.any()):
             raise ArithmeticError("the model has non-finite entries")
-        return Trial(s, decrease, shift, math.sqrt(norm2))
+        return Trial(s, decrease, shift, math.sqrt(norm2), factor=factor)
 
     def after_step(self, factor: Factor, trial: Trial) -> float:
         """The next shift after a step that is too long or too short."""
@@ -350,9 +329,10 @@ class _ShiftSearch:
             self.low = max(self.low, shift)
         else:
             self.high = min(self.high, shift)
-        newton = shift
-        if slope > 0:
-            newton = shift + trial.norm**2 / slope * (trial.norm - self.radius) / self.radius
+        more = (
+            trial.norm**2 / slope * (trial.norm - self.radius) / self.radius if slope > 0 else 0.0
+        )
+        newton = shift + more
         if self.low < newton < self.high:
             return newton
         if trial.norm < self.radius and not self.indefinite and self.low == 0.0:

@@ -54,8 +54,8 @@ def _headline(name: str, model: pin.Model, source: RobotSource) -> str:
 
 
 def _held_followers(source: RobotSource) -> dict[str, float]:
-    """Followers of fixed joints, which are fixed at their offset."""
-    held = held_values(couplings_in(source), source.locked)
+    """Followers of fixed joints, which are fixed, too."""
+    held = held_values(couplings_in(source), source.held)
     return {name: value for name, value in held.items() if name not in source.locked}
 
 
@@ -87,7 +87,8 @@ def _place(model: pin.Model, source: RobotSource, tips: Sequence[str]) -> str:
     if source.kind == "model":
         floats = model.njoints > 1 and kind_of(model.joints[1]) is FLOATING
         base = FLOATING.label if floats else "fixed"
-    locked = f"; locked: {', '.join(source.locked)}" if source.locked else ""
+    joints = [f"{name} at {at:g}" if at else name for name, at in source.held.items()]
+    locked = f"; locked: {', '.join(joints)}" if joints else ""
     ends = f"Tip frame{'' if len(tips) == 1 else 's'}: {', '.join(tips)}"
     return f"Base: {base}{locked}. {ends} ({_count(model.nframes, 'frame')})."
 

@@ -60,7 +60,7 @@ def load_shapes(source: RobotSource, kind: str) -> Shapes:
             reason = one_line(error)
             return Shapes(None, f"{kind} shapes of {source.reference!r} cannot be read: {reason}.")
     problems += remove_unusable_shapes(geometry, model)
-    _, (geometry,) = locked_and_coupled(model, [geometry], source.locked, couplings_in(source))
+    _, (geometry,) = locked_and_coupled(model, [geometry], source.held, couplings_in(source))
     problem = _sentence(source, kind, problems)
     return Shapes(geometry if geometry.ngeoms or not problems else None, problem)
 

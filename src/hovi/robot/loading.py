@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,13 +10,19 @@ from typing import Any
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import is_number
 from hovi.errors import InputError, ModelError, expect
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.robot.mimic_model import Coupling
+from hovi.robot.mimic_tags import held_values, read_couplings
 from hovi.robot.model import build_full_model, build_model, locked_model
 from hovi.robot.robot import Robot
-from hovi.robot.source import RobotSource, text_hash
+from hovi.robot.source import MAX_POSITION, RobotSource, text_hash
 from hovi.robot.srdf import read_srdf_file
 from hovi.robot.urdf.check import MAX_DOF, read_urdf
+
+Locked = tuple[str, ...] | Mapping[str, float]
+"""Joints at their neutral configuration, or their positions in [rad] or [m] by name."""
 
 
 def is_path(text: str) -> bool:
@@ -40,7 +46,7 @@ def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
 def file_source(
     path: Path,
     package_dirs: tuple[str, ...],
-    locked: tuple[str, ...],
+    locked: Locked,
     free_flyer: bool,
     srdf: Path | None = None,
     mimic: bool = False,
@@ -53,7 +59,7 @@ def file_source(
         urdf=text,
         sha256=text_hash(text),
         package_dirs=package_dirs,
-        locked=locked,
+        **_held(locked, text, path.name),
         free_flyer=free_flyer,
         folder=str(path.parent.absolute()),
         srdf=None if srdf is None else read_srdf_file(srdf),
@@ -64,7 +70,7 @@ def file_source(
 def example_source(
     name: str,
     package_dirs: tuple[str, ...],
-    locked: tuple[str, ...],
+    locked: Locked,
     free_flyer: bool | None,
     srdf: Path | None = None,
     mimic: bool = False,
@@ -79,7 +85,7 @@ def example_source(
         urdf=text,
         sha256=text_hash(text),
         package_dirs=package_dirs,
-        locked=locked,
+        **_held(locked, text, name),
         free_flyer=example.free_flyer if free_flyer is None else free_flyer,
         srdf=None if semantics is None else read_srdf_file(semantics),
         mimic=mimic,
@@ -89,13 +95,46 @@ def example_source(
     return replace(source, armature=rotor_armature(build_full_model(source), example.srdf))
 
 
+def _checked(locked: Any) -> Locked:
+    """Names of joints, or their positions by name. Raises InputError for anything else."""
+    if not isinstance(locked, Mapping):
+        return as_names(locked)
+    for name, at in locked.items():
+        if not isinstance(name, str) or not is_number(at) or not abs(at) <= MAX_POSITION:
+            raise InputError(
+                "locked must map names of joints to their positions in rad or m, got "
+                f"{name!r}: {at!r}."
+            )
+    return {name: float(at) for name, at in locked.items()}
+
+
+def _held(locked: Locked, urdf: str = "", name: str = "") -> dict[str, Any]:
+    """The fields of a source for locked joints, with the followers of those with a position.
+
+    urdf, name: the text of a URDF with <mimic> tags, and its name for messages.
+    """
+    if not isinstance(locked, Mapping):
+        return {"locked": locked}
+    held = dict(locked)
+    if urdf:
+        held = held_values(_led(urdf, name, held), held)
+    at = tuple(held.values())
+    return {"locked": tuple(held), "locked_at": at if any(at) else ()}
+
+
+def _led(urdf: str, name: str, held: Mapping[str, float]) -> list[Coupling]:
+    """The couplings to locked joints."""
+    couplings = read_couplings(urdf, name, tuple(held))
+    return [coupling for coupling in couplings if coupling.leader in held]
+
+
 @check_arguments_except("x", "mimic", "free_flyer", "locked", "package_dirs")
 def load_robot(
     x: str | Path | pin.Model,
     *,
     package_dirs: Iterable[str | Path] = (),
     free_flyer: bool | None = None,
-    locked: Iterable[str] = (),
+    locked: Iterable[str] | Mapping[str, float] = (),
     visual: pin.GeometryModel | None = None,
     collision: pin.GeometryModel | None = None,
     srdf: str | Path | None = None,
@@ -107,7 +146,9 @@ def load_robot(
         pinocchio.Model, which is copied. A string with a separator or ending in .urdf is a path.
     package_dirs: folders in which `package://` meshes are looked up.
     free_flyer: whether the base floats; by default it is fixed, or as the example's loader says.
-    locked: joints to fix at the neutral configuration, or a single name.
+    locked: joints to fix at the neutral configuration, or a single name; or a mapping from joints
+        to the positions at which they are fixed, in [rad] or [m], whose followers by <mimic> tags
+        are fixed where they follow them.
     visual, collision: geometry of a pinocchio.Model.
     srdf: path of an SRDF with named poses; by default an example robot uses its own.
     mimic: whether joints with a <mimic> tag follow their leaders, without coordinates of their own
@@ -117,28 +158,45 @@ def load_robot(
     """
     expect(mimic, bool, "mimic=True or mimic=False")
     expect(False if free_flyer is None else free_flyer, bool, "free_flyer=True or free_flyer=False")
-    names = as_names(locked)
+    held = _checked(locked)
     folders = tuple(str(Path(folder).absolute()) for folder in as_names(package_dirs))
     semantics = None if srdf is None else Path(srdf)
     if isinstance(x, pin.Model):
-        return _from_model(x, x.name, names, (visual, collision), semantics)
+        return _from_model(x, x.name, held, (visual, collision), semantics)
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
     if isinstance(x, Path) or is_path(x):
-        source = file_source(Path(x), folders, names, bool(free_flyer), semantics, mimic)
+        source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic)
     elif x in BUILT_IN_CODE:
         model, *shapes = build_in_code(x)
-        return _from_model(model, x, names, (shapes[0], shapes[1]), semantics)
+        return _from_model(model, x, held, (shapes[0], shapes[1]), semantics)
     else:
-        source = example_source(x, folders, names, free_flyer, semantics, mimic)
+        source = example_source(x, folders, held, free_flyer, semantics, mimic)
     model = build_model(source)
     return Robot(source.reference if source.kind == "example" else model.name, model, source)
+
+
+def with_locked(robot: Robot, positions: Mapping[str, float]) -> Robot:
+    """A robot with more of its joints locked, at positions in [rad] or [m] by name.
+
+    Raises ModelError for an unknown joint, or a position that it cannot have.
+    """
+    source = robot.source
+    held = source.held | dict(positions)
+    source = replace(source, locked=tuple(held), locked_at=tuple(held.values()))
+    if source.urdf is not None:
+        return Robot(robot.name, build_model(source), source)
+    given = [shape.copy() for shape in robot.given if shape is not None]
+    model, shapes = locked_model(robot.model.copy(), given, positions)
+    queue = iter(shapes)
+    kept = [None if shape is None else next(queue) for shape in robot.given]
+    return Robot(robot.name, model, source, (kept[0], kept[1]))
 
 
 def _from_model(
     model: pin.Model,
     name: str,
-    locked: tuple[str, ...],
+    locked: Locked,
     given: tuple[pin.GeometryModel | None, pin.GeometryModel | None],
     srdf: Path | None = None,
 ) -> Robot:
@@ -148,9 +206,10 @@ def _from_model(
             "accepted: lock joints with pinocchio.buildReducedModel first."
         )
     shapes = [shape.copy() for shape in given if shape is not None]
-    reduced, shapes = locked_model(model.copy(), shapes, locked)
+    held = locked if isinstance(locked, Mapping) else dict.fromkeys(locked, 0.0)
+    reduced, shapes = locked_model(model.copy(), shapes, held)
     queue = iter(shapes)
     kept = [None if shape is None else next(queue) for shape in given]
     text = None if srdf is None else read_srdf_file(srdf)
-    source = RobotSource(kind="model", reference=name, locked=locked, srdf=text)
+    source = RobotSource(kind="model", reference=name, **_held(locked), srdf=text)
     return Robot(name, reduced, source, (kept[0], kept[1]))

@@ -63,12 +63,13 @@ def _resolved(coupling: Coupling, following: Mapping[str, Coupling]) -> Coupling
     raise ModelError(f"joint {coupling.follower!r} mimics itself through others: break that cycle.")
 
 
-def held_values(couplings: Iterable[Coupling], locked: Sequence[str]) -> dict[str, float]:
-    """Positions of fixed joints: 0 for locked ones, the offset for their followers."""
-    held = dict.fromkeys(locked, 0.0)
+def held_values(couplings: Iterable[Coupling], locked: Mapping[str, float]) -> dict[str, float]:
+    """Positions of fixed joints: of the locked ones, and of their followers, which follow them."""
+    held = dict(locked)
     for coupling in couplings:
         if coupling.leader == "" or coupling.leader in locked:
-            held.setdefault(coupling.follower, coupling.offset)
+            at = locked.get(coupling.leader, 0.0)
+            held.setdefault(coupling.follower, coupling.multiplier * at + coupling.offset)
     return held
 
 

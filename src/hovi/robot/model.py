@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ from hovi.robot.source import RobotSource
 from hovi.robot.urdf.normalize import plain_urdf
 
 Array = npt.NDArray[np.float64]
+
+POSITION_TOLERANCE = 1e-9
+"""Distance by which a joint may be locked outside its range, in [rad] or [m]."""
 
 
 def build_full_model(source: RobotSource) -> pin.Model:
@@ -43,7 +46,7 @@ def build_full_model(source: RobotSource) -> pin.Model:
             "rename that joint, or load the robot without free_flyer."
         )
     model = _with_armature(model, source.armature)
-    return leaders_first(model, _moving(couplings_in(source), source.locked))
+    return leaders_first(model, _moving(couplings_in(source), source.held))
 
 
 def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
@@ -56,20 +59,21 @@ def couplings_in(source: RobotSource) -> tuple[Coupling, ...]:
 def build_model(source: RobotSource) -> pin.Model:
     """The model of a source, without locked joints, mimic joints coupled. Raises ModelError."""
     model = build_full_model(source)
-    return locked_and_coupled(model, None, source.locked, couplings_in(source))[0]
+    return locked_and_coupled(model, None, source.held, couplings_in(source))[0]
 
 
 def locked_and_coupled(
     model: pin.Model,
     geometry: list[pin.GeometryModel] | None,
-    locked: Sequence[str],
+    locked: Mapping[str, float],
     couplings: Sequence[Coupling] = (),
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
     """Model and geometry with some joints locked and the others coupled.
 
-    The `locked` joints are fixed at the neutral configuration, and their followers at the offset.
+    locked: positions of the joints to fix, in [rad] or [m]; their followers are fixed, too.
+    Raises ModelError for an unknown joint, or a position that it cannot have.
     """
-    joint_ids(model, locked)
+    _check_positions(model, locked)
     shapes = list(geometry or [])
     held = held_values(couplings, locked)
     if held:
@@ -116,8 +120,28 @@ def with_distinct_frames(model: pin.Model) -> tuple[pin.Model, dict[str, str]]:
     return copy, original
 
 
+def _check_positions(model: pin.Model, locked: Mapping[str, float]) -> None:
+    for index, (name, at) in zip(joint_ids(model, locked), locked.items(), strict=True):
+        joint = model.joints[index]
+        if at and joint.nv != 1:
+            raise ModelError(
+                f"joint {name!r} has {joint.nv} degrees of freedom and can be locked at its "
+                "neutral position only: give its name, or 0."
+            )
+        if not at or joint.nq != 1:
+            continue
+        lower, upper = (
+            float(bound[joint.idx_q])
+            for bound in (model.lowerPositionLimit, model.upperPositionLimit)
+        )
+        if lower < upper and not lower - POSITION_TOLERANCE <= at <= upper + POSITION_TOLERANCE:
+            raise ModelError(
+                f"joint {name!r} cannot be locked at {at:g}: its range is {lower:g} to {upper:g}."
+            )
+
+
 def locked_model(
-    model: pin.Model, geometry: list[pin.GeometryModel], locked: Sequence[str]
+    model: pin.Model, geometry: list[pin.GeometryModel], locked: Mapping[str, float]
 ) -> tuple[pin.Model, list[pin.GeometryModel]]:
     """As `locked_and_coupled`, for a model that has couplings of its own and keeps them."""
     couplings = couplings_of(model) if locked else ()
@@ -126,7 +150,7 @@ def locked_model(
     return locked_and_coupled(model, geometry, locked, couplings)
 
 
-def _moving(couplings: Sequence[Coupling], locked: Sequence[str]) -> tuple[Coupling, ...]:
+def _moving(couplings: Sequence[Coupling], locked: Mapping[str, float]) -> tuple[Coupling, ...]:
     """The couplings whose follower moves."""
     held = held_values(couplings, locked)
     return tuple(coupling for coupling in couplings if coupling.follower not in held)

@@ -324,6 +324,15 @@ class Robot(Coordinates):
         indices = [robot_model.frame_id(self.model, frame) for frame in frames]
         return configuration.frame_positions(self.model, indices, q)
 
+    def frame_pose(self, frame: str, q: Array) -> Array:
+        """Pose of a frame in the world as homogeneous matrices: q (..., nq) -> (..., 4, 4).
+
+        [R p; 0 1] with the frame's axes R and its origin p in [m], as a FrameGoal takes it.
+        Raises InputError for an unknown frame or another shape.
+        """
+        self._check_frame(frame)
+        return configuration.frame_poses(self.model, robot_model.frame_id(self.model, frame), q)
+
     @check_arguments_except("q")
     def check_configuration(self, q: npt.ArrayLike, name: str) -> Array:
         """`q` as a float array (nq,), finite and with unit quaternions and angles.

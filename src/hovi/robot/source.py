@@ -14,6 +14,8 @@ from typing import Any, Literal, get_args
 from hovi.errors import ModelError
 
 SourceKind = Literal["urdf", "example", "model"]
+MAX_POSITION = 1e9
+"""Largest position of a locked joint, in [rad] or [m]."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class RobotSource:
     sha256: of that text in UTF-8, in hexadecimal.
     package_dirs: folders in which `package://` meshes are looked up, none of which holds the files
         of every user.
-    locked: joints fixed at the neutral configuration, which are not part of the model.
+    locked: joints that are fixed, which are not part of the model.
+    locked_at: their positions in [rad] or [m]; 0, the neutral one, for all of them if empty.
     free_flyer: whether the base floats.
     folder: folder of the URDF file, for its meshes; "" if unknown.
     armature: reflected rotor inertia in [kg m^2] by joint, from an example's SRDF.
@@ -41,6 +44,7 @@ class RobotSource:
     sha256: str | None = None
     package_dirs: tuple[str, ...] = ()
     locked: tuple[str, ...] = ()
+    locked_at: tuple[float, ...] = ()
     free_flyer: bool = False
     folder: str = ""
     armature: tuple[tuple[str, float], ...] = ()
@@ -55,6 +59,11 @@ class RobotSource:
                     "meshes could be read from anywhere: name the folder of the packages."
                 )
 
+    @property
+    def held(self) -> dict[str, float]:
+        """The positions of the locked joints by name, in [rad] or [m]."""
+        return dict(zip(self.locked, self.locked_at or (0.0,) * len(self.locked), strict=True))
+
     def to_dict(self) -> dict[str, Any]:
         """A JSON-compatible dictionary without local paths."""
         return {
@@ -63,6 +72,7 @@ class RobotSource:
             "urdf": self.urdf,
             "sha256": self.sha256,
             "locked": list(self.locked),
+            **({"locked_at": list(self.locked_at)} if any(self.locked_at) else {}),
             "free_flyer": self.free_flyer,
             **({"mimic": True} if self.mimic else {}),
             "armature": dict(self.armature),
@@ -83,13 +93,15 @@ class RobotSource:
                 f"the URDF stored with robot {data.get('reference')!r} does not match its own "
                 "sha256: the file was damaged or edited; load the robot again from its URDF."
             )
+        locked = tuple(str(name) for name in _entry(data, "locked", list))
         return cls(
             kind=kind,
             reference=_entry(data, "reference", str),
             urdf=urdf,
             sha256=sha256,
             package_dirs=package_dirs,
-            locked=tuple(str(name) for name in _entry(data, "locked", list)),
+            locked=locked,
+            locked_at=_positions(data.get("locked_at", []), len(locked)),
             free_flyer=_entry(data, "free_flyer", bool),
             armature=_armature(_entry(data, "armature", dict)),
             srdf=None if data.get("srdf") is None else _entry(data, "srdf", str),
@@ -118,6 +130,18 @@ def _is_same(folder: Path, other: Path) -> bool:
 def text_hash(text: str) -> str:
     """The sha256 of a text in UTF-8, in hexadecimal."""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _positions(stored: Any, count: int) -> tuple[float, ...]:
+    numbers = isinstance(stored, list) and all(
+        isinstance(x, int | float) and abs(x) <= MAX_POSITION for x in stored
+    )
+    if not numbers or len(stored) not in (0, count):
+        raise ModelError(
+            f"a stored robot needs {count} positions of locked joints under 'locked_at', or none, "
+            f"not {stored!r}."
+        )
+    return tuple(float(x) for x in stored)
 
 
 def _armature(stored: dict[str, Any]) -> tuple[tuple[str, float], ...]:

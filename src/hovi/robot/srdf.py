@@ -1,8 +1,10 @@
-"""Reads SRDF files: named poses, and pairs of links without collision checking.
+"""Reads SRDF files: groups of joints, named poses, and pairs of links without collision checking.
 
 An SRDF is XML: `<group_state name="ready"><joint name="elbow" value="1.2"/></group_state>` and
-`<disable_collisions link1="hand" link2="finger"/>`. Groups are ignored: states of the same name are
-merged, and joints that they do not list are neutral.
+`<disable_collisions link1="hand" link2="finger"/>`. A group has members `<joint name=""/>`,
+`<link name=""/>` (its own joint), `<chain base_link="" tip_link=""/>` and `<group name=""/>`. The
+groups of states are ignored: states of the same name are merged, and joints that they do not list
+are neutral.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from __future__ import annotations
 import itertools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
@@ -18,13 +20,19 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import ModelError
+from hovi.errors import InputError, ModelError, nearest
+from hovi.robot.model import frame_id
 from hovi.robot.urdf.rules import MAX_MAGNITUDE, is_decimal
 from hovi.system.files import reason, require_file
 
 Array = npt.NDArray[np.float64]
 
 MAX_BYTES = 8_000_000
+_MEMBERS = {
+    **dict.fromkeys(("joint", "link", "group"), ("name",)),
+    "chain": ("base_link", "tip_link"),
+}
+"""The members of a group, and their attributes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +41,43 @@ class Srdf:
 
     states: joint positions by joint and name of the pose, in [rad] or [m].
     disabled: unordered pairs of links that are not checked for collisions.
+    groups: members of every group: ("joint" or "link" or "group", name) or ("chain", base, tip).
     """
 
     states: Mapping[str, Mapping[str, tuple[float, ...]]]
     disabled: frozenset[frozenset[str]]
+    groups: Mapping[str, tuple[tuple[str, ...], ...]] = field(default_factory=dict)
+
+    def joints_of(self, group: str, model: pin.Model) -> tuple[str, ...]:
+        """The joints of a group that a model has, in its order; those that mimic others included.
+
+        Raises InputError for an unknown group, ModelError for an unknown link or a group in itself.
+        """
+        if group not in self.groups:
+            known = (
+                nearest(group, self.groups) if self.groups else "its SRDF, if any, defines none."
+            )
+            raise InputError(f"robot {model.name!r} has no group {group!r}: {known}")
+        found = self._joints_of(group, model, ())
+        return tuple(str(name) for name in list(model.names)[1:] if name in found)
+
+    def _joints_of(self, group: str, model: pin.Model, above: tuple[str, ...]) -> set[str]:
+        if group in above:
+            raise ModelError(f"group {group!r} of the SRDF contains itself: break that cycle.")
+        if group not in self.groups:
+            raise ModelError(f"the SRDF names a group {group!r} that it does not define.")
+        found: set[str] = set()
+        for kind, *names in self.groups[group]:
+            if kind == "group":
+                found |= self._joints_of(names[0], model, (*above, group))
+            elif kind == "joint":
+                found.add(names[0])
+            elif kind == "link":
+                found |= _own_joint(model, names[0], group)
+            else:
+                base, tip = (_supports(model, link, group) for link in names)
+                found |= set(tip) - set(base)
+        return found
 
     def poses(self, model: pin.Model) -> dict[str, Array]:
         """Configurations (nq,) by name: neutral, except for the joints that a state lists.
@@ -80,7 +121,31 @@ def parse_srdf(text: str, name: str = "robot.srdf") -> Srdf:
         frozenset(_attribute(pair, end, name) for end in ("link1", "link2"))
         for pair in root.iterfind("disable_collisions")
     )
-    return Srdf(states, frozenset(pairs))
+    groups = {
+        _attribute(group, "name", name): tuple(
+            (part.tag, *(_attribute(part, key, name) for key in _MEMBERS[part.tag]))
+            for part in group
+            if part.tag in _MEMBERS
+        )
+        for group in root.iterfind("group")
+    }
+    return Srdf(states, frozenset(pairs), groups)
+
+
+def _own_joint(model: pin.Model, link: str, group: str) -> set[str]:
+    """The joint between a link and its parent, if it moves."""
+    _supports(model, link, group)
+    frame = model.frames[frame_id(model, link)]
+    fixed = model.frames[frame.parentFrame].type != pin.JOINT
+    return set() if fixed else {str(model.names[frame.parentJoint])}
+
+
+def _supports(model: pin.Model, link: str, group: str) -> tuple[str, ...]:
+    """The joints between the world and a link. Raises ModelError for an unknown one."""
+    if not any(frame.name == link for frame in model.frames):
+        raise ModelError(f"group {group!r} of the SRDF names link {link!r}, which does not exist.")
+    joint = model.frames[frame_id(model, link)].parentJoint
+    return tuple(str(model.names[index]) for index in list(model.supports[joint])[1:])
 
 
 class _Builder(ElementTree.TreeBuilder):

@@ -10,8 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+import numpy.typing as npt
 import pinocchio as pin
 
+from hovi.robot.mimic_model import couplings_of
 from hovi.robot.model import frame_id
 
 END_EFFECTORS = {
@@ -66,6 +69,17 @@ def is_end_effector_name(frame: str) -> bool:
 def is_moved(model: pin.Model, frame: str) -> bool:
     """Whether there is a joint between the world and a frame."""
     return bool(model.frames[frame_id(model, frame)].parentJoint > 0)
+
+
+def moves_frame(model: pin.Model, frame: str) -> npt.NDArray[np.bool_]:
+    """Which entries of v move a frame, (nv,); for a joint that mimics another, its leader's."""
+    found = np.zeros(model.nv, dtype=bool)
+    leaders = {coupling.follower: coupling.leader for coupling in couplings_of(model)}
+    for joint in list(model.supports[model.frames[frame_id(model, frame)].parentJoint])[1:]:
+        name = str(model.names[joint])
+        member = model.joints[model.getJointId(leaders.get(name, name))]
+        found[member.idx_v : member.idx_v + member.nv] = True
+    return found
 
 
 def names_in_words(frames: Sequence[str]) -> str:

@@ -176,6 +176,41 @@ class Lagrangian(ABC):
         return PointExpansion(value, gradient, hessian, outputs, np.zeros((len(value), 0, size)))
 
 
+class NoCost(Lagrangian):
+    """L = 0 without outputs, on the space of another Lagrangian.
+
+    of: the other one.
+    """
+
+    def __init__(self, of: Lagrangian) -> None:
+        self.of = of
+        self.order = of.order
+
+    @property
+    def nq(self) -> int:
+        """Length of a configuration."""
+        return self.of.nq
+
+    @property
+    def nv(self) -> int:
+        """Degrees of freedom."""
+        return self.of.nv
+
+    @property
+    def space(self) -> ConfigurationSpace | None:
+        """The configuration space of the other one."""
+        return self.of.space
+
+    def value(self, *jet: Array, t: Array | None = None) -> Array:
+        """Zeros, shape (P,)."""
+        return np.zeros(len(jet[0]))
+
+    def evaluate(self, *jet: Array, t: Array | None = None) -> tuple[Array, Array, Array]:
+        """Zeros: see Lagrangian.evaluate."""
+        P, rows, n = len(jet[0]), self.order + 1, self.nv
+        return np.zeros(P), np.zeros((P, rows, n)), np.zeros((P, rows, n, rows, n))
+
+
 def add_weights(hessian: Array, terms: PointTerms, nv: int) -> None:
     """Add the contributions of limits on the jet to its Hessian, in place."""
     diagonal = np.arange(hessian.shape[1])

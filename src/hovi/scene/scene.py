@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -38,7 +38,8 @@ class Scene:
     """A robot with the effects that act on it; nothing else is simulated.
 
     robot: the robot.
-    effects: at most one of each kind.
+    effects: at most one of each kind; or a table of their keys as in a scene file, such as
+        {"gravity": {"acceleration": 9.81}}.
     passive: names of unactuated joints, with all their coordinates.
     compile: compile CasADi functions once, to libraries in the user's cache folder. It needs a C
         compiler, takes seconds and does not change results.
@@ -55,7 +56,7 @@ class Scene:
     model: pin.Model = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        effects = _as_effects(self.effects)
+        effects = as_effects(self.effects)
         keys = [effect.key for effect in effects]
         for key in set(keys):
             if keys.count(key) > 1:
@@ -323,14 +324,19 @@ def require_plannable(scene: Scene) -> None:
 def _effect(key: str, values: object) -> Effect:
     """An effect from its key and its fields as a file has them. Raises SceneError."""
     if key not in REGISTRY:
-        raise SceneError(f"there is no effect {key!r}: {nearest(str(key), REGISTRY)}")
-    known = {each.name for each in dataclasses.fields(REGISTRY[key])}
-    if not isinstance(values, dict) or not values.keys() <= known:
+        raise SceneError(f"there is no effect {key!r}; {nearest(str(key), REGISTRY)}")
+    known = {each.name for each in dataclasses.fields(REGISTRY[key]) if each.init}
+    if not isinstance(values, Mapping):
         raise SceneError(f"effect {key!r} takes {', '.join(sorted(known))}, not {values!r}.")
-    try:
-        return REGISTRY[key](**values)
-    except TypeError as error:  # a parameter without a default is missing
-        raise SceneError(f"effect {key!r} lacks a parameter: {error}.") from error
+    for name in values:
+        if name not in known:
+            hint = nearest(str(name), known)
+            raise SceneError(f"unknown key `effects.{key}.{name}`; {hint}")
+    for each in dataclasses.fields(REGISTRY[key]):
+        needed = each.default is MISSING and each.default_factory is MISSING
+        if needed and each.name not in values:
+            raise SceneError(f"`effects.{key}.{each.name}` is missing.")
+    return REGISTRY[key](**values)
 
 
 def _passive_names(names: object) -> tuple[str, ...]:
@@ -340,10 +346,12 @@ def _passive_names(names: object) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _as_effects(given: object) -> tuple[Effect, ...]:
-    """Effects as a tuple. Raises SceneError for anything but a list of effects."""
+def as_effects(given: object) -> tuple[Effect, ...]:
+    """Effects as a tuple. Raises SceneError for anything but a list or a table of effects."""
     effects: tuple[Any, ...] = (None,)
-    if isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
+    if isinstance(given, Mapping):
+        effects = tuple(_effect(key, values) for key, values in given.items())
+    elif isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
         effects = tuple(given)
     if not all(isinstance(each, Effect) for each in effects):
         raise SceneError(f"effects is a list such as [hovi.effects.Gravity()], not {given!r}.")

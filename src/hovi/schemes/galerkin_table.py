@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
-from numbers import Integral
 
 import numpy as np
 
+from hovi.checks.kinds import is_whole
 from hovi.errors import SchemeError
 from hovi.schemes.interval_curve import jet_rows
 from hovi.schemes.polynomials import interval_rows
@@ -32,19 +32,19 @@ def galerkin(inner_modes: int = 2, derivatives: int = 2, points: int | None = No
         for torques and accelerations, 3 for jerk. points: Q, from r + k to 100; r + k when None.
     Raises SchemeError otherwise.
     """
-    if not (isinstance(inner_modes, Integral) and 0 <= inner_modes <= MAX_INNER_MODES):
+    if not (is_whole(inner_modes) and 0 <= inner_modes <= MAX_INNER_MODES):
         raise SchemeError(
             f"a Galerkin scheme has 0 to {MAX_INNER_MODES} inner modes, got {inner_modes!r}; "
             "for more accuracy use more intervals."
         )
-    if not (isinstance(derivatives, Integral) and 1 <= derivatives <= MAX_DERIVATIVES):
+    if not (is_whole(derivatives) and 1 <= derivatives <= MAX_DERIVATIVES):
         raise SchemeError(
             f"a Galerkin scheme is for Lagrangians of order 1 to {MAX_DERIVATIVES}, "
             f"got {derivatives!r}."
         )
     fewest = int(inner_modes) + int(derivatives)
     points = fewest if points is None else points
-    if not (isinstance(points, Integral) and fewest <= points <= MAX_POINTS):
+    if not (is_whole(points) and fewest <= points <= MAX_POINTS):
         raise SchemeError(
             f"a Galerkin scheme with {inner_modes} inner modes has {fewest} to {MAX_POINTS} "
             f"quadrature points, got {points!r}."

@@ -16,13 +16,15 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.checks.shapes import require_shape
-from hovi.errors import SchemeError
+from hovi.errors import InputError, SchemeError
 from hovi.schemes.polynomials import legendre
 
 Array = npt.NDArray[np.float64]
 
 MAX_ORDER = 20
 """Maximum order k of a Lagrangian whose curves have a basis here."""
+MAX_POSITION = 1e3
+"""Largest |s| to which polynomials on [0, 1] are extrapolated: their powers stay finite."""
 
 
 def end_degrees(k: int) -> list[int]:
@@ -35,11 +37,24 @@ def end_basis(s: Array, k: int) -> Array:
     """The paper's b^[k]_j(s) = sqrt(2 m + 1) P_m(1 - 2 s), m = k - 1 - j, shape (k, M).
 
     Orthonormal on [0, 1]; b^[2] = (sqrt(3) (1 - 2 s), 1).
+    s: shape (M,). Raises InputError for positions beyond MAX_POSITION.
     """
     _require_order(k)
-    require_shape("s", s, None)
+    require_positions(s)
     P = legendre(1 - 2 * s, max(k - 1, 1))
     return np.array([np.sqrt(2 * m + 1) * P[m] for m in end_degrees(k)])
+
+
+def require_positions(s: Array) -> None:
+    """Raise InputError unless s holds positions of an interval, shape (M,)."""
+    require_shape("s", s, None)
+    beyond = ~(np.abs(s) <= MAX_POSITION)
+    if beyond.any():
+        raise InputError(
+            "positions s in an interval go from 0 to 1, and are extrapolated up to "
+            f"{MAX_POSITION:g}, got {s[beyond][0]:g}: give the time since its start over its "
+            "length."
+        )
 
 
 def end_weights(s: Array, k: int) -> Array:

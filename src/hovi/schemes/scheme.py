@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
-from hovi.checks.shapes import require_shape
-from hovi.schemes.interval_curve import jet_rows
+from hovi.schemes.interval_curve import jet_rows, require_positions
 from hovi.schemes.polynomials import interval_rows, legendre
 
 Array = npt.NDArray[np.float64]
@@ -107,8 +106,9 @@ class Scheme:
         """The interpolant at s in [0, 1]: (q - q0, h v, h^2 a) over (h v0, Z0, Z1, c).
 
         s: shape (M,). Returns shape (M, 3, 3 + r). Cubic Hermite for r = 0.
+        Raises InputError for positions beyond MAX_POSITION.
         """
-        require_shape("s", s, None)
+        require_positions(s)
         if self.derivatives != 2:
             return jet_rows(s, self.derivatives, self.inner_modes)
         return interval_rows(s, self.inner_modes)

@@ -27,7 +27,7 @@ def draw_distances(
 ) -> None:
     """Draw the distances of the closest pairs over time, and the margin as a dashed line."""
     t = np.linspace(0.0, trajectory.duration, _SAMPLES)
-    d = distances_over_time(trajectory, distances, t)
+    d = distances_over_time(trajectory, distances, t) - distances.allowance
     closest = np.argsort(d.min(axis=0), kind="stable")[:_SHOWN_PAIRS]
     for color, k in zip(_COLORS, closest, strict=False):
         pair = distances.pairs[k]

@@ -35,6 +35,7 @@ from hovi.viewing.figures import align_zeros, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 from hovi.viewing.scheme_torque import scheme_torque
+from hovi.viewing.segment_marks import draw_segments
 from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
@@ -117,6 +118,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
         _draw(ax, trajectory, panel, curve, y)
     if kept is not None:
         draw_distances(axes[3], trajectory, *kept)
+    draw_segments(axes, trajectory)
     axes[-1].set_xlabel("time [s]")
     _legend(figure, axes[0], _names(trajectory))
     return figure

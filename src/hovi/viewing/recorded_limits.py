@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Protocol
+
 import numpy as np
 import pinocchio as pin
 
@@ -9,6 +12,8 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError, InputError
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.obstacles.obstacle import Body, Obstacle
+from hovi.planning.obstacles.obstacle_path import ObstaclePath
 from hovi.planning.problem.limits import Limits
 
 _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from robots and background
@@ -56,15 +61,53 @@ def kept_distances(trajectory: Trajectory) -> tuple[Clearance, Distances] | None
         return None
 
 
-def with_obstacles(visual: pin.GeometryModel, trajectory: Trajectory) -> pin.GeometryModel:
-    """The drawn objects of a robot and the obstacles of its motion."""
+def drawn_obstacles(trajectory: Trajectory) -> list[tuple[str, Body, Obstacle]]:
+    """The drawn bodies of a motion's obstacles, with their names and obstacles."""
     clearance = imposed_clearance(trajectory)
-    if clearance is None or not clearance.obstacles:
+    return [
+        (f"obstacle {number} {k}", body, each)
+        for number, each in enumerate(() if clearance is None else clearance.obstacles)
+        for k, body in enumerate(each.drawn())
+    ]
+
+
+def with_obstacles(visual: pin.GeometryModel, trajectory: Trajectory) -> pin.GeometryModel:
+    """The drawn objects of a robot and the obstacles of its motion, as they are at its start."""
+    drawn = drawn_obstacles(trajectory)
+    if not drawn:
         return visual
     both = visual.copy()
-    for number, each in enumerate(clearance.obstacles):
-        name = f"obstacle {number}"
-        item = pin.GeometryObject(name, 0, 0, each.placement(), each.shape())
+    for name, body, obstacle in drawn:
+        path = obstacle.motion
+        at = body.placement if path is None else path.pose(0.0) * body.placement
+        item = pin.GeometryObject(name, 0, 0, at, body.shape)
         item.meshColor = _OBSTACLE_COLOR
         both.addGeometryObject(item)
     return both
+
+
+class Drawing(Protocol):
+    """What draws a geometry: a visualizer of Pinocchio."""
+
+    visual_model: pin.GeometryModel
+
+
+@dataclass(frozen=True, eq=False)
+class MovingObjects:
+    """Names of drawn obstacles, with their placement in the frame of the path that moves them."""
+
+    items: tuple[tuple[str, pin.SE3, ObstaclePath], ...]
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> MovingObjects:
+        """Those of a motion."""
+        drawn = drawn_obstacles(trajectory)
+        found = ((name, body.placement, obstacle.motion) for name, body, obstacle in drawn)
+        return cls(tuple((name, at, path) for name, at, path in found if path is not None))
+
+    def place(self, drawing: Drawing, t: float) -> None:
+        """Put the objects where they are at a time, to be displayed."""
+        for name, placement, path in self.items:
+            visual = drawing.visual_model
+            number = visual.getGeometryId(name)
+            visual.geometryObjects[number].placement = path.pose(t) * placement

@@ -23,10 +23,11 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, expect
 from hovi.robot.robot import Robot
 from hovi.system.files import reason, whole_file
-from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights, node_name
+from hovi.viewing.animation import animation_of, frame_times, placements_at
+from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
 from hovi.viewing.meshcat_page import Page
 from hovi.viewing.meshcat_server import ServedPage
-from hovi.viewing.recorded_limits import with_obstacles
+from hovi.viewing.recorded_limits import MovingObjects, with_obstacles
 from hovi.viewing.skeleton import skeleton
 
 with warnings.catch_warnings():
@@ -44,7 +45,6 @@ _ELEVATION = 0.25
 _TRACE_COLOR = (0.80, 0.47, 0.65)
 _TRACE_WIDTH = 0.006  # relative to the picture's size
 _FRAME_RATE = 60.0
-_MAX_FRAMES = 20_000
 _VIEW_SAMPLES = 60
 _TRACE_SAMPLES = 2_000
 _BROWSER_TIMEOUT = 20.0  # [s]
@@ -88,7 +88,7 @@ class Replay:
 
         loop: whether the controls repeat the motion.
         """
-        self.page.keep(_animation(self.trajectory, self.visualizer, loop, self.highlights))
+        self.page.keep(animation_of(self.trajectory, self.visualizer, loop, self.highlights))
 
     def close(self) -> None:
         """Stop the server, if there is one. An open page stays as it is."""
@@ -97,14 +97,17 @@ class Replay:
 
     def _play_once(self, speed: float, rate: float) -> None:
         duration = self.trajectory.duration
+        moving = MovingObjects.of(self.trajectory)
         start, elapsed = time.monotonic(), 0.0
         while elapsed * speed < duration:
+            moving.place(self.visualizer, elapsed * speed)
             self.visualizer.display(self.trajectory.configurations(elapsed * speed)[0])
             if self.highlights is not None:
                 self.highlights.show(self.visualizer, elapsed * speed)
             due = (math.floor(elapsed * rate) + 1) / rate
             time.sleep(max(0.0, start + min(due, duration / speed) - time.monotonic()))
             elapsed = time.monotonic() - start
+        moving.place(self.visualizer, duration)
         self.visualizer.display(self.trajectory.configurations(duration)[0])
         if self.highlights is not None:
             self.highlights.show(self.visualizer, duration)
@@ -179,7 +182,7 @@ def serve(
     Arguments and errors as in `replay`.
     """
     robot = _robot(trajectory)
-    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
+    highlights = Highlights.of(trajectory, robot, frame_times(trajectory))
     page = ServedPage(_title(trajectory, robot), _note(robot, highlights), port)
     try:
         visualizer = _draw(trajectory, robot, page, trace, highlights)
@@ -206,10 +209,10 @@ def write_html(
     """
     check_speed(speed)
     robot = _robot(trajectory)
-    highlights = Highlights.of(trajectory, robot, _frame_times(trajectory))
+    highlights = Highlights.of(trajectory, robot, frame_times(trajectory))
     page = Page(_title(trajectory, robot), _note(robot, highlights))
     visualizer = _draw(trajectory, robot, page, trace, highlights)
-    page.keep(_animation(trajectory, visualizer, loop, highlights))
+    page.keep(animation_of(trajectory, visualizer, loop, highlights))
     text = page.offline_html(speed)
     try:
         with whole_file(path) as stream:
@@ -256,29 +259,31 @@ def _draw(
     visualizer.initViewer(viewer=meshcat.Visualizer(window=page))
     visualizer.loadViewerModel(rootNodeName="robot")
     visualizer.setBackgroundColor("gray")
+    MovingObjects.of(trajectory).place(visualizer, 0.0)
     visualizer.display(trajectory.q[0])
     if highlights is not None:
         highlights.show(visualizer, 0.0)
-    lower, upper = _swept_box(visualizer, _configurations(trajectory, _VIEW_SAMPLES))
+    lower, upper = _swept_box(visualizer, trajectory)
     if trace:
-        tips = robot.frame_positions(robot.tip_frames, _configurations(trajectory, _TRACE_SAMPLES))
+        q = trajectory.configurations(_times(trajectory, _TRACE_SAMPLES))
+        tips = robot.frame_positions(robot.tip_frames, q)
         width = _TRACE_WIDTH * float(np.linalg.norm(upper - lower))
         _draw_trace(visualizer, tips.reshape(-1, 3), width)
     _place_camera(visualizer, lower, upper)
     return visualizer
 
 
-def _configurations(trajectory: Trajectory, max_count: int) -> Array:
-    """Configurations at evenly spaced times, at most max_count, shape (M, nq)."""
+def _times(trajectory: Trajectory, max_count: int) -> Array:
+    """Evenly spaced times, at most max_count, shape (M,)."""
     count = int(min(max_count, 1 + _VIEW_SAMPLES * trajectory.grid.intervals))
-    return trajectory.configurations(np.linspace(0.0, trajectory.duration, count))
+    return np.linspace(0.0, trajectory.duration, count)
 
 
-def _swept_box(visualizer: MeshcatVisualizer, q: Array) -> tuple[Array, Array]:
+def _swept_box(visualizer: MeshcatVisualizer, trajectory: Trajectory) -> tuple[Array, Array]:
     """Lower and upper corner of the volume that the drawn robot sweeps, each (3,), in [m]."""
     corners = [_corners(item) for item in visualizer.visual_model.geometryObjects]
     points = [np.zeros((1, 3))]  # keep the base in the picture
-    for placements in _placements(visualizer, q):
+    for placements in placements_at(visualizer, trajectory, _times(trajectory, _VIEW_SAMPLES)):
         pairs = zip(corners, placements, strict=True)
         points += [c @ pose.rotation.T + pose.translation for c, pose in pairs]
     swept = np.concatenate(points)
@@ -329,61 +334,6 @@ def _shift(offset: Array) -> Array:
     placement = np.eye(4)
     placement[:3, 3] = offset
     return placement
-
-
-def _placements(visualizer: MeshcatVisualizer, q: Array) -> list[list[pin.SE3]]:
-    """Placement of every drawn object, for each configuration in q (M, nq)."""
-    model, visual = visualizer.model, visualizer.visual_model
-    data, visual_data = model.createData(), visual.createData()
-    placements = []
-    for configuration in q:
-        pin.updateGeometryPlacements(model, data, visual, visual_data, configuration)
-        placements.append([placement.copy() for placement in visual_data.oMg])
-    return placements
-
-
-def _frame_times(trajectory: Trajectory) -> Array:
-    """Times of the animation's frames, both ends included, in [s]."""
-    frames = int(min(_MAX_FRAMES, math.ceil(trajectory.duration * _FRAME_RATE))) + 1
-    return np.linspace(0.0, trajectory.duration, max(frames, 2))
-
-
-def _animation(
-    trajectory: Trajectory,
-    visualizer: MeshcatVisualizer,
-    loop: bool,
-    highlights: Highlights | None,
-) -> dict[str, object]:
-    """The message that makes a page play the motion: keyframe tracks by drawn object, in [s]."""
-    times = _frame_times(trajectory)
-    visible = {} if highlights is None else highlights.changes(visualizer)
-    placements = _placements(visualizer, trajectory.configurations(times))
-    animation = meshcat.animation.Animation()
-    for number, item in enumerate(visualizer.visual_model.geometryObjects):
-        poses = [frame[number] for frame in placements]
-        rotations = [pin.Quaternion(pose.rotation).coeffs() for pose in poses]
-        tracks = {
-            "position": _track("position", "vector3", times, [p.translation for p in poses]),
-            "quaternion": _track("quaternion", "quaternion", times, rotations),
-        }
-        name = node_name(visualizer, item)
-        if name in visible:
-            keys, flags = visible[name]
-            tracks["visible"] = _track("visible", "bool", keys, list(flags))
-        node = visualizer.viewer[name]
-        animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
-    repetitions = math.inf if loop else 1
-    command = meshcat.commands.SetAnimation(animation, play=True, repetitions=repetitions)
-    message: dict[str, object] = command.lower()
-    return message
-
-
-def _track(
-    name: str, kind: str, times: Array, values: list[Array]
-) -> meshcat.animation.AnimationTrack:
-    return meshcat.animation.AnimationTrack(
-        name, kind, times.tolist(), [value.tolist() for value in values]
-    )
 
 
 def _title(trajectory: Trajectory, robot: Robot) -> str:

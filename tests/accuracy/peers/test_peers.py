@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,7 +23,7 @@ from hovi.accuracy.peers.collocation_table import (
     lagrange_integrals,
     radau_points,
 )
-from hovi.accuracy.peers.external_method import ExternalMethod
+from hovi.accuracy.peers.external_method import ExternalMethod, scene_request
 from hovi.accuracy.peers.ipopt_method import CollocationMethod, Kernels
 from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.accuracy.peers.tools import EXTERNAL, tool_peers
@@ -217,6 +218,25 @@ def test_a_missing_python_raises(setting: Setting) -> None:
 def test_a_python_without_the_tool_raises_with_the_missing_module(setting: Setting) -> None:
     with pytest.raises(UnmeasurableError, match="No module named 'crocoddyl'"):
         external_method(setting, Path(sys.executable))
+
+
+@pytest.mark.skipif("HOVI_CROCODDYL_PYTHON" not in os.environ, reason="needs Crocoddyl")
+def test_torque_limits_raise_the_cost_of_crocoddyl_and_goals_move(setting: Setting) -> None:
+    t = np.linspace(0.0, setting.problem.grid.duration, 81)
+    q, v, a = (x.tolist() for x in setting.guess(t))
+    goal = [*setting.problem.boundary[2] + 0.01, *setting.problem.boundary[3]]
+    costs = []
+    for limits in (None, [7.0, 7.0]):
+        worker = Worker(Path(os.environ["HOVI_CROCODDYL_PYTHON"]), "crocoddyl_worker")
+        options = {"control": "zero", "torque_limits": limits}
+        worker.ask(scene_request(setting) | {"options": options})
+        worker.ask({"prepare": 40, "guess": {"q": q, "v": v, "a": a}})
+        answers = [worker.ask({"solve": 40}), worker.ask({"solve": 40, "goal": goal})]
+        worker.close()
+        assert [answer["success"] for answer in answers] == [True, True]
+        np.testing.assert_allclose([*answers[1]["q"][-1], *answers[1]["v"][-1]], goal, atol=1e-6)
+        costs.append([answer["cost"] for answer in answers])
+    assert np.all(np.array(costs[1]) > 1.001 * np.array(costs[0]))
 
 
 @pytest.mark.parametrize("name", EXTERNAL)

@@ -14,7 +14,11 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.guess import path_on_grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
+from hovi.planning.clearance.clearance_violation import (
+    approach_along,
+    approach_sentence,
+    near_pairs,
+)
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -86,3 +90,36 @@ def test_each_pair_has_its_approach_in_each_interval(arm_scene: hovi.Scene) -> N
             motion.configurations(motion.t[k] + found.at[k] * motion.grid.steps[k])
         )
         np.testing.assert_allclose(np.diagonal(at), found.distance[k], atol=1e-12)
+
+
+@pytest.mark.parametrize("share", PASSING)
+def test_near_pairs_are_those_whose_closest_approach_is_below_a_distance(
+    arm_scene: hovi.Scene, share: float
+) -> None:
+    """By a micrometre, which only samples around the closest approach show."""
+    motion = turning(arm_scene)
+    q = START + share * (GOAL - START)
+    balls = [Sphere(factor * tip(arm_scene, q), 0.05) for factor in (1.15, 1.3, 5.0)]
+    distances = Distances(arm_scene.robot, Clearance(balls, 0.05))
+    t = share * T + np.linspace(-0.01, 0.01, 2001)
+    closest = distances.values(motion.configurations(t)).min(axis=0)
+    last = [k for k, pair in enumerate(distances.pairs) if pair.link == "tip"]
+    assert len(last) == len(balls)
+    for k in last:
+        for change, found in ((1e-6, True), (-1e-6, False)):
+            near = near_pairs(motion, distances, float(closest[k]) + change)
+            assert (k in near) == found
+            assert [n for n in last if n < k] == [n for n in near if n in last and n < k]
+
+
+def test_beyond_reach_an_approach_is_a_lower_bound(arm_scene: hovi.Scene) -> None:
+    motion = turning(arm_scene)
+    balls = [Sphere(factor * tip(arm_scene, START), 0.05) for factor in (1.2, 3.0)]
+    distances = Distances(arm_scene.robot, Clearance(balls, 0.05))
+    exactly = approach_along(motion, distances, 0.05).distance
+    found = approach_along(motion, distances, 0.05, 0.5).distance
+    far = exactly > 0.5
+    assert far.any()
+    assert (found[far] > 0.5).all()
+    assert (found <= exactly + 1e-12).all()
+    np.testing.assert_allclose(found[~far], exactly[~far], atol=1e-12)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +13,7 @@ from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.clearance.obstacles import Box, Capsule, Obstacle, Sphere
+from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -168,36 +167,66 @@ def test_a_flat_mesh_is_refused_by_name() -> None:
         convex_geometry(robot)
 
 
-class Counting(Distances):
-    """Counts the pairs whose nearest points are looked at for a derivative."""
-
-    counted = 0
-
-    def _record(self, contacts: Any, p: int, pairs: npt.NDArray[np.intp]) -> None:
-        self.counted += len(pairs)
-        super()._record(contacts, p, pairs)
-
-
-def test_pairs_30_cm_beyond_the_margin_need_no_derivative(two_link: Robot) -> None:
+def test_pairs_30_cm_beyond_the_margin_have_no_derivative(two_link: Robot) -> None:
     margin = 0.1
-    distances = Counting(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2)))
+    distances = Distances(two_link, Clearance(Sphere([2.85, 0.0, 0.0], 0.2)))
     q = np.linspace([0.0, 0.0], [0.6, 0.6], 50)
     d = distances.values(q)
-    near = int(np.sum(d < margin + 0.3))
-    assert 0 < near < d.size
-    ClearanceOutputs(distances, margin).expand(q, np.zeros(d.shape))
-    assert distances.counted == near
+    far = d > margin + 0.3
+    assert 0 < far.sum() < d.size
+    outputs = ClearanceOutputs(distances, margin)
+    assert outputs.reach == pytest.approx(margin + 0.3)
+    jacobian, curvature = outputs.expand(q, np.where(far, 1.0, 0.0))
+    assert (jacobian[far] == 0.0).all()
+    assert np.mean((jacobian[~far] != 0.0).any(axis=1)) > 0.9  # some are at a symmetric point
+    assert (curvature == 0.0).all()
+
+
+def test_restricted_outputs_are_those_columns(panda: Robot) -> None:
+    outputs = ClearanceOutputs(Distances(panda, Clearance(OBSTACLES)), 0.05)
+    q = around([0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.7], 10)
+    some = [7, 30, 12]
+    part = outputs.restricted(some)
+    assert part.size == len(some)
+    assert part.distances.pairs == tuple(outputs.distances.pairs[k] for k in some)
+    np.testing.assert_allclose(part.values(q), outputs.values(q)[:, some], atol=1e-12)
+    force = np.zeros((len(q), outputs.size))
+    force[:, some] = 1.0
+    whole, alone = outputs.expand(q, force), part.expand(q, force[:, some])
+    np.testing.assert_allclose(alone[0], whole[0][:, some], atol=1e-12)
+    np.testing.assert_allclose(alone[1], whole[1], atol=1e-12)
+
+
+def test_second_derivatives_include_those_by_coal(two_link: Robot) -> None:
+    """Of a cone, of which the compiled part knows no distances, beside a sphere."""
+    distances = Distances(two_link, Clearance(Sphere([1.9, 0.0, 0.6], 0.1)))
+    cone = pin.GeometryObject("cone", 2, 0, pin.SE3.Identity(), coal.Cone(0.1, 0.2))
+    geometry = distances.geometry.copy()
+    number = geometry.addGeometryObject(cone)
+    geometry.addCollisionPair(pin.CollisionPair(number, distances.ends[0][1]))
+    measured = PairDistances(two_link, geometry)
+    pairs = np.arange(len(geometry.collisionPairs))
+    q = around([0.1, 0.3], width=0.05)
+    d, jacobian, curvature = measured.expand(q, pairs, np.inf, np.ones((len(q), len(pairs))))
+    numeric = derivative_per_point(lambda q: measured.values(q, pairs, np.inf), q, 1e-5)
+    np.testing.assert_allclose(jacobian, numeric, atol=1e-5)
+    assert d[:, -1].min() > 0.0
+    bend = derivative_per_point(
+        lambda q: measured.expand(q, pairs, np.inf, None)[1].sum(axis=1), q, 1e-4
+    )
+    np.testing.assert_allclose(curvature, bend, atol=2e-3 * np.abs(bend).max())
 
 
 def test_only_pairs_with_a_force_bend_the_motion(two_link: Robot) -> None:
-    """Forces below a hundredth of the largest count as none."""
     outputs = ClearanceOutputs(Distances(two_link, Clearance(Sphere([1.9, 0.0, 0.4], 0.2))), 0.3)
     q = around([0.1, 0.3], width=0.05)
     y = outputs.values(q)
     assert (y < 1.0).all()  # in reach, and not levelling off
     force = np.zeros(y.shape)
+    assert (outputs.expand(q, force)[1] == 0.0).all()
     force[:, tip_column(outputs.distances)] = 1.0
     alone = outputs.expand(q, force)[1]
-    for small, counts in ((9e-3, False), (2e-2, True)):
-        more = np.where(force > 0, force, small)
-        assert np.array_equal(outputs.expand(q, more)[1], alone) != counts
+    small = 1e-6 * np.where(force > 0, 0.0, 1.0)  # no threshold: each counts by its force
+    more = outputs.expand(q, small)[1]
+    assert (more != 0.0).any()
+    np.testing.assert_allclose(outputs.expand(q, force + small)[1], alone + more, atol=1e-15)

@@ -29,14 +29,15 @@ def test_an_obstacle_comes_back_from_json(obstacle: Obstacle) -> None:
 @pytest.mark.parametrize("ends", [[[0, 0, 0], [0, 0.3, 0.4]], [[1, -2, 0.5], [1.6, -2, 1.3]]])
 def test_a_capsule_lies_along_its_ends(ends: list[list[float]]) -> None:
     capsule = Capsule(ends, 0.05)
-    half = capsule.shape().halfLength
+    ((shape, placement),) = capsule.bodies()
+    half = shape.halfLength
     assert half == pytest.approx(0.5 * math.dist(*ends))
-    found = [capsule.placement().act(np.array([0.0, 0.0, z])) for z in (-half, half)]
+    found = [placement.act(np.array([0.0, 0.0, z])) for z in (-half, half)]
     np.testing.assert_allclose(found, ends, atol=1e-15)
 
 
 def test_a_box_is_turned_as_in_a_urdf() -> None:
-    corner = ALL[2].placement().act(np.array([0.5, 1.0, 0.05]))
+    corner = ALL[2].bodies()[0].placement.act(np.array([0.5, 1.0, 0.05]))
     np.testing.assert_allclose(corner, [-1.0, 0.5, -0.05], atol=1e-15)
 
 

@@ -9,7 +9,7 @@ import pytest
 import hovi
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.inverse_kinematics import inverse_kinematics
+from hovi.planning.problem.inverse_kinematics import nearest_configuration
 from hovi.planning.problem.node_conditions import Condition, JointCondition
 from hovi.robot.robot import Robot
 from oracles.finite_differences import derivative
@@ -60,7 +60,7 @@ def test_inverse_kinematics_meets_every_kind_of_goal(panda: Robot, ur5: Robot, k
     for robot, frame in ((panda, "panda_hand"), (ur5, "tool0")):
         target = random.uniform(0.6 * robot.lower, 0.6 * robot.upper).clip(-2, 2)
         goal = goals(robot, frame, target)[kind]
-        reached = inverse_kinematics(robot, goal, robot.neutral(), robot.lower, robot.upper)
+        reached = nearest_configuration(robot, goal, robot.neutral(), (robot.lower, robot.upper))
         assert reached.reason == ""
         assert np.all(reached.q >= robot.lower)
         assert np.all(reached.q <= robot.upper)
@@ -102,7 +102,8 @@ def test_the_derivatives_are_taken_along_the_configuration_space() -> None:
 
 
 def test_a_goal_out_of_reach_is_reported_with_its_distance(ur5: Robot) -> None:
-    reached = inverse_kinematics(ur5, FrameGoal("tool0", position=[3.0, 0, 0]), ur5.neutral())
+    goal, bounds = FrameGoal("tool0", position=[3.0, 0, 0]), (ur5.lower, ur5.upper)
+    reached = nearest_configuration(ur5, goal, ur5.neutral(), bounds)
     assert "frame 'tool0' misses it by" in reached.reason
     missing = float(reached.reason.split("misses it by ")[1].split(" m")[0])
     tip = placement(ur5, "tool0", reached.q).translation

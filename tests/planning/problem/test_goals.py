@@ -66,6 +66,23 @@ def test_a_position_goal_costs_less_than_the_pose_that_fixes_more() -> None:
     assert position.cost < axis.cost < pose.cost
 
 
+def test_a_hand_that_a_frame_goal_does_not_mention_keeps_its_opening() -> None:
+    """Joints that do not move the frame are at the goal where they are at the start."""
+    robot = hovi.load_robot("panda")
+    start = robot.pose("default")
+    start[-2:] = 0.011, 0.023
+    goal = hovi.FrameGoal("panda_hand", position=[0.4, 0.1, 0.5])
+    ld = hovi.DiscreteLagrangian(
+        hovi.Scene(robot).effort_lagrangian(), hovi.Grid.uniform(1.0, 4, galerkin(2))
+    )
+    problem = hovi.TrajectoryProblem(ld, hovi.State(start), goal)
+    np.testing.assert_array_equal(problem.boundary[2][-2:], start[-2:])
+    np.testing.assert_array_equal(problem.free_ends[1, 0], [True] * 7 + [False] * 2)
+    loose = hovi.State(start, free=["panda_finger_joint1"])
+    problem = hovi.TrajectoryProblem(ld, loose, goal)
+    np.testing.assert_array_equal(problem.free_ends[1, 0], [True] * 8 + [False])
+
+
 def test_free_components_leave_no_momentum_at_the_end(arm_scene: hovi.Scene) -> None:
     """The natural boundary conditions: p = 0 where q is free, p~ = 0 where v is."""
     goal = hovi.State([0.3, 0.7], free=["elbow"], free_velocity=["shoulder"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import Accuracy, Quantity, Tolerance
 from hovi.robot.loading import load_robot

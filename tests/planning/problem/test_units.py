@@ -42,6 +42,9 @@ def test_a_time_is_a_number_of_seconds_or_has_a_unit(given: Any, expected: float
         ("2 s 3", "it must be a number of seconds"),
         (None, "it must be a number of seconds.*got None"),
         ([2.0], "it must be a number of seconds"),
+        (True, "it must be a number of seconds"),
+        (np.complex128(2.0), "it must be a number of seconds"),
+        (np.timedelta64(500, "ms"), "it must be a number of seconds"),
     ],
 )
 def test_an_invalid_time_is_refused_in_one_sentence(given: Any, sentence: str) -> None:
@@ -49,9 +52,13 @@ def test_an_invalid_time_is_refused_in_one_sentence(given: Any, sentence: str) -
         seconds(given, "it")
 
 
-@pytest.mark.parametrize("given", [(), (1.0,), (1.0, 2.0, 3.0), None, object()])
+@pytest.mark.parametrize(
+    "given", [(), (1.0,), (1.0, 2.0, 3.0), None, object(), True, np.timedelta64(2, "s")]
+)
 def test_a_duration_is_one_number_or_two(given: Any) -> None:
-    with pytest.raises(InputError, match=r"a number or a pair \(lower, upper\)"):
+    with pytest.raises(
+        InputError, match=r"`duration` must be a positive .* \[lower, upper\] of two"
+    ):
         as_duration(given)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import deviation
+from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity
@@ -289,7 +289,7 @@ def test_no_error_below_the_tolerance_of_limits_is_claimed(arm_scene: Scene) -> 
 def test_an_interrupt_after_some_grids_returns_the_most_accurate_motion(arm_scene: Scene) -> None:
     """Under a limit, which takes many grids."""
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(2)))
-    limits = as_limits(arm_scene.robot, {"base": "none", "v": 6.0})
+    limits = as_limits(arm_scene.robot, {"base": "none", "tau": 6.5, "tolerance": 1e-9})
     first = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits))
     rounds: list[Round] = []
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import deviation
+from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem

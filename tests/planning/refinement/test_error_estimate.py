@@ -9,7 +9,7 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import (
+from hovi.discrete.measures.motion_error import (
     MotionError,
     deviation,
     relative_difference,

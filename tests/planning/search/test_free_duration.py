@@ -127,11 +127,11 @@ def test_a_search_that_runs_out_of_time_is_no_success() -> None:
 
 
 def test_bad_durations_are_refused() -> None:
-    with pytest.raises(InputError, match="0 < lower < upper"):
+    with pytest.raises(InputError, match=r"lower, upper\] of two"):
         reach((2.0, 1.0))
     with pytest.raises(InputError, match="time_weight needs a free duration"):
         reach(1.0, time_weight=1.0)
-    with pytest.raises(InputError, match="a number or a pair"):
+    with pytest.raises(InputError, match=r"lower, upper\] of two"):
         reach((1.0, 2.0, 3.0))
     with pytest.raises(InputError, match="weight of time must be"):
         reach((1.0, 2.0), time_weight=-1.0)
@@ -204,7 +204,8 @@ def test_a_hurry_ends_at_the_edge_of_feasibility(two_link: hovi.Robot) -> None:
     found = raised(two_link, (0.3, 3.0), time_weight=1e5, intervals=8)
     T = found.trajectory.duration
     assert found.status is hovi.Status.MINIMUM, found.message
-    assert f"to 0.1 % the shortest one found feasible, is {T:.10g}" in found.message
+    assert f"The best duration is {T:.10g}" in found.message
+    assert found.duration_derivative == pytest.approx(-1e5, rel=1e-7)
     assert excess(found, [8.0, 3.0]) <= 1e-5
     shorter = raised(two_link, T * (1 - 2e-3), intervals=8, guess=found.trajectory)
     assert shorter.status is hovi.Status.INFEASIBLE
@@ -240,9 +241,15 @@ def test_passive_joints_and_limits_leave_room_for_the_best_duration(two_link: ho
     assert "The best duration is" in found.message
 
 
+FAR_AWAY = hovi.Sphere([5.0, 5.0, 5.0], 0.1)
+"""An obstacle that changes nothing but the way in which a best duration is found: by solves for
+given ones."""
+
+
 def test_all_starts_are_made_where_there_is_a_motion(two_link: hovi.Robot) -> None:
     told: list[str] = []
     options = {"starts": 3, "processes": 1, "intervals": 8, "time_weight": 30.0}
+    options["obstacles"] = [FAR_AWAY]
     found = raised(two_link, (0.3, 3.0), progress=lambda text, _: told.append(text), **options)
     assert found.success, found.message
     assert [text[:11] for text in told].count("3 of 3 star") == 2  # at the first and at the next
@@ -265,7 +272,7 @@ def test_around_an_obstacle_the_best_duration_is_cheaper_than_its_neighbours(
     assert bare.cost + 30.0 * T < found.cost * (1 - 0.01)
 
 
-@pytest.mark.parametrize("limit", [0.02, 0.3, 0.9])
+@pytest.mark.parametrize("limit", [0.02, 0.1, 0.3])
 def test_a_time_limit_is_told_wherever_it_ends_the_search(
     two_link: hovi.Robot, limit: float
 ) -> None:
@@ -284,7 +291,7 @@ def test_each_other_duration_is_tried_from_one_start(two_link: hovi.Robot) -> No
         said.append(text)
 
     options = {"progress": progress, "continuation": False, "processes": 1, "starts": 3}
-    found = raised(two_link, (0.3, 3.0), time_weight=30.0, **options)
+    found = raised(two_link, (0.3, 3.0), time_weight=30.0, obstacles=[FAR_AWAY], **options)
     assert found.success
     assert any(text.startswith("no minimum for") for text in said)
     counted = {int(number) for text in said for number in re.findall(r"of (\d+) starts", text)}

@@ -10,7 +10,7 @@ import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import deviation
+from hovi.discrete.measures.motion_error import deviation
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -198,3 +198,26 @@ def test_a_tolerance_that_is_not_reached_ends_the_search(task: Task) -> None:
     assert len(refined) == 1
     assert not accuracy_of(found).reached
     assert accuracy_of(found).rounds == accuracy_of(refined[0]).rounds
+
+
+def test_a_duration_that_is_far_from_the_best_is_not_called_the_best(arm_scene: Scene) -> None:
+    """A joint solve that leaves the duration where it is, on a grid that needs no refinement."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 24, galerkin(4)))
+    first = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q)))
+
+    def on_grid(grid: Grid) -> SolveFor:
+        raise AssertionError("the grid is kept")
+
+    def refine(solution: Solution) -> Solution:
+        return refine_to_tolerance(solution, Tolerance(1e-2))
+
+    def kept(solution: Solution) -> Solution:
+        return solution
+
+    rate = first.duration_derivative
+    for weight, status in ((0.5 * abs(rate), Status.UNRESOLVED), (abs(rate), Status.MINIMUM)):
+        free = FreeDuration(0.5, 6.0, weight)
+        found = free_to_tolerance(free, lambda grid: partial(on_grid, grid), refine, first, kept)
+        assert found.status is status, found.message
+        assert found.success == (status is Status.MINIMUM)
+        assert ("another duration is far better" in found.message) != found.success

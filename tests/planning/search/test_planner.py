@@ -157,11 +157,9 @@ def test_active_limits_are_held(arm_scene: Scene, intervals: int, limits: dict[s
 
 
 def test_a_plan_under_limits_can_be_replanned(arm_scene: Scene) -> None:
-    # with so few intervals, some are halved so that the limit holds between the points
     limits = {"base": "none", "a": 30.0}
     planned = plan(arm_scene, HANG, GOAL, 1.0, intervals=6, limits=limits)
     assert planned.status is Status.MINIMUM
-    assert planned.trajectory.grid.intervals > 6
     again = planned.replan(goal=State(REACH_Q + 0.001, REACH_V))
     assert again.status is Status.MINIMUM
     np.testing.assert_array_equal(again.trajectory.q[-1], REACH_Q + 0.001)
@@ -343,10 +341,10 @@ def test_after_an_interrupt_no_other_minimum_is_compared_with_a_finer_grid(
         ({"starts": np.nan}, InputError, "starts must be a whole number of 1 or more, got nan"),
         ({"max_iterations": 0}, InputError, "max_iterations must be a whole number of 1 or more"),
         ({"limits": "urfd"}, InputError, "limits are .*'urfd'"),
-        ({"duration": 0.0}, InputError, "duration must be positive and finite, got 0"),
-        ({"duration": -1.0}, InputError, "duration must be positive and finite, got -1"),
-        ({"duration": np.nan}, InputError, "duration must be positive and finite, got nan"),
-        ({"duration": np.inf}, InputError, "duration must be positive and finite, got inf"),
+        ({"duration": 0.0}, InputError, "`duration` must be a positive number .* is 0.0"),
+        ({"duration": -1.0}, InputError, "`duration` must be a positive .* is -1.0"),
+        ({"duration": np.nan}, InputError, "`duration` must be a positive .* is nan"),
+        ({"duration": np.inf}, InputError, "`duration` must be a positive .* is inf"),
         ({"goal": [np.nan, 0.0]}, InputError, "goal is nan at joint 'shoulder'"),
         ({"goal": [0.0]}, InputError, r"goal has shape \(1,\), expected \(2,\)"),
         ({"start": [0.0] * 3}, InputError, r"start has shape \(3,\), expected \(2,\)"),

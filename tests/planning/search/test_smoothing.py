@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -176,6 +177,14 @@ def test_a_smooth_motion_replans_and_survives_a_file(smooth: hovi.Solution, tmp_
     t = np.linspace(0.0, 1.5, 7)
     for one, other in zip(loaded.sample(t), smooth.trajectory.sample(t), strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("duration", [5e-324, 1e-200, 1e160, 1e308])
+def test_a_duration_whose_square_is_no_number_is_refused(two_link: Robot, duration: float) -> None:
+    """The weight is (T M / 100)^2."""
+    scene, ends = hovi.Scene(two_link, [Gravity()]), ([0.0, 0.0], [0.3, 0.7])
+    with pytest.raises(InputError, match=re.escape(f"too long for that at {duration:.3g} s")):
+        hovi.plan(scene, *ends, duration, smooth=True)
 
 
 def test_both_smooth_and_a_weight_of_the_jerk_are_refused(ur5: hovi.Scene) -> None:

@@ -17,7 +17,11 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
+from hovi.planning.solver.action_objective import (
+    MAX_CHART_TURN,
+    ActionObjective,
+    LinearAlgebra,
+)
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.solver import guess_path
 from hovi.planning.task_file.reading import load_task
@@ -319,3 +323,20 @@ def test_the_size_of_a_step_is_its_largest_change_in_either_direction(
         assert size > 0
         assert action.relative_size(path, -step, model) == size
         assert action.relative_size(path, -3 * step, model) == pytest.approx(3 * size, rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [1e2, 1e5, 1e8, 1e100, 1e160, 1e300])
+@pytest.mark.parametrize("name", ["galerkin-1x5", "hermite-simpson"])
+def test_a_path_far_beyond_its_charts_costs_infinity(name: str, size: float) -> None:
+    """There, the charts hold NaN, which is neither below nor above any turn."""
+    task = load_task(example("spacecraft_reorients"))
+    grid = Grid.uniform(8.0, 4, by_name(name))
+    ld = DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    problem = TrajectoryProblem(ld, task.start, task.goal)
+    action, path = ActionObjective(problem), guess_path(problem, "cubic")
+    model = action.model(path, None, None)
+    moved = action.retract(path, size * model.random_vector(0), model)
+    turns = ld.turns(moved)
+    assert turns.max() > MAX_CHART_TURN
+    assert not np.isnan(turns).any()
+    assert action.value(moved) == np.inf

@@ -60,7 +60,7 @@ def test_the_violation_is_the_largest_share_outside(
 def test_the_value_is_the_action_and_the_squares_outside(
     bounded: BoundedAction, path: DiscretePath
 ) -> None:
-    squares = np.sum(bounded.bounds.weights * outside(bounded, path) ** 2)
+    squares = np.sum(bounded.bounds.weights * outside(bounded, path).ravel() ** 2)
     expected = bounded.ld.action(path) + PENALTY / 2 * squares
     assert PenalizedAction(bounded, PENALTY).value(path) == pytest.approx(expected, rel=1e-13)
 

@@ -104,14 +104,13 @@ def stopped(problem: TrajectoryProblem, convex: TrajectoryProblem) -> StopsAnywh
     """A search at the minimum of `convex`, whose first joint moves like that of the problem."""
     assert problem.limits is not None
     path = guess_path(problem, "cubic")
-    found = BoundedSearch(convex, problem.limits, Options(), None, path).solve(path)
+    first = BoundedSearch(convex, problem.limits, Options(), None, path)
+    found = first.solve(path)
     assert found.stop is Stop.STATIONARY
     search = StopsAnywhere(problem, problem.limits, Options(), None, path)
-    barrier = found.barrier
-    residual = found.outputs.y - barrier.s
-    found.model = search.objective(None).model(
-        found.x, barrier.sigma, barrier.gradient + barrier.sigma * residual, barrier.multipliers
-    )
+    search.rows = first.rows
+    condensed = found.barrier.condensed(found.outputs.y)
+    found.model = search.objective(None).model(found.x, *condensed)
     search.found = found
     return search
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import hovi
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import check_path, regularized
@@ -704,3 +705,20 @@ def test_a_replan_starts_from_the_motion_that_is_given(arm_scene: Scene) -> None
         assert abs(again.cost - guess.cost) < 0.1 * abs(one.cost - other.cost)
         unchanged = origin.replan(goal=State([-0.89, 1.2]))
         assert abs(unchanged.cost - origin.cost) < 0.1 * abs(one.cost - other.cost)
+
+
+@pytest.mark.parametrize("limits", ["none", "urdf"])
+@pytest.mark.parametrize("passive", [(), ("elbow",), ("shoulder",)])
+def test_an_interval_without_unknowns_is_solved_or_infeasible(
+    two_link: Robot, limits: str, passive: tuple[str, ...]
+) -> None:
+    """One interval without inner modes between fixed ends; the arm hangs at rest, or moves."""
+    scene, down = Scene(two_link, [Gravity()], passive=passive), np.array([-np.pi / 2, 0.0])
+    once = {"scheme": "taylor-midpoint", "intervals": 1, "limits": limits}
+    still = hovi.plan(scene, down, down, 1.0, **once)
+    assert still.success, still.message
+    assert still.cost < 1e-20
+    moved = hovi.plan(scene, down, [0.3, 0.2], 1.0, **once)
+    assert moved.status == ("infeasible" if passive else "unresolved")
+    if passive:
+        assert f"zero torque at passive joint {passive[0]!r}" in moved.message

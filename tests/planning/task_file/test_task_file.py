@@ -10,17 +10,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
 import pytest
 
 import hovi.effects
+from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError, ModelError, SceneError, SchemeError
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.tolerance import Quantity, Tolerance
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.writing import save_task
 from hovi.robot.bundled_models import example, example_scenes
+from hovi.robot.robot import Robot
 from hovi.schemes import galerkin
+from samples.meshes import WEDGE
+from samples.world_files import PLANNING_SCENE
 
 REACH = example("two_link_reach.toml").read_text()
 
@@ -57,6 +64,14 @@ def test_every_shipped_scene_loads(name: str) -> None:
     assert task.options.limits == "none" or name not in COMPARED
 
 
+def numbers_of(end: State | FrameGoal, robot: Robot) -> list[npt.NDArray[np.float64]]:
+    """What a state or a frame goal prescribes."""
+    if isinstance(end, State):
+        return [*end.on(robot, "end")]
+    given = end.position, end.rotation, *(end.axis or (None, None))
+    return [np.asarray([] if each is None else each, dtype=float) for each in given]
+
+
 @pytest.mark.parametrize("name", sorted(example_scenes()))
 def test_a_saved_task_is_read_back_as_the_same_task(name: str, tmp_path: Path) -> None:
     task = load_task(example(name))
@@ -70,7 +85,7 @@ def test_a_saved_task_is_read_back_as_the_same_task(name: str, tmp_path: Path) -
         assert via.time == read.time
     assert again.options.clearance.to_dict() == task.options.clearance.to_dict()
     for end in ("start", "goal"):
-        ends = [getattr(each, end).on(each.scene.robot, end) for each in (task, again)]
+        ends = [numbers_of(getattr(each, end), each.scene.robot) for each in (task, again)]
         for expected, found in zip(*ends, strict=True):
             np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
     assert again.scene.effects == task.scene.effects
@@ -129,9 +144,12 @@ def test_times_may_be_texts(folder: Path) -> None:
 
 def test_options_without_a_key_are_refused_on_saving(folder: Path) -> None:
     task = load_task(write(folder, REACH))
-    for name, value in (("weight", [1.0, 2.0]), ("max_iterations", 7), ("time_limit", "2 s")):
+    for name, value in (("weight", [1.0, 2.0]), ("processes", 2)):
         with pytest.raises(SceneError, match=f"no key for option '{name}'"):
             save_task(task.with_options(**{name: value}), folder / "again.toml")
+    motion = hovi.plan(task.scene, [0, 0], [0.1, 0.1], 1.0, intervals=2).trajectory
+    with pytest.raises(SceneError, match="no key for a motion as option 'guess'"):
+        save_task(task.with_options(guess=motion), folder / "again.toml")
     own = dataclasses.replace(galerkin(2), name="mine")
     with pytest.raises(SceneError, match="the custom scheme 'mine'"):
         save_task(task.with_options(scheme=own), folder / "again.toml")
@@ -177,7 +195,7 @@ MISTAKES = {
     "T < 0": ("= 1.0", "= -3.0", ["`duration`", "-3.0"]),
     "T without a unit": ("= 1.0", '= "1"', ["`duration`", "positive number", '"1"']),
     "unit of T": ("= 1.0", '= "1 sec"', ["line 5", "the duration '1 sec'", "'s'"]),
-    "T = 0 s": ("= 1.0", '= "0 s"', ["line 5", "`duration`", "positive number", '"0 s"']),
+    "T = 0 s": ("= 1.0", '= "0 s"', ["line 5", "`duration`", "positive number", "'0 s'"]),
     "unit in a pair": ("= 1.0", '= ["1 s", "2 mn"]', ["line 5", "'2 mn'", "'min'"]),
     "pair that falls": ("= 1.0", '= ["2 s", 1.0]', ["line 5", "`duration`", "[lower, upper]"]),
     "T = inf": ("= 1.0", "= inf", ["`duration`", "inf"]),
@@ -198,7 +216,11 @@ MISTAKES = {
         ["`goal.q.elbow`", "one number"],
     ),
     "no goal": ("[goal]", "[gaol]", ["`gaol`", "'goal'"]),
-    "start without q": ("q = [-1.57", "v = [-1.57", ["line 8", "`start.q`", "missing"]),
+    "start without q": (
+        "q = [-1.57",
+        "v = [-1.57",
+        ["line 8", "`start` needs q, or a frame and its target"],
+    ),
     "limits by an unknown word": ('"none"', '"urd"', ["line 6", "`limits`", '"urdf"', '"urd"']),
     "limits of another arm": ('"none"', '"panda"', ["line 6", "panda_joint1", "shoulder, elbow"]),
     "limits as a number": ('"none"', "3", ["line 6", "`limits`", '"urdf"', "3"]),
@@ -507,3 +529,172 @@ def test_options_under_their_old_names_warn() -> None:
         assert task.intervals == task.options.intervals
     with pytest.raises(AttributeError, match="no attribute 'intervalls'"):
         _ = task.intervalls
+
+
+WORLD = """
+[[obstacles]]
+name = "floor"
+kind = "half_space"
+normal = [0, 0, 1]
+position = [0, 0, -9]
+[[obstacles]]
+kind = "cylinder"
+radius = 0.1
+length = 1.0
+position = [5.0, 0.0, 0.0]
+[[obstacles]]
+kind = "convex_hull"
+points = [[5, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1]]
+[[obstacles]]
+kind = "mesh"
+file = "parts/wedge.obj"
+position = [5.0, 0.0, 0.0]
+scale = 0.5
+[[obstacles]]
+kind = "point_cloud"
+points = [[5, 0, 0], [6, 0, 0]]
+radius = 0.1
+[[obstacles]]
+kind = "file"
+name = "left"
+file = "parts/kitchen.yaml"
+position = [9.0, 0.0, 0.0]
+"""
+
+
+def test_every_kind_of_obstacle_is_read_and_written(folder: Path, tmp_path: Path) -> None:
+    """Files are relative to the scene, and found again from another folder."""
+    (folder / "parts").mkdir()
+    (folder / "parts" / "wedge.obj").write_text(WEDGE)
+    (folder / "parts" / "kitchen.yaml").write_text(PLANNING_SCENE)
+    task = load_task(write(folder, REACH + WORLD))
+    names = [each.name for each in task.options.clearance.obstacles]
+    assert names == [
+        *("floor", "cylinder 2", "convex hull 3", "mesh 4", "point cloud 5"),
+        *("left/table", "left/table 2", "left/ball", "left/wedge"),
+    ]
+    again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
+    assert '"../parts/wedge.obj"' in (tmp_path / "copy" / "scene.toml").read_text()
+    assert again.options.clearance.to_dict() == task.options.clearance.to_dict()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("parts/wedge.obj", "wedge.obj", "there is no mesh"),
+        ("parts/kitchen.yaml", "kitchen.yaml", "there is no file"),
+        ('file = "parts/kitchen.yaml"', "", "obstacles of a file need `file`"),
+        ('name = "left"', "rpi = [0, 0, 0]", "did you mean 'rpy'"),
+        ("position = [9.0", "package_dirs = 7\nposition = [9.0", "a list of names"),
+        ('kind = "file"', 'kind = "files"', "did you mean 'file'"),
+    ],
+)
+def test_a_wrong_file_of_obstacles_is_one_sentence(
+    folder: Path, old: str, new: str, words: str
+) -> None:
+    (folder / "parts").mkdir()
+    (folder / "parts" / "wedge.obj").write_text(WEDGE)
+    (folder / "parts" / "kitchen.yaml").write_text(PLANNING_SCENE)
+    sentence = refusal(folder, (REACH + WORLD).replace(old, new))
+    assert words in sentence
+    assert "line" in sentence
+
+
+GRASPED = """
+[[obstacles]]
+name = "table"
+kind = "box"
+size = [1, 1, 0.1]
+position = [5.0, 0.0, 0.0]
+[[grasped]]
+name = "box"
+frame = "tip"
+mass = 2.0
+position = [0.1, 0.0, 0.0]
+shape = { kind = "box", size = [0.1, 0.1, 0.1], position = [0, 0, 0] }
+may_touch = ["table"]
+[[grasped]]
+name = "lamp"
+frame = "upper_arm"
+mass = 0.1
+center = [0.0, 0.0, 0.1]
+inertia = [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]
+[[grasped.shape]]
+kind = "sphere"
+position = [0.0, 0.0, 0.2]
+radius = 0.1
+[[grasped.shape]]
+kind = "cylinder"
+position = [0.0, 0.0, 0.1]
+radius = 0.01
+length = 0.2
+"""
+
+
+def test_grasped_objects_are_read_and_written(folder: Path, tmp_path: Path) -> None:
+    """A goal may name the frame of one, and a simulation has their masses."""
+    text = REACH[: REACH.index("[goal]")] + REACH[REACH.index("[scheme]") :]
+    goal = '[goal]\nframe = "box"\nposition = [1.5, 0.0, -1.0]\n'
+    task = load_task(write(folder, text + goal + GRASPED))
+    first, second = task.options.grasped
+    assert first.may_touch == ("table",)
+    assert task.options.clearance.may_touch == (("box", "table"),)
+    assert [each.kind for each in second.shapes] == ["sphere", "cylinder"]
+    again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
+    assert again.options.grasped == task.options.grasped
+    more = pin.computeTotalMass(task.held_scene.model) - pin.computeTotalMass(task.scene.model)
+    assert more == pytest.approx(2.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('frame = "tip"', 'frame = "tipp"', "did you mean 'tip'"),
+        ("mass = 2.0", "mass = -2.0", "`grasped[0].mass` must be a positive number of kilograms"),
+        ("mass = 2.0", "mas = 2.0", "did you mean 'mass'"),
+        ('{ kind = "box"', '{ kind = "boks"', "object 'box': there is no obstacle of kind 'boks'"),
+        ('{ kind = "box", size = [0.1, 0.1, 0.1], position = [0, 0, 0] }', "3", "must be a table"),
+        ('name = "lamp"', 'name = "box"', "two grasped objects have the name 'box'"),
+        ('["table"]', '["tabel"]', "nothing that may touch is named 'tabel'"),
+    ],
+)
+def test_a_wrong_grasped_object_is_one_sentence(
+    folder: Path, old: str, new: str, words: str
+) -> None:
+    sentence = refusal(folder, (REACH + GRASPED).replace(old, new))
+    assert words in sentence
+    assert "line" in sentence
+
+
+MOVING = """
+[[obstacles]]
+name = "cart"
+kind = "box"
+size = [1, 1, 1]
+position = [0, 0, 0.5]
+path = { times = [0, 1], positions = [[9, 0, 0], [9, 5, 0]], rpy = [[0, 0, 0], [0, 0, 1]] }
+[[obstacles]]
+kind = "file"
+file = "kitchen.yaml"
+path.times = [0.0, 1.0]
+path.positions = [[9.0, 0.0, 0.0], [9.0, 5.0, 0.0]]
+"""
+
+
+def test_the_path_of_an_obstacle_is_read_and_written(folder: Path, tmp_path: Path) -> None:
+    (folder / "kitchen.yaml").write_text(PLANNING_SCENE)
+    task = load_task(write(folder, REACH + MOVING))
+    cart, *others = task.options.clearance.obstacles
+    assert cart.motion is not None
+    np.testing.assert_allclose(cart.motion.pose(0.5).translation, [9.0, 2.5, 0.0])
+    assert all(each.motion is not None for each in others)
+    again = load_task(save_task(task, tmp_path / "copy" / "scene.toml"))
+    assert again.options.clearance.to_dict() == task.options.clearance.to_dict()
+
+
+def test_a_wrong_path_is_one_sentence(folder: Path) -> None:
+    (folder / "kitchen.yaml").write_text(PLANNING_SCENE)
+    text = (REACH + MOVING).replace("times = [0, 1]", "times = [1, 0]")
+    assert "obstacle 'cart': the times of a path of an obstacle must ascend" in refusal(
+        folder, text
+    )

@@ -46,6 +46,9 @@ LIBRARIES = {
     "after a carriage return": "o a\rmtllib ../outside/secret.mtl",
     "after a zero": "o a\0mtllib ../outside/secret.mtl",
     "by a link": "mtllib link.mtl",
+    "by the end of a name": "mtllib gone/away/link.mtl",
+    "by the end of a name with a backslash": "mtllib gone\\link.mtl",
+    "by the cut end of a name": "mtllib gone/link.mtlx/abcdefg",
 }
 
 

@@ -111,6 +111,7 @@ def study_effects(
     Raises SceneError when no motion of the task itself is found, and InputError for a candidate at
     a frame that cannot move.
     """
+    task.require_one_motion("a study of effects")
     report = progress or (lambda text, share: None)
     deadline, scene = Deadline(time_limit), task.scene
     tried = tuple(

@@ -7,6 +7,7 @@ interval and its defects are linear in the end states and the accelerations.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from dataclasses import dataclass
 
@@ -83,17 +84,41 @@ _NODAL = {"trapezoidal": _trapezoidal, "hermite-simpson": _hermite_simpson}
 def _gauss(name: str, s: int, radau: bool) -> CollocationTable:
     """s accelerations per interval; q and v at the points are eliminated as their integrals."""
     c = radau_points(s) if radau else (np.polynomial.legendre.leggauss(s)[0] + 1) / 2
-    single, double = lagrange_integrals(c, c)
     b, bb = (row[0] for row in lagrange_integrals(c, np.ones(1)))
-    points = np.zeros((s, 3, s + 4))  # columns q0, v0, a_1 .. a_s, q1, v1
-    points[:, 0, 0] = points[:, 1, 1] = 1.0
-    points[:, 0, 1] = c
-    points[:, 0, 2:-2], points[:, 1, 2:-2], points[:, 2, 2:-2] = double, single, np.eye(s)
+    points = _points_on_curve(c, c)
     defects = np.zeros((2, s + 4))
     defects[0, :2], defects[1, 1] = 1.0, 1.0
     defects[0, 2:-2], defects[1, 2:-2] = bb, b
     defects[0, -2] = defects[1, -1] = -1.0
     return CollocationTable(name, 2 * s - radau, 2, c, points, b, 0.0, defects)
+
+
+def with_points(table: CollocationTable, s: Array, weights: Array) -> CollocationTable:
+    """The same curves with other quadrature points; those of weight 0 only sample limits.
+
+    table: one whose accelerations are all inside the interval. s: points in [0, 1], shape (M,).
+    weights: shape (M,). Raises SchemeError for tables with accelerations at the nodes.
+    """
+    if table.end_weight:
+        raise SchemeError(
+            f"{table.name!r} has quadrature points at the nodes, which cannot be replaced; use "
+            "'lg-S' or 'lgr-S'."
+        )
+    points = _points_on_curve(table.inner, s)
+    return dataclasses.replace(table, points=points, weights=weights)
+
+
+def _points_on_curve(c: Array, s: Array) -> Array:
+    """Rows (q, h v, h^2 a) at times s of curves with accelerations at c, (M, 3, len(c) + 4)."""
+    points = np.zeros((len(s), 3, len(c) + 4))  # columns q0, v0, a_1 .. a_s, q1, v1
+    points[:, 0, 0] = points[:, 1, 1] = 1.0
+    points[:, 0, 1] = s
+    points[:, 1, 2:-2], points[:, 0, 2:-2] = lagrange_integrals(c, s)
+    vandermonde = np.polynomial.legendre.legvander
+    degree = len(c) - 1
+    to_values = np.linalg.solve(vandermonde(2 * c - 1, degree).T, vandermonde(2 * s - 1, degree).T)
+    points[:, 2, 2:-2] = to_values.T
+    return points
 
 
 def radau_points(s: int) -> Array:

@@ -2,7 +2,8 @@
 
 The running cost is the squared torque. The goal is a terminal cost of large weight, whose target is
 then shifted by the remaining error (method of multipliers), so that the penalty leaves no bias.
-Starting with a smaller weight would lead away from a near guess.
+Starting with a smaller weight would lead away from a near guess. With torque limits the solver is
+BoxFDDP, which bounds the control and has no limits on positions and velocities.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ class Arm:
         q0, v0, q1, v1 = (np.array(x) for x in scene["ends"])
         self.start, self.goal = np.concatenate([q0, v0]), np.concatenate([q1, v1])
         self.control = scene["options"]["control"]
+        self.torque_limits = scene["options"].get("torque_limits")
         self.state = cr.StateMultibody(self.model)
         self.actuation = cr.ActuationModelFull(self.state)
         self._check(scene["check"])
@@ -79,7 +81,11 @@ class Solve:
         last = cr.IntegratedActionModelEuler(arm.dynamics(self.terminal), 0.0)
         self.problem = cr.ShootingProblem(arm.start, [stage] * intervals, last)
         self.problem.nthreads = 1  # like all measured methods
-        self.solver = cr.SolverFDDP(self.problem)
+        bounded = arm.torque_limits is not None
+        if bounded:
+            stage.u_ub = np.tile(arm.torque_limits, stage.nu // nu)
+            stage.u_lb = -stage.u_ub
+        self.solver = (cr.SolverBoxFDDP if bounded else cr.SolverFDDP)(self.problem)
         self.solver.th_stop = STOP_TOLERANCE
         self.goal = arm.goal
         q, v, a = (np.array(guess[k]) for k in "qva")
@@ -94,29 +100,46 @@ class Solve:
 
     def run(self) -> None:
         """One solve from the guess."""
-        xs, us, self.steps, feasible = self.xs, self.us, 0, False
-        reference = self.terminal.costs["goal"].cost.residual
-        target = self.goal.copy()
-        for shift in range(TARGET_SHIFTS + 1):
-            if shift:
-                target = target + self.goal - np.array(xs[-1])
-            reference.reference = target
-            self.done = self.solver.solve(xs, us, MAX_ITERATIONS, feasible, 1e-9)
-            self.steps += self.solver.iter
-            xs, us = list(self.solver.xs), list(self.solver.us)
-            feasible = self.solver.isFeasible
-        self.found = xs, us
+        self.steps, self.target = 0, self.goal.copy()
+        self._solve(self.xs, self.us, False)
+        for _ in range(TARGET_SHIFTS):
+            self._shift()
+
+    def replan(self, goal: list[float]) -> None:
+        """A solve with another goal (q, v) from the last motion; shifts end at the tolerance."""
+        self.target = self.target + goal - self.goal
+        self.steps, self.goal = 0, np.array(goal)
+        self._solve(*self.found, self.solver.isFeasible)
+        for _ in range(TARGET_SHIFTS):
+            if self.missed > GOAL_TOLERANCE:
+                self._shift()
+
+    @property
+    def missed(self) -> float:
+        """The error of the final state."""
+        return float(np.abs(self.found[0][-1] - self.goal).max())
+
+    def _shift(self) -> None:
+        """Shift the target by the remaining error, and solve again."""
+        self.target = self.target + self.goal - self.found[0][-1]
+        self._solve(*self.found, self.solver.isFeasible)
+
+    def _solve(self, xs: list[np.ndarray], us: list[np.ndarray], feasible: bool) -> None:
+        """Solve with the current target."""
+        self.terminal.costs["goal"].cost.residual.reference = self.target
+        self.done = self.solver.solve(xs, us, MAX_ITERATIONS, feasible, 1e-9)
+        self.steps += self.solver.iter
+        self.found = list(self.solver.xs), list(self.solver.us)
 
     def answer(self) -> dict[str, Any]:
         """The result of the last solve."""
         self.problem.calc(*self.found)
         x = np.array([np.array(each) for each in self.found[0]])
         n = x.shape[1] // 2
-        missed = float(np.abs(x[-1] - self.goal).max())
         converged = bool(self.done) or self.solver.stop < CONVERGENCE_TOLERANCE
         return {
-            "success": converged and missed < GOAL_TOLERANCE,
-            "message": f"stop {self.solver.stop:.1e}, goal missed by {missed:.1e}",
+            "success": converged and self.missed < GOAL_TOLERANCE,
+            "message": f"stop {self.solver.stop:.1e}, goal missed by {self.missed:.1e}",
             "cost": float(sum(data.cost for data in self.problem.runningDatas)),
             "steps": self.steps,
             "q": x[:, :n].tolist(),

@@ -49,7 +49,7 @@ class ExternalMethod(Method):
         self._setting = setting
         self._guess = setting.nearer if nearer else setting.guess
         self.name, self.family, self.order = name, family, order
-        scene = _scene(setting) | {"options": dict(options)}
+        scene = scene_request(setting) | {"options": dict(options)}
         self._worker = Worker(python, tool, timeout=2 * setting.longest + STARTUP_TIME)
         try:
             self._worker.ask(scene)
@@ -110,8 +110,8 @@ class ExternalTool:
         ]
 
 
-def _scene(setting: Setting) -> dict[str, Any]:
-    """The robot and boundary states, and torques that let a tool check its robot model."""
+def scene_request(setting: Setting) -> dict[str, Any]:
+    """The first request of serve.py: robot and boundary states, and torques to check its model."""
     problem = setting.problem
     model, n = problem.scene.model, problem.robot.nv
     q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, _CHECK_POINTS, n))

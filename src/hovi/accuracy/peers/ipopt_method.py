@@ -16,7 +16,12 @@ from hovi.accuracy import Setting
 from hovi.accuracy.method import CLOCKS, Answer, Method, Prepared, Stopwatch
 from hovi.accuracy.peers.collocation import Collocation
 from hovi.accuracy.peers.collocation_table import NAMES, collocation_table
-from hovi.accuracy.peers.point_program import LIBRARY, PointKernels, compiled, point_kernels
+from hovi.accuracy.peers.point_program import (
+    PointKernels,
+    compiled,
+    loaded_functions,
+    point_kernels,
+)
 from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 
@@ -103,10 +108,9 @@ def _cached(kernels: PointKernels, folder: Path, clock: str) -> tuple[PointKerne
     entry = folder / hashlib.sha256(text).hexdigest()[:16]
     times = entry / "seconds.json"
     if times.exists():
-        names = (kernels.value, kernels.gradient, kernels.hessian)
-        library = str(entry / LIBRARY)
-        functions = PointKernels(*(ca.external(each.name(), library) for each in names))
-        return functions, float(json.loads(times.read_text())[clock])
+        functions = (kernels.value, kernels.gradient, kernels.hessian)
+        loaded = PointKernels(*loaded_functions(functions, entry))
+        return loaded, float(json.loads(times.read_text())[clock])
     entry.mkdir(parents=True, exist_ok=True)
     watches = {name: Stopwatch(name) for name in CLOCKS}
     built = compiled(kernels, entry)

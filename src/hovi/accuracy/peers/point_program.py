@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,19 +66,28 @@ def compiled(kernels: PointKernels, folder: Path) -> PointKernels:
 
     Raises UnmeasurableError if gcc is missing or fails.
     """
+    functions = (kernels.value, kernels.gradient, kernels.hessian)
+    return PointKernels(*compiled_functions(functions, folder))
+
+
+def compiled_functions(functions: Sequence[ca.Function], folder: Path) -> list[ca.Function]:
+    """The functions compiled by gcc into a library in `folder`. Raises as `compiled` does."""
     if shutil.which(COMPILE[0]) is None:
         raise UnmeasurableError("compiled kernels need gcc, which was not found; install gcc.")
-    functions = (kernels.value, kernels.gradient, kernels.hessian)
     generator = ca.CodeGenerator("kernels.c")
     for function in functions:
         generator.add(function)
     generator.generate(f"{folder}/")
-    library = str(folder / LIBRARY)
-    command = [*COMPILE, "-o", library, str(folder / "kernels.c"), "-lm"]
+    command = [*COMPILE, "-o", str(folder / LIBRARY), str(folder / "kernels.c"), "-lm"]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
         raise UnmeasurableError(f"gcc did not compile the kernels: {done.stderr.strip()[:200]}")
-    return PointKernels(*(ca.external(function.name(), library) for function in functions))
+    return loaded_functions(functions, folder)
+
+
+def loaded_functions(functions: Sequence[ca.Function], folder: Path) -> list[ca.Function]:
+    """The functions from the library that `compiled_functions` wrote into `folder`."""
+    return [ca.external(function.name(), str(folder / LIBRARY)) for function in functions]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +122,8 @@ class PointProgram:
         no_parameters, lf, lg = ca.MX.sym("par", 0, 1), ca.MX.sym("lf"), ca.MX.sym("lg", g.shape[0])
         value, slope = kernels.gradient.map(P)(p)
         slope = ca.mtimes(self.points.T, ca.vec(slope * ca.repmat(W.T, m, 1)))
-        columns = list(range(0, m * m * P + 1, m))
-        rows = [m * k + i for k in range(P) for _ in range(m) for i in range(m)]
-        blocks = ca.Sparsity(m * P, m * P, columns, rows)
         scale = ca.repmat(ca.DM(np.repeat(self.weights, m)).T, m, 1)
-        H = ca.MX(blocks, lf * ca.vec(kernels.hessian.map(P)(p) * scale))
+        H = block_diagonal(lf * kernels.hessian.map(P)(p) * scale, P)
         H = ca.mtimes(ca.mtimes(self.points.T, H), self.points)
         fgrad, jacobian = [ca.dot(value.T, W), slope], [g, ca.MX(self.defects)]
         hessian_of = ["x", "p", "lam:f", "lam:g"]
@@ -132,6 +139,14 @@ class PointProgram:
                 "nlp_hess_l", [w, no_parameters, lf, lg], [ca.triu(H)], hessian_of, upper
             ),
         }
+
+
+def block_diagonal(blocks: ca.MX, count: int) -> ca.MX:
+    """The block-diagonal matrix of `count` dense blocks of one size, given side by side."""
+    m, n = blocks.shape[0], blocks.shape[1] // count
+    columns = list(range(0, m * n * count + 1, m))
+    rows = [m * k + i for k in range(count) for _ in range(n) for i in range(m)]
+    return ca.MX(ca.Sparsity(m * count, n * count, columns, rows), ca.vec(blocks))
 
 
 def casadi_matrix(matrix: sparse.spmatrix) -> ca.DM:

@@ -1,8 +1,9 @@
 """The server process of one tool, run by the Python of its environment, without hovi.
 
 It reads and writes one JSON object per line. The first request is the scene; each later one is
-"prepare" or "solve" with a number of intervals. The command-line argument names a module of this
-folder that defines Arm (the checked scene) and Solve (one grid, with methods `run` and `answer`).
+"prepare" or "solve" with a number of intervals; "solve" with a "goal" too moves the goal and starts
+from the last motion. The command-line argument names a module of this folder that defines Arm (the
+checked scene) and Solve (one grid, with methods `run`, `answer`, and `replan` if goals may move).
 """
 
 from __future__ import annotations
@@ -33,7 +34,10 @@ class Session:
         if "solve" in request:
             solve = self._solves[request["solve"]]
             began = self._clock()
-            solve.run()
+            if "goal" in request:
+                solve.replan(request["goal"])
+            else:
+                solve.run()
             return {"seconds": self._clock() - began, **solve.answer()}
         began, intervals = self._clock(), request["prepare"]
         self._solves[intervals] = self._tool.Solve(self._arm, intervals, request["guess"])

@@ -50,8 +50,9 @@ def plan(
         str | None, typer.Option(metavar="SECONDS", help="Return the best motion found by then.")
     ] = None,
     guess: Annotated[
-        str, typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="Initial guess.")
-    ] = "cubic",
+        str | None,
+        typer.Option(metavar="cubic|minimum-jerk|FILE.npz", help="Override the scene's."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="F.npz", help="Path of the motion.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
     certificate: Annotated[
@@ -99,7 +100,9 @@ def _options(flags: dict[str, Any]) -> dict[str, Any]:
     if limits not in names:
         hint = nearest(limits, names)
         raise InputError(f"--limits {limits!r}: {hint} Give other limits in the scene file.")
-    return given | {"guess": _guess(given["guess"])} | _tolerance_override(given)
+    if "guess" in given:
+        given["guess"] = _guess(given["guess"])
+    return given | _tolerance_override(given)
 
 
 def _tolerance_override(given: dict[str, Any]) -> dict[str, Any]:
@@ -148,6 +151,8 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     from hovi.system.deadline import Deadline
 
     deadline = Deadline(task.options.time_limit_seconds)
+    if not json:
+        _note_assumptions(task)
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
     written, save_error = out, None
@@ -168,6 +173,22 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
         if save_error is not None:
             raise save_error
     return 0 if solution.success else 1
+
+
+def _note_assumptions(task: Task) -> None:
+    """Print what the plan assumes without being told; see its message for more."""
+    import sys
+    from contextlib import suppress
+
+    from hovi.planning.problem.presolve.assumptions import assumptions
+    from hovi.planning.search.group import in_group
+
+    scene, group = task.scene, task.options.group
+    if group is not None:
+        scene, _, _ = in_group(scene, group, task.start, task.goal)
+    with suppress(OSError):  # stderr may be closed
+        for sentence in assumptions(scene, weighted=task.options.weight is not None):
+            print(f"note: {sentence}", file=sys.stderr, flush=True)
 
 
 def _margins(solution: Solution, deadline: Deadline, report: Progress | None) -> Margins:

@@ -44,6 +44,7 @@ def simulate(
     Exit code 0, or 2 for invalid input.
     """
     from hovi.cli.arguments.files import check_output, find_scene
+    from hovi.cli.reports.progress import progress
     from hovi.errors import InputError
     from hovi.planning.task_file.reading import load_task
 
@@ -56,13 +57,15 @@ def simulate(
     if plan is None and feedback != "none":
         raise InputError("--feedback needs a plan to track; give one with --plan F.npz.")
     task = load_task(find_scene(scene))
-    if plan is None:
-        motion = _simulate(task, duration, intervals, inner_modes)
-        report = _report(task, motion, out)
-    else:
-        tracking = _track(task, plan, feedback, bandwidth, intervals, inner_modes)
-        motion = tracking.simulation
-        report = _report(task, motion, out) | _deviation(tracking, plan, feedback, bandwidth)
+    task.require_one_motion("a simulation")
+    with progress(quiet=json, doing="simulating"):
+        if plan is None:
+            motion = _simulate(task, duration, intervals, inner_modes)
+            report = _report(task, motion, out)
+        else:
+            tracking = _track(task, plan, feedback, bandwidth, intervals, inner_modes)
+            motion = tracking.simulation
+            report = _report(task, motion, out) | _deviation(tracking, plan, feedback, bandwidth)
     if out is not None:
         motion.trajectory.save(out)
     if json:
@@ -84,7 +87,9 @@ def _simulate(
     longest = max(task.duration) if isinstance(task.duration, tuple) else task.duration
     T = longest if duration is None else positive_seconds("--duration", duration)
     N = max(1, math.ceil(100 * T)) if intervals is None else intervals
-    return simulate_motion(task.scene, task.start, T, intervals=N, inner_modes=inner_modes)
+    return simulate_motion(
+        task.held_scene, task.start_state, T, intervals=N, inner_modes=inner_modes
+    )
 
 
 def _track(
@@ -99,7 +104,7 @@ def _track(
     from hovi.flows.execution.tracking import play
 
     return play(
-        task.scene,
+        task.held_scene,
         load_trajectory(plan),
         feedback,
         bandwidth=bandwidth,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hovi.discrete.grid import Grid
-from hovi.discrete.motion_error import MotionError
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task

@@ -81,7 +81,7 @@ def least_distance(motion: Solution | Trajectory) -> float | None:
         return None
     clearance, distances = kept
     approach = approach_along(_trajectory_of(motion), distances, clearance.margin)
-    return float(approach.distance.min())
+    return float((approach.distance - distances.allowance).min())
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from hovi.cli.reports.certificate import certificate_json, certificate_lines
 from hovi.cli.reports.extremes import extremes_json, extremes_lines
 from hovi.cli.reports.limit_margins import LimitMargins, Margins
 from hovi.cli.reports.peaks import Peaks, peaks
+from hovi.cli.reports.segments import segment_lines, segments_json
 from hovi.cli.reports.terminal_table import print_table, terminal_table
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.planning.refinement.certificate import Certificate
@@ -57,6 +58,7 @@ def as_json(
         "excess": None if limits is None else limits.excess,
         "least_distance": margins.distance,
         "out": None if out is None else str(out),
+        **segments_json(solution),
         **accuracy_json(solution, task),
         "certificate": None if certificate is None else certificate_json(certificate),
     }
@@ -120,6 +122,7 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
+    rows += segment_lines(solution)
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""

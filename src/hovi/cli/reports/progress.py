@@ -14,20 +14,21 @@ if TYPE_CHECKING:
 
 BAR_DELAY = 1.0
 """Time in [s] before the bar appears."""
-LINE_PERIOD = 10.0
+LINE_PERIOD = 5.0
 """Time in [s] between plain lines."""
 
 
 @contextmanager
-def progress(quiet: bool) -> Iterator[Progress | None]:
+def progress(quiet: bool, doing: str = "planning") -> Iterator[Progress | None]:
     """The `progress` argument of `hovi.plan`; None when quiet.
 
     What was reported last is shown with the time since the beginning, also while nothing new is.
+    doing: what is shown until something is reported.
     """
     if quiet:
         yield None
         return
-    shown = _progress_bar() if sys.stderr.isatty() else _plain_lines()
+    shown = _progress_bar(doing) if sys.stderr.isatty() else _plain_lines(doing)
     with shown as report:
         yield _harmless(report)
 
@@ -43,14 +44,14 @@ def _harmless(report: Progress) -> Progress:
 
 
 @contextmanager
-def _progress_bar() -> Iterator[Progress]:
+def _progress_bar(doing: str) -> Iterator[Progress]:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     bar = Bar(*columns, console=Console(stderr=True), transient=True)
-    line = bar.add_task("", total=1.0)
+    line = bar.add_task(doing, total=1.0)
 
     def report(text: str, fraction: float) -> None:
         bar.update(line, description=text.replace("[", r"\["), completed=fraction)
@@ -64,8 +65,8 @@ def _progress_bar() -> Iterator[Progress]:
 
 
 @contextmanager
-def _plain_lines() -> Iterator[Progress]:
-    began, last = time.monotonic(), ("planning", 0.0)
+def _plain_lines(doing: str) -> Iterator[Progress]:
+    began, last = time.monotonic(), (doing, 0.0)
 
     def report(text: str, fraction: float) -> None:
         nonlocal last

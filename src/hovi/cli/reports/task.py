@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from hovi.discrete.state import State
     from hovi.planning.problem.frame_goal import FrameGoal
+    from hovi.planning.problem.limits import Limits
     from hovi.planning.task_file.task import Task
     from hovi.robot.robot import Robot
 
@@ -24,18 +25,41 @@ def describe_task(task: Task) -> str:
     if not options.names_grid:
         how = f"tolerance {as_number_or_text(options.effective_tolerance)}"
     lines = [f"task {task.name!r}: {_duration(task)}, {how}"]
-    lines.append(f"starts {options.starts}, seed {options.seed}, limits {_limits(task)}")
+    lines.append(
+        f"starts {options.starts}, seed {options.seed}, limits {_limits(task.options.limits)}"
+    )
     if options.smooth:
         lines.append("smooth: with a cost on the jerk, see the effect jerk_cost")
     arm = limit_set_of(task)
     if arm is not None:
         lines += [f"limits of a {arm.title}, published in", *source_lines(arm)]
+    for each in options.grasped:
+        lines.append(f"holds {each.name!r}, {each.mass:g} kg, at {each.frame!r}")
     if options.clearance.wanted:
         lines.append(f"keeps {options.clearance.margin:g} m from {_kept_from(task)}")
-    lines += _end(task.start, "start", robot) + _end(task.goal, "goal", robot)
+    lines += _end(task.start, "start", robot)
+    lines += _segments(task) if task.segments else _end(task.goal, "goal", robot)
     for via in options.via:
         lines += [f"via at {via.time:g} s:", *(f"  {x}" for x in _end(via.goal, "via", robot))]
     return "\n".join([*lines, "", task.scene.describe(), "", robot.describe()])
+
+
+def _segments(task: Task) -> list[str]:
+    """The segments: when they end, where, and what is theirs alone."""
+    from hovi.planning.sequence.segment import as_goal, names_of
+
+    robot, lines, end = task.scene.robot, [], 0.0
+    for name, each in zip(names_of(task.segments), task.segments, strict=True):
+        begin, end = end, end + each.duration
+        lines.append(f"segment {name!r}: {each.duration:g} s, from {begin:g} to {end:g} s")
+        own = [effect.describe() for effect in each.effects]
+        if each.limits is not None:
+            own.append(f"limits {_limits(each.limits)}")
+        where = ["goal: none, where the best motion passes"]
+        if each.goal is not None:
+            where = _end(as_goal(each.goal, robot), "goal", robot)
+        lines += [f"  {line}" for line in (*own, *where)]
+    return lines
 
 
 def _duration(task: Task) -> str:
@@ -79,16 +103,15 @@ def _kept_from(task: Task) -> str:
     return ", ".join(names + (["itself"] if task.options.clearance.self_collision else []))
 
 
-def _limits(task: Task) -> str:
+def _limits(limits: str | Limits | Mapping[str, Any]) -> str:
     from hovi.planning.problem.limits import Limits
 
-    if isinstance(task.options.limits, str):
-        return task.options.limits
-    if isinstance(task.options.limits, Limits):
+    if isinstance(limits, str):
+        return limits
+    if isinstance(limits, Limits):
         return "given"
-    base = task.options.limits.get("base", "urdf")
-    given = [f"{key} = {value}" for key, value in task.options.limits.items() if key != "base"]
-    return "; ".join([base, *given])
+    given = [f"{key} = {value}" for key, value in limits.items() if key != "base"]
+    return "; ".join([limits.get("base", "urdf"), *given])
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -24,6 +24,7 @@ from hovi.scene.scene import Scene
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-11, 1e-13
 """Tolerances of the integration."""
@@ -70,17 +71,18 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
     a = ABA(q, v, tau - torques of effects), with tau of the interpolant at the same times and zero
     at passive joints; each interval starts at its node, in the chart of that node.
     frame: whose deviation is reported, by default the largest of the robot's tip_frames.
+    The intervals of a segment are simulated in its own scene.
     Raises InputError with the reason if this is not possible.
     """
     from scipy.integrate import solve_ivp  # slow to import, and only needed here
 
-    scene, robot = _scene_of(trajectory)
+    robot, parts = _parts_of(trajectory)
     robot.measured_frames(
         frame
     )  # raises for a frame that is unknown or fixed, before the integration
     N, n = trajectory.v[:-1].shape
     h, start = trajectory.grid.steps[:, None], trajectory.q[:-1]
-    forward = _ForwardDynamics(scene, trajectory)
+    forward = [_ForwardDynamics(scene, trajectory, index) for scene, index in parts]
     k = np.arange(N)
 
     def rates(s: float, y: Array) -> Array:
@@ -88,7 +90,8 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         raise_if_late()
         tau = trajectory.sample_intervals(k, np.full(N, s)).tau
         t = trajectory.t[:-1] + s * trajectory.grid.steps
-        a = forward(robot.integrate(start, x), hv / h, tau, t)
+        given = robot.integrate(start, x), hv / h, tau, t
+        a = np.concatenate([each(*(row[each.index] for row in given)) for each in forward])
         return np.concatenate([chart_rates(robot, start, x, hv), h * h * a]).ravel()
 
     first = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
@@ -130,20 +133,19 @@ def chart_rates(robot: Robot, origin: Array, x: Array, v: Array) -> Array:
 
 
 class _ForwardDynamics:
-    """a(q, v, tau, t) of a scene by Pinocchio's ABA.
+    """a(q, v, tau, t) of a scene by Pinocchio's ABA, in some intervals of a motion.
 
     Torques of effects are subtracted first; they must not depend on a.
     """
 
-    def __init__(self, scene: Scene, trajectory: Trajectory) -> None:
+    def __init__(self, scene: Scene, trajectory: Trajectory, index: Index) -> None:
         self.scene = scene
+        self.index = index
         self.data = scene.model.createData()
         self.passive = scene.passive_coordinates
         self._mass = MassMatrix(scene.model) if scene.robot.couplings else None
-        motion = trajectory.sample_intervals(
-            np.arange(trajectory.grid.intervals), np.full(trajectory.grid.intervals, 0.5)
-        )
-        t = trajectory.t[:-1] + 0.5 * trajectory.grid.steps
+        motion = trajectory.sample_intervals(index, np.full(len(index), 0.5))
+        t = trajectory.t[index] + 0.5 * trajectory.grid.steps[index]
         moving = self._added(motion.q, motion.v, motion.a, t)
         still = self._added(motion.q, motion.v, np.zeros_like(motion.a), t)
         # along a motion of mechanics tau is rounding, of which the inertial torque is the scale
@@ -175,10 +177,13 @@ class _ForwardDynamics:
         return np.asarray(self.scene.inverse_dynamics(q, v, a, t) - rigid)
 
 
-def _scene_of(trajectory: Trajectory) -> tuple[Scene, Robot]:
-    scene = trajectory.scene
+def _parts_of(trajectory: Trajectory) -> tuple[Robot, list[tuple[Scene, Index]]]:
+    """The robot, and the scene of each segment with its intervals, in order of time."""
+    k = np.arange(trajectory.grid.intervals)
     if trajectory.segments is not None:
-        raise InputError("a motion in segments has several scenes, and this takes one")
-    if scene is None:
+        known = trajectory.segments
+        pieces = np.split(k, np.cumsum(known.intervals)[:-1])
+        return known.robot, list(zip(known.scenes, pieces, strict=True))
+    if trajectory.scene is None:
         raise InputError("the motion was saved without its scene")
-    return scene, scene.robot
+    return trajectory.scene.robot, [(trajectory.scene, k)]

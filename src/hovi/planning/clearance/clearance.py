@@ -9,7 +9,7 @@ from typing import Any
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
-from hovi.planning.clearance.obstacles import Obstacle, obstacle_from_dict
+from hovi.planning.obstacles.obstacle import Obstacle
 
 DISTANCE_SCALE = 0.1
 """Unit in which the solver measures distances, in [m]; limits are measured by their ranges."""
@@ -19,9 +19,11 @@ MAX_MARGIN = 1e9
 """Largest margin, in [m]."""
 MAX_OBSTACLES = 1_000
 """Maximum number of obstacles."""
+TOUCH_DEPTH = 1e-3
+"""Depth by which shapes that may touch may overlap, in [m]."""
 
 
-@check_arguments_except("obstacles", "margin")
+@check_arguments_except("obstacles", "margin", "may_touch")
 @dataclass(frozen=True, eq=False)
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
@@ -29,38 +31,43 @@ class Clearance:
     obstacles: static shapes in the world; those without a name are numbered.
     margin: the minimum distance, in [m]; 0 allows contact.
     self_collision: whether links keep the margin from each other, too: all pairs that are not
-        connected by one joint, except those that the robot's SRDF disables.
+        connected by one joint, except those that the robot's SRDF disables and those that overlap
+        at every configuration.
+    may_touch: pairs of names, of a link and of an obstacle or another link, that need not keep the
+        margin and may overlap by TOUCH_DEPTH, such as what is grasped and what it stands on.
     Raises InputError for other objects, equal names or a margin that is no length.
     """
 
     obstacles: Sequence[Obstacle] = ()
     margin: float = DEFAULT_MARGIN
     self_collision: bool = False
+    may_touch: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.obstacles, Obstacle):
             object.__setattr__(self, "obstacles", (self.obstacles,))
         if not isinstance(self.obstacles, Sequence):
             raise InputError(
-                f"obstacles must be a list of hovi.Sphere, hovi.Capsule or hovi.Box, got "
-                f"{self.obstacles!r}."
+                f"obstacles must be a list, such as of hovi.Sphere, got {self.obstacles!r}."
             )
         if len(self.obstacles) > MAX_OBSTACLES:
             raise InputError(f"there may be at most {MAX_OBSTACLES} obstacles.")
-        for each in self.obstacles:
+        given = [_from_table(x) if isinstance(x, Mapping) else x for x in self.obstacles]
+        for each in given:
             if not isinstance(each, Obstacle):
                 raise InputError(
-                    f"an obstacle must be a hovi.Sphere, hovi.Capsule or hovi.Box, got {each!r}."
+                    f"an obstacle must be a hovi.Sphere, hovi.Box or another kind, got {each!r}."
                 )
         named = tuple(
-            each if each.name else dataclasses.replace(each, name=f"{each.kind} {number}")
-            for number, each in enumerate(self.obstacles, start=1)
+            each if each.name else dataclasses.replace(each, name=f"{each.in_words} {number}")
+            for number, each in enumerate(given, start=1)
         )
         names = [each.name for each in named]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two obstacles have the name {name!r}; give each its own name.")
         object.__setattr__(self, "obstacles", named)
+        object.__setattr__(self, "may_touch", _pairs_of_names(self.may_touch))
         number = isinstance(self.margin, float | int) and not isinstance(self.margin, bool)
         if not (number and 0 <= self.margin <= MAX_MARGIN):
             raise InputError(
@@ -76,18 +83,69 @@ class Clearance:
     def to_dict(self) -> dict[str, Any]:
         """The clearance as JSON-able data."""
         return {
-            "obstacles": [each.to_dict() for each in self.obstacles],
+            "obstacles": [each.recorded().to_dict() for each in self.obstacles],
             "margin": float(self.margin),
             "self_collision": bool(self.self_collision),
+            **({"may_touch": [list(pair) for pair in self.may_touch]} if self.may_touch else {}),
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Clearance:
         """The inverse of to_dict. Raises InputError for other data."""
+        from hovi.planning.clearance.obstacles import obstacle_from_dict  # 10 ms
+
         try:
+            if any("file" in each for each in data["obstacles"]):
+                raise InputError("a recorded clearance names no files.")
             obstacles = [obstacle_from_dict(each) for each in data["obstacles"]]
-            return cls(obstacles, float(data["margin"]), bool(data["self_collision"]))
+            touching = [tuple(pair) for pair in data.get("may_touch", ())]
+            margin, both = float(data["margin"]), bool(data["self_collision"])
+            return cls(obstacles, margin, both, touching)
         except (KeyError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise InputError(
                 f"expected the clearance that `to_dict` returns, got data with {error!r}."
             ) from error
+
+
+def _from_table(table: Mapping[str, Any]) -> Obstacle:
+    """An obstacle in the words of a scene file. Raises InputError."""
+    from hovi.planning.clearance.obstacles import obstacle_from_dict  # 10 ms
+
+    return obstacle_from_dict(table)
+
+
+def _pairs_of_names(pairs: Any) -> tuple[tuple[str, str], ...]:
+    """Pairs of different names. Raises InputError for anything else."""
+    if not isinstance(pairs, Sequence) or not all(_is_pair(pair) for pair in pairs):
+        raise InputError(
+            f"may_touch must be a list of pairs of different names, got {pairs!r:.200}."
+        )
+    return tuple((first, second) for first, second in pairs)
+
+
+def _is_pair(pair: Any) -> bool:
+    """Whether something is two different names."""
+    two = isinstance(pair, tuple | list) and len(pair) == 2
+    return two and all(isinstance(name, str) for name in pair) and pair[0] != pair[1]
+
+
+@dataclass(frozen=True, eq=False)
+class PartOfClearance(Clearance):
+    """The clearance of some pairs of shapes only.
+
+    whole: the clearance of all pairs. numbers: of the pairs, as its distances list them.
+    """
+
+    whole: Clearance = Clearance()
+    numbers: tuple[int, ...] = ()
+
+    @classmethod
+    def of(cls, whole: Clearance, numbers: Sequence[int]) -> PartOfClearance:
+        """Of pairs by their numbers."""
+        fields = whole.obstacles, whole.margin, whole.self_collision, whole.may_touch
+        return cls(*fields, whole, tuple(int(k) for k in numbers))
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there are pairs."""
+        return bool(self.numbers)

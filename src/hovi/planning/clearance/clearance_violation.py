@@ -39,45 +39,81 @@ class Approach:
         return int(k), int(pair)
 
 
-def approach_along(trajectory: Trajectory, distances: Distances, least: float) -> Approach:
-    """Closest approaches along the interpolant, refined where they are near `least`, in [m]."""
+def approach_along(
+    trajectory: Trajectory, distances: Distances, least: float, reach: float = np.inf
+) -> Approach:
+    """Closest approaches along the interpolant, refined where they are near `least`, in [m].
+
+    reach: distance in [m] beyond which a lower bound of at least that is enough.
+    """
+    nearest, at = _nearest(*_sampled(trajectory, distances, reach))
+    return _refined(trajectory, distances, nearest, at, least + REFINEMENT_DISTANCE)
+
+
+def near_pairs(trajectory: Trajectory, distances: Distances, least: float) -> npt.NDArray[np.intp]:
+    """Numbers of the pairs that come nearer than `least`, in [m], anywhere along a motion."""
+    below = least + REFINEMENT_DISTANCE
+    nearest, at = _nearest(*_sampled(trajectory, distances, below))
+    closest = nearest.min(axis=0)
+    unclear = np.flatnonzero((closest >= least) & (closest < below))
+    some = distances.restricted(unclear.tolist())
+    refined = _refined(trajectory, some, nearest[:, unclear], at[:, unclear], below)
+    closest[unclear] = refined.distance.min(axis=0)
+    return np.flatnonzero(closest < least)
+
+
+def distances_over_time(
+    trajectory: Trajectory, distances: Distances, t: Array, reach: float = np.inf
+) -> Array:
+    """Distances of every pair at given times, shape (M, K), in [m].
+
+    reach: as for `approach_along`.
+    """
+    return distances.values(distances.at(trajectory.configurations(t), t), reach)
+
+
+def _sampled(trajectory: Trajectory, distances: Distances, reach: float) -> tuple[Array, Array]:
+    """Relative positions (SAMPLES,) in every interval, and the distances, (N, SAMPLES, K)."""
     N = trajectory.grid.intervals
     s = np.linspace(0.0, 1.0, SAMPLES)
-    d = _measured(trajectory, distances, np.repeat(np.arange(N), SAMPLES), np.tile(s, N))
-    d = d.reshape(N, SAMPLES, -1)
-    index = np.argmin(d, axis=1)  # (N, K)
-    nearest = np.take_along_axis(d, index[:, None], axis=1)[:, 0]
-    return _refined(trajectory, distances, nearest, s[index], least + REFINEMENT_DISTANCE)
+    d = _measured(trajectory, distances, np.repeat(np.arange(N), SAMPLES), np.tile(s, N), reach)
+    return s, d.reshape(N, SAMPLES, -1)
 
 
-def distances_over_time(trajectory: Trajectory, distances: Distances, t: Array) -> Array:
-    """Distances of every pair at given times, shape (M, K), in [m]."""
-    return distances.values(trajectory.configurations(t))
+def _nearest(s: Array, d: Array) -> tuple[Array, Array]:
+    """The smallest of the sampled distances in every interval, and where, (N, K)."""
+    index = np.argmin(d, axis=1)
+    return np.take_along_axis(d, index[:, None], axis=1)[:, 0], s[index]
 
 
 def _measured(
-    trajectory: Trajectory, distances: Distances, k: npt.NDArray[np.intp], s: Array
+    trajectory: Trajectory,
+    distances: Distances,
+    k: npt.NDArray[np.intp],
+    s: Array,
+    reach: float = np.inf,
 ) -> Array:
     """Distances at relative positions s in intervals k, shape (M, K)."""
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    return distances_over_time(trajectory, distances, np.minimum(t, trajectory.duration))
+    return distances_over_time(trajectory, distances, np.minimum(t, trajectory.duration), reach)
 
 
 def _refined(
     trajectory: Trajectory, distances: Distances, nearest: Array, at: Array, below: float
 ) -> Approach:
     nearest, at = nearest.copy(), at.copy()
-    k, pair = np.nonzero(nearest < below)
-    width = 1.0 / (SAMPLES - 1)
-    rows = np.arange(len(k))
-    for _ in range(REFINEMENT_PASSES if len(k) else 0):
-        around = at[k, pair][:, None] + width * np.linspace(-1.0, 1.0, REFINED_SAMPLES)
-        around = np.clip(around, 0.0, 1.0)
-        d = _measured(trajectory, distances, np.repeat(k, REFINED_SAMPLES), around.ravel())
-        values = d.reshape(len(k), REFINED_SAMPLES, -1)[rows, :, pair]
-        best = np.argmin(values, axis=1)
-        nearest[k, pair], at[k, pair] = values[rows, best], around[rows, best]
-        width *= 2.0 / (REFINED_SAMPLES - 1)
+    near = nearest < below
+    for pair in np.flatnonzero(near.any(axis=0)):
+        k, alone = np.flatnonzero(near[:, pair]), distances.restricted([int(pair)])
+        width, rows = 1.0 / (SAMPLES - 1), np.arange(len(k))
+        for _ in range(REFINEMENT_PASSES):
+            around = at[k, pair][:, None] + width * np.linspace(-1.0, 1.0, REFINED_SAMPLES)
+            around = np.clip(around, 0.0, 1.0)
+            d = _measured(trajectory, alone, np.repeat(k, REFINED_SAMPLES), around.ravel())
+            values = d.reshape(len(k), REFINED_SAMPLES)
+            best = np.argmin(values, axis=1)
+            nearest[k, pair], at[k, pair] = values[rows, best], around[rows, best]
+            width *= 2.0 / (REFINED_SAMPLES - 1)
     return Approach(nearest, at)
 
 
@@ -87,8 +123,9 @@ def approach_sentence(
     """The pair that comes closest: its names, the distance, the time and the margin."""
     k, pair = approach.worst()
     t = trajectory.t[k] + approach.at[k, pair] * trajectory.grid.steps[k]
+    distance = float(approach.distance[k, pair] - distances.allowance[pair])
     return (
-        f"{distances.pairs[pair]} {distance_in_words(float(approach.distance[k, pair]))} at "
+        f"{distances.pairs[pair]} {distance_in_words(distance)} at "
         f"t = {t:.3g} s, the margin is {margin:g} m"
     )
 

@@ -6,13 +6,11 @@ from functools import lru_cache
 
 import coal
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.errors import ModelError
+from hovi.planning.obstacles.hull import hull_of
 from hovi.robot.robot import Robot
-
-Array = npt.NDArray[np.float64]
 
 _CONVEX = (
     coal.Box,
@@ -55,27 +53,10 @@ def _convex(item: pin.GeometryObject, robot: Robot) -> coal.CollisionGeometry:
     if isinstance(shape, _CONVEX):
         return shape
     if isinstance(shape, coal.BVHModelBase):
-        hull = _hull(np.array(shape.vertices()))
+        hull = hull_of(np.array(shape.vertices()))
         if hull is not None:
             return hull
     raise ModelError(
         f"collision shape {item.name!r} of robot {robot.name!r} has no convex hull "
         f"({type(shape).__name__}); use a mesh with volume, or a primitive."
     )
-
-
-def _hull(vertices: Array) -> coal.ConvexBase | None:
-    """The convex hull of vertices (M, 3); None if they span no volume.
-
-    SciPy computes the hull's vertices first, since Coal's own call crashes on flat shapes. It is
-    imported here because the import takes a quarter of a second and few scenes need it.
-    """
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        corners = vertices[ConvexHull(vertices).vertices]
-    except (QhullError, ValueError):
-        return None
-    points = coal.StdVec_Vec3s()
-    points.extend(list(corners))
-    return coal.Convex.convexHull(points, True, "Qt")

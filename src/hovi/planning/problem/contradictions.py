@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.state import Periodic
 from hovi.planning.clearance.clearance_violation import distance_in_words
 from hovi.planning.problem.arms.limit_set import KIND_NAMES
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goal_clearance import goal_in_obstacle
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.node_conditions import JointCondition
+from hovi.planning.problem.presolve.end_torques import unavoidable_torque
+from hovi.planning.problem.presolve.legs import Stop, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.space.coordinates import Coordinates
 
@@ -27,7 +30,7 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     Checks the ends, the via points, and the mean velocities that the duration requires.
     """
     q0, v0, q1, v1 = problem.boundary
-    names, space = problem.coordinates.coordinate_names, problem.coordinates.space
+    space = problem.coordinates.space
     q0, q1 = space.coordinates(q0), space.coordinates(q1)
     if problem.unreachable:
         return problem.unreachable
@@ -42,31 +45,9 @@ def contradiction(problem: TrajectoryProblem, limits: Limits) -> str:
     return (
         _via_outside(problem, limits)
         or _end_in_obstacle(problem)
-        or _duration_too_short(problem, limits, names)
+        or _duration_too_short(problem, limits)
+        or unavoidable_torque(problem, limits)
     )
-
-
-def static_sentence(problem: TrajectoryProblem, limits: Limits) -> str:
-    """Which end exceeds a torque limit at rest, as the end of a sentence; "" if none does."""
-    if not problem.about_robot:
-        return ""
-    q0, v0, q1, v1 = problem.boundary
-    zero = np.zeros((1, problem.coordinates.nv))
-    for i, (end, q, v) in enumerate((("start", q0, v0), ("goal", q1, v1))):
-        if np.any(v != 0) or problem.free_ends[i].any():
-            continue
-        here, scene = limits.at_ends[i], problem.scenes[-i]
-        tau = scene.inverse_dynamics(q[None], zero, zero)[0]
-        over = np.maximum(here.lower[3] - tau, tau - here.upper[3])
-        i = int(np.argmax(over))
-        if over[i] > 0:
-            bound = here.upper[3, i] if tau[i] > 0 else here.lower[3, i]
-            return (
-                f"; holding the robot still at the {end} takes {tau[i]:.4g} "
-                f"{problem.coordinates.coordinate_units[i].tau} at joint "
-                f"{problem.coordinates.coordinate_names[i]!r}, whose limit is {bound:.4g}"
-            )
-    return ""
 
 
 def _outside(
@@ -111,12 +92,14 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
     for i, end in enumerate(("start", "goal")):
         if problem.free_ends[i, 0].any():
             continue
-        d = problem.distances.values(problem.boundary[2 * i][None])[0]
+        t = i * problem.grid.duration
+        d = problem.distances.values(problem.distances.at(problem.boundary[2 * i][None], t))[0]
         k = int(np.argmin(d))
         if d[k] < margin - MARGIN_TOLERANCE:
-            needed = "" if d[k] < 0 else f", less than the margin of {margin:g} m"
+            distance = float(d[k] - problem.distances.allowance[k])
+            needed = "" if distance < 0 else f", less than the margin of {margin:g} m"
             return (
-                f"at the {end} {pairs[k]} {distance_in_words(float(d[k]))}{needed}; change the "
+                f"at the {end} {pairs[k]} {distance_in_words(distance)}{needed}; change the "
                 f"{end} or move the obstacle"
             )
     goals = [(problem.goal, "goal"), *((via.goal, "via point") for via in problem.via)]
@@ -128,22 +111,13 @@ def _end_in_obstacle(problem: TrajectoryProblem) -> str:
     return ""
 
 
-def _duration_too_short(problem: TrajectoryProblem, limits: Limits, names: tuple[str, ...]) -> str:
-    """Which joint cannot cover its distance at its velocity limit in time; "" if all can."""
-    q0, _, q1, _ = problem.boundary
-    if limits.parts:
-        return ""
-    distance = problem.coordinates.difference(q0, q1)
-    T = problem.grid.duration
-    fastest = np.where(distance >= 0, limits.upper[1], -limits.lower[1])
-    needed = np.abs(distance) / np.maximum(fastest, 1e-300)
-    needed[problem.free_ends[:, 0].any(axis=0)] = 0.0
-    i = int(np.argmax(needed))
-    if needed[i] <= T:
-        return ""
-    units = problem.coordinates.coordinate_units[i]
-    return (
-        f"joint {names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}, which takes "
-        f"{needed[i]:.4g} s at its velocity limit of {fastest[i]:.4g} {units.v}, longer than the "
-        f"duration of {T:.4g} s; increase the duration or the velocity limit"
-    )
+def _duration_too_short(problem: TrajectoryProblem, limits: Limits) -> str:
+    """Which joint cannot cover its distance within the limits in time; "" if all can."""
+    first, last = problem.start, problem.goal
+    if isinstance(last, Periodic):
+        timed = problem.ld.lagrangian.timed
+        first, last = last.ends(first, problem.coordinates, problem.ld.k, timed)
+    stops = [Stop(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via]
+    stops = sorted(stops, key=lambda stop: stop.time)
+    ends = Stop("start", 0.0, first), Stop("goal", problem.grid.duration, last)
+    return states_too_far_apart(problem.coordinates, [ends[0], *stops, ends[1]], limits)

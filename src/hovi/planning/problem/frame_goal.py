@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,9 +14,11 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments
+from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.errors import InputError
+from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_from
 from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
@@ -24,6 +27,8 @@ Array = npt.NDArray[np.float64]
 
 MAX_ANGLE_ERROR = 1e-6
 """Angle in [rad] above which a frame whose equations hold is half a turn away from its goal."""
+_TURNS = ("rotation", *ORIENTATIONS, "axis")
+"""What a frame goal says of its orientation: one of them at most."""
 ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest deviation of a rotation matrix from orthonormality, and smallest length of an axis."""
 
@@ -37,11 +42,15 @@ class FrameGoal:
     pose: a homogeneous matrix (4, 4) or a pinocchio.SE3; sets position and rotation.
     position: of the frame's origin in the world, shape (3,), in [m].
     rotation: of the frame's axes in the world, shape (3, 3).
+    rpy: the same as roll, pitch and yaw in [rad]: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.
+    quaternion_xyzw, quaternion_wxyz: the same as a unit quaternion, in that order.
     axis: (direction in the frame, direction in the world), two vectors of shape (3,).
     free_velocity: joints whose velocity at the goal is free, by name or ALL; the others are at
         rest.
     guess: configuration (nq,) from which inverse kinematics starts.
-    Raises InputError for a matrix that is no rotation, an axis without length, or an empty goal.
+    Whatever was given, `position`, `rotation` and `axis` hold the goal.
+    Raises InputError for a matrix that is no rotation, an axis or a quaternion without length, or
+    an empty goal.
     """
 
     frame: str
@@ -49,12 +58,21 @@ class FrameGoal:
     position: npt.ArrayLike | None = None
     rotation: npt.ArrayLike | None = None
     axis: tuple[npt.ArrayLike, npt.ArrayLike] | None = None
+    rpy: npt.ArrayLike | None = field(default=None, kw_only=True)
+    quaternion_xyzw: npt.ArrayLike | None = field(default=None, kw_only=True)
+    quaternion_wxyz: npt.ArrayLike | None = field(default=None, kw_only=True)
     free_velocity: Sequence[str] = field(default=(), kw_only=True)
     guess: npt.ArrayLike | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        turned = [name for name in _TURNS if getattr(self, name) is not None]
+        if len(turned) > 1:
+            raise InputError(
+                f"a frame goal takes a rotation or an axis, not both: leave out {turned[0]} or "
+                f"{turned[1]}."
+            )
         if self.pose is not None:
-            if self.position is not None or self.rotation is not None or self.axis is not None:
+            if self.position is not None or turned:
                 raise InputError(
                     "a frame goal takes a pose, or a position with a rotation or an axis, not both."
                 )
@@ -66,10 +84,12 @@ class FrameGoal:
             object.__setattr__(self, "position", matrix[:3, 3])
             object.__setattr__(self, "rotation", matrix[:3, :3])
             object.__setattr__(self, "pose", None)
+        for name in ORIENTATIONS:
+            if getattr(self, name) is not None:
+                object.__setattr__(self, "rotation", rotation_from(name, getattr(self, name)))
+                object.__setattr__(self, name, None)
         if self.position is None and self.rotation is None and self.axis is None:
             raise InputError("a frame goal needs a pose, a position, a rotation or an axis.")
-        if self.rotation is not None and self.axis is not None:
-            raise InputError("a frame goal takes a rotation or an axis, not both.")
         if self.position is not None:
             object.__setattr__(self, "position", _vector("position", self.position))
         if self.rotation is not None:
@@ -92,6 +112,32 @@ class FrameGoal:
         self.check(robot)
         return FrameCondition(self, robot)
 
+    @property
+    def equations(self) -> int:
+        """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
+        turn = 3 if self.rotation is not None else 2 if self.axis is not None else 0
+        return (3 if self.position is not None else 0) + turn
+
+    def miss(self, robot: Robot, q: Array) -> tuple[float, float]:
+        """Distance in [m] and angle in [rad] of the frame at q (nq,); 0 for parts left free."""
+        pose = robot.frame_pose(self.frame, q)
+        R, p = pose[:3, :3], pose[:3, 3]
+        distance = 0.0 if self.position is None else _norm(p - np.asarray(self.position))
+        angle = 0.0
+        if self.rotation is not None:
+            angle = _norm(pin.log3(np.asarray(self.rotation).T @ R))
+        if self.axis is not None:
+            inner, world = (np.asarray(each) for each in self.axis)
+            angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
+        return distance, angle
+
+    def miss_in_words(self, robot: Robot, q: Array) -> str:
+        """The distance and the angle by which the frame misses its goal at q (nq,)."""
+        distance, angle = self.miss(robot, q)
+        parts = [f"{distance:.3g} m"] * (self.position is not None)
+        parts += [f"{angle:.3g} rad"] * (self.rotation is not None or self.axis is not None)
+        return f"frame {self.frame!r} misses it by {' and '.join(parts)}"
+
 
 @dataclass(frozen=True, eq=False)
 class FrameCondition(Condition):
@@ -107,36 +153,26 @@ class FrameCondition(Condition):
 
     @property
     def size(self) -> int:
-        """Number of equations: 3 for a position, 3 for a rotation, 2 for an axis."""
-        goal = self.goal
-        turn = 3 if goal.rotation is not None else 2 if goal.axis is not None else 0
-        return (3 if goal.position is not None else 0) + turn
+        """Number of equations."""
+        return self.goal.equations
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         """c and its Jacobian."""
-        c, J = self._linear(q)
+        c, J = self._linear(q)  # np.asarray of them would turn an interrupt into a SystemError
         jacobian = np.zeros((self.size, 2, self.robot.nv))
-        jacobian[:, 0] = np.asarray(J)
-        return np.asarray(c).ravel(), jacobian
+        jacobian[:, 0] = J.full()
+        return c.full().ravel(), jacobian
 
     def curvature(self, q: Array, v: Array, weights: Array) -> Array:
         """sum_i weights_i d2 c_i."""
         n = self.robot.nv
         curvature = np.zeros((2, n, 2, n))
-        curvature[0, :, 0] = np.asarray(self._curvature(q, weights))
+        curvature[0, :, 0] = self._curvature(q, weights).full()
         return curvature
 
     def pose_error(self, q: Array) -> tuple[float, float]:
         """Distance in [m] and angle in [rad] from the goal; 0 for parts that it leaves free."""
-        R, p = (np.asarray(each, dtype=float) for each in self._placement(q))
-        distance = 0.0 if self.goal.position is None else _norm(p.ravel() - self.goal.position)
-        angle = 0.0
-        if self.goal.rotation is not None:
-            angle = _norm(pin.log3(np.asarray(self.goal.rotation).T @ R))
-        if self.goal.axis is not None:
-            inner, world = (np.asarray(each) for each in self.goal.axis)
-            angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
-        return distance, angle
+        return self.goal.miss(self.robot, q)
 
     def is_spurious(self, q: Array, v: Array) -> bool:
         """Whether the frame is half a turn away from its goal."""
@@ -144,10 +180,7 @@ class FrameCondition(Condition):
 
     def describe(self, q: Array, v: Array) -> str:
         """The distance and the angle by which the frame misses its goal."""
-        distance, angle = self.pose_error(q)
-        parts = [f"{distance:.3g} m"] * (self.goal.position is not None)
-        parts += [f"{angle:.3g} rad"] * (self.goal.rotation is not None or bool(self.goal.axis))
-        return f"frame {self.goal.frame!r} misses it by {' and '.join(parts)}"
+        return self.goal.miss_in_words(self.robot, q)
 
     @cached_property
     def _placement(self) -> ca.Function:
@@ -202,15 +235,14 @@ def _vector(name: str, value: npt.ArrayLike) -> Array:
 
 def _direction(value: npt.ArrayLike) -> Array:
     vector = _vector("axis", value)
-    length = np.linalg.norm(vector)
-    if length < ORTHONORMALITY_TOLERANCE:
+    if math.hypot(*vector) < ORTHONORMALITY_TOLERANCE:
         raise InputError("the axis of a frame goal has length zero; give a direction.")
-    return np.asarray(vector / length)
+    return unit_vector(vector)
 
 
 def _rotation(value: npt.ArrayLike) -> Array:
     matrix = _numbers("rotation", value)
-    fits = matrix.shape == (3, 3) and np.isfinite(matrix).all()
+    fits = matrix.shape == (3, 3) and (np.abs(matrix) <= 1 + ORTHONORMALITY_TOLERANCE).all()
     if not fits or np.max(np.abs(matrix.T @ matrix - np.eye(3))) > ORTHONORMALITY_TOLERANCE:
         raise InputError(
             f"the rotation of a frame goal must be an orthonormal (3, 3) matrix, got {value!r}."

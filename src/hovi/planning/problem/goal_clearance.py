@@ -31,9 +31,11 @@ def goal_distances(goal: FrameGoal, distances: Distances) -> dict[Pair, float]:
     frame = distances.robot.model.frames[distances.robot.model.getFrameId(goal.frame)]
     at = np.asarray(goal.position, dtype=float)
     objects, found = distances.geometry.geometryObjects, dict[Pair, float]()
-    for pair, ends in zip(distances.pairs, distances.geometry.collisionPairs, strict=True):
-        shape, obstacle = objects[ends.first], objects[ends.second]
-        if not pair.obstacle or shape.parentJoint != frame.parentJoint:
+    for pair, (first, second) in zip(distances.pairs, distances.ends, strict=True):
+        shape, obstacle = objects[first], objects[second]
+        if not pair.obstacle or pair.touching or second in distances.moving:
+            continue
+        if shape.parentJoint != frame.parentJoint:
             continue
         if goal.rotation is not None:
             placed = pin.SE3(np.asarray(goal.rotation), at) * frame.placement.inverse()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,12 +13,17 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import ALL, State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.inverse_kinematics import InverseKinematicsResult, inverse_kinematics
+from hovi.planning.problem.inverse_kinematics import (
+    InverseKinematicsResult,
+    nearest_configuration,
+)
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import Condition, JointCondition
+from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.tip_frame import moves_frame
 
 Array = npt.NDArray[np.float64]
 
@@ -73,10 +79,14 @@ def goal_state(
     coordinates: Coordinates,
     near: Array,
     limits: Limits | None,
+    free: Sequence[str] = (),
 ) -> GoalState:
     """A state at the goal: the goal itself, or by inverse kinematics.
 
+    Joints that do not move the frame of a goal are held where they are in `near`: a hand that is
+    not mentioned keeps its opening.
     name: of the goal in messages. near: the first seed, shape (nq,). limits: those on q apply.
+    free: joints that are free in any case.
     Raises InputError for another kind of goal, or a frame that the robot does not have.
     """
     if isinstance(goal, State):
@@ -86,12 +96,23 @@ def goal_state(
     if not isinstance(coordinates, Robot):
         raise InputError(f"the {name} must be a State: {coordinates.owner} has no frames.")
     reached = _solved_inverse_kinematics(coordinates, goal, near.tobytes(), limits)
-    state = State(reached.q, free=(ALL,), free_velocity=tuple(goal.free_velocity))
+    moving = _moving_joints(coordinates, goal.frame, tuple(free))
+    state = State(reached.q, free=moving, free_velocity=tuple(goal.free_velocity))
+    advice = f"move the {name} closer or give its FrameGoal a guess"
     reason = reached.reason and (
         f"no configuration that reaches the {name} was found: at the nearest, {reached.reason}; "
-        f"move the {name} closer or give its FrameGoal a guess"
+        f"{hint_on_frame(coordinates, goal) or advice}"
     )
     return GoalState(state, (_condition(coordinates, goal),), reason)
+
+
+def _moving_joints(robot: Robot, frame: str, free: tuple[str, ...]) -> tuple[str, ...]:
+    """The joints that are free at the goal of a frame: those that move it, and the given ones."""
+    moves = moves_frame(robot.model, frame)
+    if moves.all() or ALL in free:
+        return (ALL,)
+    own = (joint for joint in robot.joint_names if moves[robot.entries_of(joint)].any())
+    return tuple(dict.fromkeys((*own, *free)))
 
 
 def via_conditions(via: Via, reached: GoalState, coordinates: Coordinates) -> tuple[Condition, ...]:
@@ -116,5 +137,6 @@ def _solved_inverse_kinematics(
 ) -> InverseKinematicsResult:
     first = np.frombuffer(near) if goal.guess is None else goal.guess
     first = robot.check_configuration(first, "the goal's guess")
-    bounds = (None, None) if limits is None else (limits.lower[0], limits.upper[0])
-    return inverse_kinematics(robot, goal, first, *bounds)
+    unbounded = np.full((2, robot.nv), np.inf) * [[-1], [1]]
+    bounds = unbounded if limits is None else (limits.lower[0], limits.upper[0])
+    return nearest_configuration(robot, goal, first, (bounds[0], bounds[1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,6 +13,7 @@ from hovi.discrete.grid import Grid
 from hovi.discrete.interval_batch import COORDINATES, Coordinates
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.merge_tree import MergeTree, merge_levels
+from hovi.planning.problem.seams import Hold
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -26,12 +28,14 @@ class ActionStructure:
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, n); None for fixed ends.
     periodic: whether both ends are one node, whose free components are those of the start.
+    holds: what is fixed at inner nodes.
     """
 
     grid: Grid
     dof: int
     free_ends: Mask | None = None
     periodic: bool = False
+    holds: tuple[Hold, ...] = ()
 
     @cached_property
     def metric(self) -> dict[Coordinates, Array]:
@@ -52,7 +56,7 @@ class ActionStructure:
     @cached_property
     def layout(self) -> BandLayout:
         """The indices of nodes and inner modes in a banded matrix."""
-        numbers = unknowns(self.grid, self.dof, self.free_ends, self.periodic)
+        numbers = unknowns(self.grid, self.dof, self.free_ends, self.periodic, self.holds)
         return BandLayout.of(numbers, self._scales())
 
     @cached_property
@@ -100,13 +104,19 @@ def action_metric(grid: Grid, coordinates: Coordinates, periodic: bool = False) 
     return metric
 
 
-def unknowns(grid: Grid, n: int, free_ends: Mask | None = None, periodic: bool = False) -> Index:
+def unknowns(
+    grid: Grid,
+    n: int,
+    free_ends: Mask | None = None,
+    periodic: bool = False,
+    holds: Sequence[Hold] = (),
+) -> Index:
     """Indices of the unknowns of each interval's columns (q0, h v0, q1, h v1, c), -1 where fixed.
 
     Nodes and inner modes alternate along the motion. Shape (N, m, n). A periodic motion is a cycle
     of them, folded at its start: the first, second, last, third, last but one, and so on, so that
     the band is only twice as wide as that of a motion between two ends, and nothing is bordered.
-    free_ends, periodic: as in ActionStructure.
+    free_ends, periodic, holds: as in ActionStructure.
     """
     N, r, k = grid.intervals, grid.inner_modes, grid.order
     modes = np.zeros(N, dtype=np.intp)
@@ -115,6 +125,8 @@ def unknowns(grid: Grid, n: int, free_ends: Mask | None = None, periodic: bool =
     free = np.ones((2 * N + 1, max(k, r), n), dtype=bool)  # nodes and inner modes alternate
     free[0::2, k:] = False
     free[[0, -1], :k] = False if free_ends is None else free_ends
+    for each in holds:
+        free[2 * each.node, :2] &= ~each.fixed
     free[1::2] = np.arange(max(k, r))[:, None] < modes[:, None, None]
     if periodic:
         free[-1] = False

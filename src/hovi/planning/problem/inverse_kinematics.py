@@ -1,34 +1,40 @@
-"""Inverse kinematics of a frame goal: Levenberg-Marquardt from several seeds."""
+"""Inverse kinematics: the configurations in which a frame meets its goal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hovi.planning.problem.frame_goal import FrameCondition, FrameGoal
+from hovi.checks.arguments import check_arguments_except
+from hovi.checks.kinds import is_whole
+from hovi.errors import InputError, UnreachableError, expect
+from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
+from hovi.planning.clearance.clearance_violation import distance_in_words
+from hovi.planning.clearance.distances import Distances, distances_between
+from hovi.planning.obstacles.obstacle import Obstacle
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.kinematics.branches import Branches, find_branches
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
+from hovi.robot.tip_frame import moves_frame
 
 Array = npt.NDArray[np.float64]
+Bounds = tuple[Array, Array]
 
-MAX_SEEDS = 160
-"""Maximum number of random seeds after the first."""
-SOLUTIONS_WANTED = 4
-"""Number of solutions among which the nearest is returned."""
-MAX_ITERATIONS = 100
-"""Maximum number of steps per seed."""
-RESIDUAL_TOLERANCE = 1e-13
-"""Largest component of the residual at convergence, in [m] or [rad]."""
-MAX_STEP = 0.5
-"""Maximum step of a joint, in [rad] or [m]."""
-STALL_RATIO = 0.98
-"""Ratio of successive residuals above which a step counts as stalled."""
-MAX_STALLED_STEPS = 8
-"""Consecutive stalled steps after which a seed is given up."""
-GOAL_TOLERANCE = 1e-6
-"""Largest sum of distance [m] and angle [rad] of a configuration that meets the goal."""
+MOST = 16
+"""Default number of configurations: a six-axis arm has no more."""
+SEEDS = 1000
+"""Default number of seeds."""
+MAX_COUNT = 100_000
+"""Largest number of configurations or seeds that may be asked for."""
+SEARCHED = 4
+"""Number of configurations that are searched for each one wanted, where obstacles rule some out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,80 +48,166 @@ class InverseKinematicsResult:
     reason: str = ""
 
 
+@check_arguments_except("robot", "goal", "near", "limits", "obstacles", "margin", "most", "seeds")
 def inverse_kinematics(
     robot: Robot,
     goal: FrameGoal,
+    *,
+    near: npt.ArrayLike | str | None = None,
+    limits: str | Limits | Mapping[str, Any] = "urdf",
+    obstacles: Sequence[Obstacle] = (),
+    margin: float = DEFAULT_MARGIN,
+    self_collision: bool = False,
+    most: int = MOST,
+    seeds: int = SEEDS,
+) -> Array:
+    """Distinct configurations in which a frame meets its goal, best first, shape (K, nq), K >= 1.
+
+    The best is the one nearest to `near` in |q (-) near|. The goal is met to 1e-9 m and 1e-9 rad. A
+    revolute joint with a range of more than a turn is given at the turn nearest to `near`;
+    configurations that differ by full turns count as one. Where the joints are more than the
+    equations of the goal, configurations form families, of which some members are returned that
+    differ by at least 0.3 rad or m in a joint. Joints that do not move the frame keep the values of
+    `near`.
+
+    goal: what the frame has to meet: see FrameGoal.
+    near: a configuration (nq,) or the name of a pose, from which the search begins; by default the
+        goal's guess, or the middle of the joints' ranges, 0 for joints without or with full turns.
+    limits: as for `plan`; only those on q count.
+    obstacles, margin, self_collision: as for `plan`; configurations that come closer are left out.
+    most: number of configurations at which the search ends.
+    seeds: number of configurations from which it starts, at most.
+    Raises UnreachableError, with the nearest configuration, if none is found; InputError.
+    """
+    expect(robot, Robot, "one from hovi.load_robot")
+    expect(goal, FrameGoal, "hovi.FrameGoal(frame, ...)")
+    goal.check(robot)
+    most, seeds = _count("most", most), _count("seeds", seeds)
+    clearance = _clearance_of(obstacles, margin, self_collision)
+    bounds = position_bounds(robot, limits)
+    first = first_configuration(robot, goal, near, bounds)
+    return configurations(robot, goal, first, bounds, clearance, most, seeds)
+
+
+def configurations(
+    robot: Robot,
+    goal: FrameGoal,
     near: Array,
-    lower: Array | None = None,
-    upper: Array | None = None,
+    bounds: Bounds,
+    clearance: Clearance,
+    most: int = MOST,
+    seeds: int = SEEDS,
+) -> Array:
+    """As `inverse_kinematics`: the configurations in which a frame meets its goal, (K, nq).
+
+    near: shape (nq,). bounds: as position_bounds. Raises UnreachableError.
+    """
+    searched = min(SEARCHED * most, MAX_COUNT) if clearance.wanted else most
+    found = find_branches(robot, goal, near, bounds, searched, seeds)
+    if len(found.q) == 0:
+        raise UnreachableError(_unreachable(robot, goal, found), found.best)
+    q = by_distance(robot, found.q, near)
+    if clearance.wanted:
+        q = _clear(q, distances_between(robot, clearance), clearance.margin)
+    return q[:most]
+
+
+def nearest_configuration(
+    robot: Robot, goal: FrameGoal, near: Array, bounds: Bounds
 ) -> InverseKinematicsResult:
     """The nearest of the configurations found that meet a goal, or the best one if none does.
 
-    near: the first seed, to which distances are measured, shape (nq,).
-    lower, upper: position limits, shape (nv,), applied to joints whose q is a plain number.
+    near: the first seed, to which distances are measured, shape (nq,). bounds: as position_bounds.
     """
-    condition = goal.condition(robot)
-    n = robot.nv
-    lower = np.full(n, -np.inf) if lower is None else lower
-    upper = np.full(n, np.inf) if upper is None else upper
-    found: list[Array] = []
-    best, least = near, np.inf
-    for seed in _seeds(robot, near, lower, upper):
-        q = _newton(robot, condition, _inside(robot, seed, lower, upper), near, lower, upper)
-        pose_error = sum(condition.pose_error(q))
-        if pose_error < least:
-            best, least = q, pose_error
-        if pose_error <= GOAL_TOLERANCE:
-            found.append(q)
-        if len(found) == SOLUTIONS_WANTED:
-            break
-    if not found:
-        return InverseKinematicsResult(best, condition.describe(best, np.zeros(n)))
-    return InverseKinematicsResult(
-        min(found, key=lambda q: float(np.linalg.norm(robot.difference(near, q))))
-    )
+    found = find_branches(robot, goal, near, bounds, MOST, SEEDS)
+    if len(found.q) == 0:
+        return InverseKinematicsResult(found.best, goal.miss_in_words(robot, found.best))
+    return InverseKinematicsResult(by_distance(robot, found.q, near)[0])
 
 
-def _seeds(robot: Robot, near: Array, lower: Array, upper: Array) -> Iterator[Array]:
-    """The configuration `near`, then reproducible random ones."""
-    yield near
-    random = np.random.default_rng(0)
-    low, high = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
-    middle, half = (low + high) / 2, (high - low) / 2
-    for i in range(MAX_SEEDS):
-        if i % 2 == 0 or not robot.vector_joints:
-            yield robot.integrate(near, random.uniform(-1, 1, robot.nv) * min(1.0, 0.2 * (i + 1)))
-        else:
-            yield middle + half * random.uniform(-1, 1, robot.nv)
+def by_distance(robot: Robot, q: Array, near: Array) -> Array:
+    """Configurations (K, nq), those first that are the nearest to `near`, (nq,)."""
+    order = np.argsort(np.linalg.norm(robot.difference(near, q), axis=1), kind="stable")
+    return np.asarray(q[order])
 
 
-def _newton(
-    robot: Robot, condition: FrameCondition, q: Array, near: Array, lower: Array, upper: Array
+def position_bounds(robot: Robot, limits: str | Limits | Mapping[str, Any]) -> Bounds:
+    """Lower and upper limits on q, shape (nv,). Raises InputError."""
+    chosen = _named(robot, limits) if isinstance(limits, str) else as_limits(robot, limits)
+    return chosen.lower[0], chosen.upper[0]
+
+
+@lru_cache(maxsize=64)
+def _named(robot: Robot, limits: str) -> Limits:
+    return as_limits(robot, limits)
+
+
+def first_configuration(
+    robot: Robot, goal: FrameGoal, near: npt.ArrayLike | str | None, bounds: Bounds
 ) -> Array:
-    """Levenberg-Marquardt steps, clipped to the limits."""
-    v = np.zeros(robot.nv)
-    c, J = condition.evaluate(q, v)
-    damping, stalled = 1e-2, 0
-    for _ in range(MAX_ITERATIONS):
-        if np.max(np.abs(c)) <= RESIDUAL_TOLERANCE:
-            break
-        A = J[:, 0]
-        step = -A.T @ np.linalg.solve(A @ A.T + damping * np.eye(len(c)), c)
-        step *= min(1.0, MAX_STEP / max(float(np.max(np.abs(step))), 1e-300))
-        candidate = _inside(robot, robot.integrate(q, step), lower, upper)
-        new, slope = condition.evaluate(candidate, v)
-        share = np.linalg.norm(new) / np.linalg.norm(c)
-        if share < 1.0:
-            q, c, J = candidate, new, slope
-        damping = max(0.2 * damping, 1e-14) if share < 1.0 else 8.0 * damping
-        stalled = stalled + 1 if share > STALL_RATIO else 0
-        if stalled >= MAX_STALLED_STEPS:
-            break
+    """Where the search begins, shape (nq,). Raises InputError."""
+    if isinstance(near, str):
+        return robot.pose(near)
+    if near is not None:
+        return robot.check_configuration(near, "near")
+    if goal.guess is not None:
+        return robot.check_configuration(goal.guess, "the goal's guess")
+    lower, upper = bounds
+    centered = moves_frame(robot.model, goal.frame) & (upper - lower < 2 * np.pi)
+    middle = np.zeros(robot.nv)
+    middle[centered] = (lower[centered] + upper[centered]) / 2
+    q = robot.neutral()
+    indices, velocities = robot.space.plain
+    q[indices] = np.clip(middle, lower, upper)[velocities]
     return q
 
 
-def _inside(robot: Robot, q: Array, lower: Array, upper: Array) -> Array:
-    indices, velocities = robot.space.plain
-    inside = q.copy()
-    inside[indices] = np.clip(q[indices], lower[velocities], upper[velocities])
-    return inside
+def _clearance_of(obstacles: Any, margin: Any, self_collision: bool) -> Clearance:
+    """The clearance, the same object for the same obstacles, whose distances are kept."""
+    try:
+        return _kept_clearance(tuple(obstacles), margin, self_collision)
+    except TypeError:  # not hashable, or no sequence
+        return Clearance(obstacles, margin, self_collision)
+
+
+@lru_cache(maxsize=16, typed=True)
+def _kept_clearance(obstacles: tuple[Obstacle, ...], margin: float, both: bool) -> Clearance:
+    return Clearance(obstacles, margin, both)
+
+
+def _clear(q: Array, distances: Distances, margin: float) -> Array:
+    """The configurations that keep the margin from all that stands still.
+
+    Raises UnreachableError if none does.
+    """
+    distances = distances.still()
+    if not distances.pairs:
+        return q
+    d = distances.values(q)
+    kept = d.min(axis=1) >= margin
+    if kept.any():
+        return np.asarray(q[kept])
+    best = int(np.argmax(d.min(axis=1)))
+    pair = int(np.argmin(d[best]))
+    distance = float(d[best, pair] - distances.allowance[pair])
+    raise UnreachableError(
+        f"the goal is met by {len(q)} configurations that were found, but all of them come closer "
+        f"to obstacles or links than {margin:g} m: in the best one {distances.pairs[pair]} "
+        f"{distance_in_words(distance)}; move the goal or the obstacle, reduce the margin, or ask "
+        "for more configurations.",
+        q[best],
+    )
+
+
+def _unreachable(robot: Robot, goal: FrameGoal, found: Branches) -> str:
+    advice = hint_on_frame(robot, goal) or "move the goal closer or widen the limits"
+    return (
+        f"no configuration of robot {robot.name!r} within its limits was found that reaches the "
+        f"goal: at the nearest, {goal.miss_in_words(robot, found.best)}; {advice}."
+    )
+
+
+def _count(name: str, value: Any) -> int:
+    if not is_whole(value) or not 1 <= value <= MAX_COUNT:
+        raise InputError(f"{name} must be a whole number from 1 to {MAX_COUNT:,}, got {value!r}.")
+    return int(value)

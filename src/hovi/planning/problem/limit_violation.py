@@ -25,6 +25,8 @@ POSITIONS = (1.0 - np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))) / 2
 """Their positions, closer at both ends, where polynomials of high degree oscillate faster."""
 REFINED_SAMPLES = 25
 """Samples of each further pass, between the neighbours of an extreme sample."""
+BATCH = 128
+"""Extremes that are refined at once."""
 REFINEMENT_SHARE = 0.05
 """The largest extreme of an output in an interval is refined if it is closer than this to a bound,
 as a share of its range."""
@@ -58,8 +60,10 @@ class Excess:
         return float(max(self.lower.max(), self.upper.max()))
 
 
-def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
+def excess_along(trajectory: Trajectory, limits: Limits, refined: bool = True) -> Excess:
     """The extremes of the limited quantities along the interpolant, compared with the limits.
+
+    refined: whether they are looked for between the samples.
 
     Every interval is sampled, and again more densely around all extremes that are near a bound, and
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
@@ -70,8 +74,8 @@ def excess_along(trajectory: Trajectory, limits: Limits) -> Excess:
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N)
     outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *shape)
     below, above = limits.on(trajectory.t)
-    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs)
-    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs)
+    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs, refined)
+    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs, refined)
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -87,7 +91,7 @@ class _Side:
     sign: float
     bound: Array
 
-    def extremes(self, outputs: Array) -> tuple[Array, Array]:
+    def extremes(self, outputs: Array, refined: bool) -> tuple[Array, Array]:
         """The largest excess in each interval, and its relative position, (N, kinds, nv) each.
 
         outputs: of all samples, shape (N, SAMPLES, kinds, nv).
@@ -97,19 +101,32 @@ class _Side:
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
+        if not refined:
+            return largest, s
         k, sample, kind, joint = np.nonzero(
             _near_extremes(excess, largest) | _may_exceed(excess, self.limits.tolerance)
         )
         if len(k) == 0:
             return largest, s
-        found, at = self._refined(k, sample, kind, joint)
+        found, at = self.refined(k, sample, kind, joint)
         for row in np.argsort(found):  # the largest of each interval and output comes last
             entry = k[row], kind[row], joint[row]
             if found[row] >= largest[entry]:
                 largest[entry], s[entry] = found[row], at[row]
         return largest, s
 
-    def _refined(self, k: Index, sample: Index, kind: Index, joint: Index) -> tuple[Array, Array]:
+    def refined(self, *extremes: Index) -> tuple[Array, Array]:
+        """As `_refined_batch`, in batches, since a deadline may be in force."""
+        parts = []
+        for first in range(0, len(extremes[0]), BATCH):
+            raise_if_late()
+            parts.append(self._refined_batch(*(x[first : first + BATCH] for x in extremes)))
+        found, at = zip(*parts, strict=True)
+        return np.concatenate(found), np.concatenate(at)
+
+    def _refined_batch(
+        self, k: Index, sample: Index, kind: Index, joint: Index
+    ) -> tuple[Array, Array]:
         """The excess at M extremes and their positions, from three denser samplings around them.
 
         k: intervals. sample: the extreme samples. kind, joint: of the outputs. All (M,).
@@ -177,15 +194,17 @@ def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
 
 
 def worst_sentence(trajectory: Trajectory, limits: Limits, coordinates: Coordinates) -> str:
-    """The limit that is exceeded most: kind, joint, time, value and bound."""
-    excess = excess_along(trajectory, limits)
+    """The limit that is exceeded most at the samples: kind, joint, time, value and bound."""
+    excess = excess_along(trajectory, limits, refined=False)
     above = excess.upper.max() >= excess.lower.max()
     side = excess.upper if above else excess.lower
     position = excess.at_upper if above else excess.at_lower
     k, kind, joint = np.unravel_index(int(np.argmax(side)), side.shape)
-    s = float(position[k, kind, joint])
-    value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
+    sample = np.searchsorted(POSITIONS, position[k, kind, joint])
     bounds = limits.on(trajectory.t)[int(above)]
+    bounded = _Side(trajectory, limits, 1.0 if above else -1.0, bounds)
+    s = float(bounded.refined(*(np.array([each]) for each in (k, sample, kind, joint)))[1][0])
+    value = _outputs(trajectory, np.array([k]), np.array([s]), limits)[0, kind, joint]
     bound = bounds[min(int(k), len(bounds) - 1), kind, joint]
     t = trajectory.t[k] + s * trajectory.grid.steps[k]
     unit = coordinates.coordinate_units[joint][kind]

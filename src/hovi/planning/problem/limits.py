@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments, check_arguments_except
-from hovi.checks.kinds import shown
+from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import HoviWarning, InputError, nearest
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
@@ -83,6 +83,8 @@ class Limits:
                 f"there must be limits, or None, for each of the {len(ends) + 1} segments, got "
                 f"{len(parts)}."
             )
+        if any(len(each.kinds) == len(KINDS) for each in parts):
+            parts = [_with_all_kinds(each) for each in parts]
         for each in parts:
             require_shape("the limits of a segment", each.lower, *parts[0].lower.shape)
         lower = np.stack([each.lower for each in parts])
@@ -102,7 +104,7 @@ class Limits:
         if not self.parts:
             return self.lower[None], self.upper[None]
         require_shape("nodes", nodes, None)
-        middle = (nodes[1:] + nodes[:-1]) / 2
+        middle = nodes[1:] / 2 + nodes[:-1] / 2
         part = np.searchsorted(np.array(self.ends), middle)
         lower, upper = (np.stack([getattr(p, x) for p in self.parts]) for x in ("lower", "upper"))
         return lower[part], upper[part]
@@ -111,6 +113,10 @@ class Limits:
     def at_ends(self) -> tuple[Limits, Limits]:
         """The limits at the start and at the goal."""
         return (self.parts[0], self.parts[-1]) if self.parts else (self, self)
+
+    def until(self, time: float) -> Limits:
+        """The limits just before a time, in [s]: those of its segment, or these."""
+        return self.parts[int(np.searchsorted(np.array(self.ends), time))] if self.parts else self
 
     @property
     def _empty(self) -> npt.NDArray[np.bool_]:
@@ -129,6 +135,14 @@ class Limits:
     def on_rates(self) -> bool:
         """Whether there is a limit on the jerk or on d tau / dt, which needs order 3."""
         return bool(self.bounded[FIRST_KINDS:].any())
+
+    def require_order(self, order: int) -> None:
+        """Raise InputError for limits that a Lagrangian of this order does not have."""
+        if self.on_rates and order != 3:
+            raise InputError(
+                "limits on the jerk and on the torque rate need a Lagrangian of order 3: add the "
+                "effect jerk_cost to the scene, set smooth = true, or leave them out."
+            )
 
     @property
     def on_torque_rate(self) -> bool:
@@ -179,6 +193,8 @@ class Limits:
 
     def without(self, *kinds: str) -> Limits:
         """The same limits but for those of some kinds, which are unbounded."""
+        if self.parts:
+            return Limits.of_segments([part.without(*kinds) for part in self.parts], self.ends)
         rows = [row for row, kind in enumerate(self.kinds) if kind in kinds]
         lower, upper = self.lower.copy(), self.upper.copy()
         lower[rows], upper[rows] = -np.inf, np.inf
@@ -288,7 +304,7 @@ def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
 
 def _number(limits: Mapping[str, Any], key: str, default: float) -> float:
     value = limits.get(key, default)
-    if isinstance(value, bool) or not isinstance(value, float | int | np.number):
+    if not is_number(value):
         raise InputError(f"limits.{key} must be a number, got {value!r}.")
     return float(value)
 
@@ -323,6 +339,8 @@ def _of_arm(coordinates: Coordinates, name: str, order: int) -> Limits:
 
 def _with_all_kinds(limits: Limits) -> Limits:
     """The limits with rows for the jerk and the torque rate, without bounds if they had none."""
+    if len(limits.kinds) == len(KINDS):
+        return limits
     more = np.full((len(KINDS) - len(limits.kinds), limits.lower.shape[1]), np.inf)
     lower, upper = np.concatenate([limits.lower, -more]), np.concatenate([limits.upper, more])
     return Limits(lower, upper, limits.tolerance)
@@ -352,7 +370,7 @@ def _pairs(coordinates: Coordinates, kind: str, given: Any) -> dict[int, tuple[f
                     f"{coordinates.hint(str(name), names)}"
                 )
         return {names.index(name): _pair(kind, name, value) for name, value in given.items()}
-    if isinstance(given, float | int | np.number):
+    if is_number(given):
         given = [given] * coordinates.nv
     if not isinstance(given, Sequence | np.ndarray) or len(given) != coordinates.nv:
         raise InputError(

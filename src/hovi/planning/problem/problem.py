@@ -25,10 +25,11 @@ from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.problem.conserved_momentum import free_fall_contradiction, without_redundancy
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via, goal_state, via_conditions
+from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
+from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
@@ -60,14 +61,14 @@ class TrajectoryProblem:
 
     ld: the discrete Lagrangian on a grid: of the effort of a scene, or any other.
     start: state at t = 0. goal: state at t = T, a task-space goal, or Periodic.
-    limits: bounds along the motion; none if None.
-    via: via points, at nodes of the grid.
+    limits: bounds along the motion; none if None. via: via points, at nodes of the grid.
     clearance: obstacles and their margin; none if None.
     boundary: (q0, v0, q1, v1) of the two ends; initial guesses in free components.
     end_jets: (q, q', ..., q^(k-1)) of the two ends for orders k other than 2, k arrays of two rows.
     free_ends: which of (q, q', ..., q^(k-1)) are free at the start and at the goal, shape
         (2, k, nv).
-    conditions: equations at nodes. unreachable: why the goal cannot be met, or "".
+    conditions: equations at nodes. holds: what is fixed where segments meet.
+    unreachable: why the goal cannot be met, or "".
     turns: full turns of the initial guess beyond the shortest path, as rotation vectors over 2 pi,
         shape (nv,).
     Raises InputError, ModelError or SchemeError if the input defines no problem.
@@ -83,6 +84,7 @@ class TrajectoryProblem:
     end_jets: tuple[Array, ...] = field(init=False, repr=False)
     free_ends: Mask = field(init=False, repr=False)
     conditions: tuple[NodeCondition, ...] = field(init=False, repr=False)
+    holds: tuple[Hold, ...] = field(init=False, repr=False)
     unreachable: str = field(init=False, repr=False)
     turns: Array = field(init=False, repr=False)
 
@@ -107,27 +109,21 @@ class TrajectoryProblem:
     def _set_conditions(self, first: State, last: State | FrameGoal) -> None:
         """Set the boundary data and the conditions at nodes, from both ends and the via points."""
         coordinates, limits = self.coordinates, self.limits
-        start = first.on(coordinates, "start")
-        last_limits = None if limits is None else limits.at_ends[1]
-        end = goal_state(last, "goal", coordinates, start[0], last_limits)
+        start, at_end = first.on(coordinates, "start"), limits and limits.at_ends[1]
+        passed = ViaPoints.of(self.via, self.grid, coordinates, start[0], limits)
+        near = passed.holds[-1].q if passed.holds else start[0]
+        free = (*first.free, *(joint for scene in self.scenes for joint in scene.passive))
+        end = goal_state(last, "goal", coordinates, near, at_end, free)
         conditions = [NodeCondition(self.grid.intervals, each) for each in end.conditions]
-        unreachable = end.reason
-        for via in self.via:
-            name = f"via point at {via.time:g} s"
-            reached = goal_state(via.goal, name, coordinates, start[0], limits)
-            node = self.grid.node_at(via.time)
-            conditions += [
-                NodeCondition(node, each) for each in via_conditions(via, reached, coordinates)
-            ]
-            unreachable = unreachable or reached.reason
-        object.__setattr__(self, "conditions", tuple(conditions))
+        unreachable = end.reason or passed.reason
+        object.__setattr__(self, "conditions", (*conditions, *passed.conditions))
+        object.__setattr__(self, "holds", passed.holds)
         self._set_ends(first, end.state)
         if self.about_robot and not self.periodic:
-            unreachable = unreachable or free_fall_contradiction(
-                self.scene, self.boundary, self.free_ends, self.grid.duration
-            )
-            known = without_redundancy(self.scene, self.boundary[3], self.free_ends)
-            object.__setattr__(self, "free_ends", known)
+            known = self.scene, self.boundary, self.free_ends
+            unreachable = unreachable or free_fall_contradiction(*known, self.grid.duration)
+            independent = without_redundancy(self.scene, self.boundary[3], self.free_ends)
+            object.__setattr__(self, "free_ends", independent)
         object.__setattr__(self, "unreachable", unreachable)
 
     def _set_ends(self, start: State, goal: State) -> None:
@@ -176,13 +172,13 @@ class TrajectoryProblem:
     def structure(self) -> ActionStructure:
         """Block structure of the action's Hessian on this grid."""
         free = self.free_ends if self.free_ends.any() or self.periodic else None
-        return ActionStructure(self.grid, self.coordinates.nv, free, self.periodic)
+        return ActionStructure(self.grid, self.coordinates.nv, free, self.periodic, self.holds)
 
     def on(self, grid: Grid) -> TrajectoryProblem:
         """The same problem on another grid."""
         ld = DiscreteLagrangian(self.ld.lagrangian, grid)
         T = self.grid.duration
-        if self.conditions or abs(grid.duration - T) > 1e-12 * T:
+        if self.conditions or self.holds or abs(grid.duration - T) > 1e-12 * T:
             return dataclasses.replace(self, ld=ld)
         for scheme, _ in grid.groups:
             require_regular(scheme)
@@ -206,29 +202,36 @@ class TrajectoryProblem:
         return problem
 
     def path(self, curve: Curve) -> DiscretePath:
-        """A curve sampled on the grid, with the problem's ends in fixed components."""
-        if self.ld.k != 2:
-            ends = curve(np.array([0.0, self.grid.duration]))[: self.ld.k]
-            return path_of_any_order(curve, self.grid, self._with_fixed(ends), self.coordinates)
-        q, v, _ = curve(np.array([0.0, self.grid.duration]))
-        return path_on_grid(curve, self.grid, self.ends(q, v), self.coordinates)
+        """A curve sampled on the grid, with the problem's data in fixed components."""
+        ends = curve(np.array([0.0, self.grid.duration]))[: self.ld.k]
+        if self.ld.k == 2:
+            path = path_on_grid(curve, self.grid, self.ends(*ends), self.coordinates)
+        else:
+            fixed = self._with_fixed(ends)
+            path = path_of_any_order(curve, self.grid, fixed, self.coordinates)
+        return holding(path, self.grid, self.holds)
 
     def moved(self, path: DiscretePath) -> DiscretePath:
         """A path plus the cubic, or Hermite polynomial, that moves its ends to the problem's."""
         if self.ld.k == 2:
-            return moved(path, self.grid, self.ends(path.q, path.v), self.coordinates)
+            return self._moved(path, self.ends(path.q, path.v))
         ends = [x[[0, -1]] for x in (path.q, *np.moveaxis(path.rates, 1, 0))]
-        return moved_any(path, self.grid, self._with_fixed(ends), self.coordinates)
+        return self._moved(path, self._with_fixed(ends))
 
     def moved_to_guesses(self, path: DiscretePath) -> DiscretePath:
         """As `moved`, with the problem's own initial guesses in free components, too."""
-        if self.ld.k == 2:
-            return moved(path, self.grid, self.boundary, self.coordinates)
-        return moved_any(path, self.grid, self.end_jets, self.coordinates)
+        return self._moved(path, self.boundary if self.ld.k == 2 else self.end_jets)
+
+    def _moved(self, path: DiscretePath, ends: Any) -> DiscretePath:
+        move: Any = moved if self.ld.k == 2 else moved_any
+        return holding(move(path, self.grid, ends, self.coordinates), self.grid, self.holds)
 
     def guess(self, name: str) -> DiscretePath:
         """The guess with a name; for orders other than 2 always the Hermite polynomial."""
         T = self.grid.duration
+        if self.holds:
+            jets = self.end_jets if self.ld.k != 2 else (self.boundary[::2], self.boundary[1::2])
+            return self.path(curve_through(name, self.coordinates, jets, self.holds, T))
         if self.ld.k != 2:
             return self.path(polynomial(self.coordinates, self.end_jets, T, self.turns))
         curve = named_curve(name, self.coordinates, self.boundary, T)
@@ -303,8 +306,8 @@ class TrajectoryProblem:
 
     @property
     def plain(self) -> bool:
-        """Whether both ends are fixed and there are no equality constraints."""
-        return not (self.constrained or self._has_free_ends or self.periodic)
+        """Whether the ends alone are fixed, wholly, and there are no equality constraints."""
+        return not (self.constrained or self._has_free_ends or self.periodic or self.holds)
 
     @property
     def periodic(self) -> bool:
@@ -393,8 +396,5 @@ def _require_supported(problem: TrajectoryProblem) -> None:
             f"{' and '.join(named)} need a Lagrangian of order 2 or 3, and this one is of order "
             f"{k}: leave them out."
         )
-    if limits is not None and limits.on_rates and k != 3:
-        raise InputError(
-            "limits on the jerk and on the torque rate need a Lagrangian of order 3: add the "
-            "effect jerk_cost to the scene, set smooth = true, or leave them out."
-        )
+    if limits is not None:
+        limits.require_order(k)

@@ -12,8 +12,8 @@ from typing import Self
 import numpy as np
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.checks.kinds import shown
-from hovi.discrete.motion_error import MotionError
+from hovi.checks.kinds import is_number, shown
+from hovi.discrete.measures.motion_error import MotionError
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
@@ -64,7 +64,7 @@ class Tolerance:
             return cls(*parts)._checked(robot)
         if isinstance(tolerance, str):
             return cls._parsed(tolerance)._checked(robot)
-        if isinstance(tolerance, bool) or not isinstance(tolerance, float | int | np.number):
+        if not is_number(tolerance):
             raise InputError(_expected(tolerance))
         try:
             return cls(float(tolerance))._checked(robot)

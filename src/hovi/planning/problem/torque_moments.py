@@ -44,7 +44,40 @@ class TorqueMoments:
         """The moments; None where passive torques vanish at all points of every interval."""
         if len(passive) == 0 or all(scheme.moments is None for scheme, _ in ld.grid.groups):
             return None
-        return cls([_BatchMoments(batch) for batch in ld.batches], passive)
+        return cls.everywhere(ld, passive)
+
+    @classmethod
+    def everywhere(cls, ld: DiscreteLagrangian, passive: Index) -> Self:
+        """As `of`, and where passive torques vanish at all points one moment for each of these."""
+        return cls([_BatchMoments(batch) for batch in ld.interval_batches], passive)
+
+    def scaled(self, torques: Array, batch: int) -> Array:
+        """sqrt(h) m_j of the intervals of a batch, flat: their squares are those of `squares`."""
+        moments = self.batches[batch]
+        return np.asarray(moments.of(torques[:, self.passive]) * moments.root_steps).ravel()
+
+    def scaled_slopes(self, expansion: Expansion, batch: int) -> Array:
+        """Slopes of `scaled` in the nodal columns of the intervals, shape (B, K p, m, n)."""
+        moments, (_, J) = self.batches[batch], expansion.outputs[batch]
+        if expansion.charts is None:
+            slopes = moments.slopes(J[:, self.passive])
+        else:
+            charts = expansion.charts[batch]
+            assert isinstance(charts, IntervalCharts)  # torques have Lagrangians of order 2
+            slopes = moments.slopes_in_charts(J[:, self.passive], charts)
+        return np.asarray(slopes / moments.root_steps[..., None])
+
+    def spread(self, multipliers: Array, batch: int) -> Array:
+        """Multipliers of `scaled` as lambda at the points, shape (P, passive)."""
+        moments = self.batches[batch]
+        K = len(moments.tests)
+        weights = multipliers.reshape(-1, K, len(self.passive)) / moments.root_steps
+        return np.asarray(np.matmul(moments.tests.T, weights).reshape(-1, len(self.passive)))
+
+    def size(self, batch: int) -> int:
+        """Number of moments of a batch."""
+        moments = self.batches[batch]
+        return len(moments.batch.h) * len(moments.tests) * len(self.passive)
 
     def projected(self, torques: Array, batch: int) -> Array:
         """sum_j m_j P_j of the passive joints at the points of a batch, shape (P, passive).
@@ -94,6 +127,11 @@ class _BatchMoments:
         """P_j at the points, (K, Q); one per point where a torque vanishes at every point."""
         scheme = self.batch.scheme
         return np.diag(scheme.weights**-0.5) if scheme.moments is None else scheme.moments
+
+    @cached_property
+    def root_steps(self) -> Array:
+        """sqrt(h), shape (B, 1, 1)."""
+        return np.sqrt(self.batch.h)[:, None, None]
 
     @cached_property
     def _weighted(self) -> Array:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import Any
 
 import numpy as np
 
-from hovi.checks.kinds import shown
+from hovi.checks.kinds import is_number, shown
 from hovi.errors import InputError, nearest
 
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
@@ -17,6 +18,10 @@ DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 """Units of lengths, angles, relative errors and durations, in [m], [rad], 1 and [s]."""
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
 
+DURATION_IN_WORDS = (
+    'a positive number of seconds, a text such as "2 s", or a list [lower, upper] of two'
+)
+"""What a duration is, in messages about scene files and in Python."""
 Duration = float | str | tuple[float | str, float | str]
 """A duration, or (lower, upper) bounds of a free duration."""
 
@@ -39,7 +44,7 @@ def seconds(given: Any, what: str) -> float:
     what: its name in messages, such as "the duration".
     Raises InputError for anything else.
     """
-    if isinstance(given, float | int | np.number) and not isinstance(given, bool):
+    if is_number(given):
         return _as_double(given, what)
     parsed = number_and_unit(given) if isinstance(given, str) else None
     if parsed is None:
@@ -55,21 +60,36 @@ def seconds(given: Any, what: str) -> float:
     return number * DURATIONS[unit]
 
 
-def _as_double(number: float | np.number[Any], what: str) -> float:
+def _as_double(number: float, what: str) -> float:
     try:
         return float(number)
-    except (TypeError, OverflowError):  # a complex number, an integer of hundreds of digits
+    except OverflowError:  # an integer of hundreds of digits
         raise InputError(f"{what} must be a number of seconds, got {shown(number)}.") from None
 
 
 def as_duration(given: Any) -> float | tuple[float, float]:
-    """A duration in [s], or (lower, upper) bounds of a free one. Raises InputError."""
-    if isinstance(given, str | float | int | np.number):
-        return seconds(given, "the duration")
+    """A duration in [s], or (lower, upper) bounds of a free one.
+
+    Raises InputError for what is neither, not positive, not finite, or falls.
+    """
+    if isinstance(given, str) or is_number(given):
+        ends: tuple[float, ...] = (seconds(given, "the duration"),)
+    else:
+        ends = _bounds(given)
+    if not all(math.isfinite(each) and each > 0 for each in ends) or ends != tuple(sorted(ends)):
+        raise _no_duration(given)
+    return (ends[0], ends[1]) if len(ends) == 2 else ends[0]
+
+
+def _bounds(given: Any) -> tuple[float, float]:
     try:
         lower, upper = given
     except (TypeError, ValueError):
-        raise InputError(
-            f"the duration must be a number or a pair (lower, upper), got {given!r}."
-        ) from None
+        raise _no_duration(given) from None
     return seconds(lower, "the duration"), seconds(upper, "the duration")
+
+
+def _no_duration(given: Any) -> InputError:
+    pair = isinstance(given, list | tuple) and len(given) == 2
+    came = f"[{', '.join(map(shown, given))}]" if pair else shown(given)
+    return InputError(f"`duration` must be {DURATION_IN_WORDS}, but it is {came}.")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.curve_integral import integral_along
-from hovi.discrete.motion_error import relative_difference
+from hovi.discrete.measures.motion_error import relative_difference
 from hovi.errors import InputError
 from hovi.planning.problem.tolerance import CURVE_TOLERANCE, Quantity, Tolerance
 from hovi.planning.refinement.error_estimate import (
@@ -28,6 +28,7 @@ from hovi.planning.refinement.passive_torque import (
     passive_torque,
 )
 from hovi.planning.refinement.whirling import Whirl, whirl
+from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
 
@@ -236,8 +237,13 @@ def error_along(solution: Solution, finer: FinerSolution) -> float:
 
 
 def least_error(solution: Solution) -> float:
-    """The least relative error of the cost that can be estimated: see `cost_of_tolerance`."""
-    return max(ROUNDING_FLOOR, cost_of_tolerance(solution))
+    """The least relative error of the cost that can be estimated: see `cost_of_tolerance`.
+
+    Within limits, plus MAX_LOSS: the price of bounding control points instead of the curve.
+    """
+    rows = None if solution.central is None else solution.central.rows
+    price = 0.0 if rows is None or rows.size == 0 else MAX_LOSS
+    return max(ROUNDING_FLOOR, cost_of_tolerance(solution)) + price
 
 
 def contributions(finer: FinerSolution) -> Array:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.curve_integral import CurveIntegral, integral_along
-from hovi.discrete.motion_error import MotionError, relative_difference
+from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
@@ -160,7 +160,7 @@ def _upper_bound(solution: Solution, problem: TrajectoryProblem, integral: Curve
 def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
     """Relative residual of the discrete Euler-Lagrange equations at the inner nodes.
 
-    Of a periodic motion at all nodes.
+    Of a periodic motion at all nodes; not where the goal of a segment fixes the motion.
 
     The largest |F+ L_d - F- L_d| of p and of p~, each relative to the largest of its kind; rounding
     contributes like eps/h^3. Raises InputError if multipliers contribute to the equations.
@@ -170,6 +170,8 @@ def momentum_jump(problem: TrajectoryProblem, trajectory: Trajectory) -> float:
     D = problem.ld.derivatives(trajectory.path)
     k = problem.ld.k
     ends = np.roll(D, 1, axis=0)[:, k:] + D[:, :k]  # that of the first node is of a cycle
+    for each in problem.holds:
+        ends[each.node, :2][each.fixed] = 0.0
     jump = np.abs(ends[0 if problem.periodic else 1 :]).max(axis=(0, 2), initial=0.0)
     sizes = np.abs(D).reshape(len(D), 2, k, -1).max(axis=(0, 1, 3))
     return float(np.max(jump / np.maximum(sizes, np.finfo(float).tiny)))

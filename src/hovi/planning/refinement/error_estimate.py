@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -21,19 +22,27 @@ from hovi.checks.arguments import check_arguments
 from hovi.discrete.contraction import Expansion
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import stretched
-from hovi.discrete.motion_error import MotionError, deviation, sample_points
+from hovi.discrete.measures.motion_error import MotionError, deviation, sample_points, times_of
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
 
 Array = npt.NDArray[np.float64]
 
-LIMITED_SAFETY_FACTOR = 1.5
+LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
+RICHER_LEVEL = 1e-3
+"""Barrier parameter at which a solve with more modes begins within limits."""
+FINISHED_LEVEL = 1e-4
+"""Barrier parameter at which such a motion is solved to its end."""
+RICHER_BARRIER = 1e-7
+"""Its last barrier parameter, whose share of the cost is less than errors that can be told."""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
@@ -88,7 +97,9 @@ def finer_than(solution: Solution, time_limit: float | None = None) -> FinerSolu
             f"only errors of minima can be estimated, and this solve ended in {solution.status}; "
             "plan again with more time or another initial guess."
         )
-    return finer_solution(problem, solution.trajectory.path, time_limit)
+    within = problem.limited and solution.central is not None
+    richer = richer_within_limits(solution, time_limit) if within else None
+    return richer or finer_solution(problem, solution.trajectory.path, time_limit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +126,35 @@ class FinerSolution:
     def trajectory(self) -> Trajectory:
         """The motion without momenta, for sampling."""
         return self.problem.trajectory(self.path)
+
+
+def richer_within_limits(
+    solution: Solution, time_limit: float | None = None
+) -> FinerSolution | None:
+    """The solution with two more modes per interval, within the same limits at the same instants.
+
+    It starts from the solution's central path, and torques are not checked between the points.
+    Finished, it is a solution within limits everywhere. time_limit: in [s].
+    """
+    problem, central = solution.problem, solution.central
+    assert problem is not None
+    assert central is not None
+    fine, path = problem.finer, solution.trajectory.path
+    paths = tuple(prolonged(point, fine.grid) for _, point in central.points)
+    method = InteriorPoint(central.on(fine.grid, paths), RICHER_LEVEL)
+    start = prolonged(path, fine.grid)
+    found = _solved(fine, start, problem, path, time_limit, method)
+    return None if found is None else dataclasses.replace(found, finish=partial(_finished, found))
+
+
+def _finished(found: FinerSolution) -> Solution | None:
+    """A motion that is no minimum yet, or whose limits were not checked, solved to the end."""
+    known = found.finish()
+    if known is None or known.central is None or known.problem is None:
+        return None
+    method = InteriorPoint(known.central.freed(), FINISHED_LEVEL)
+    solution = solve_on_grid(known.problem, known.trajectory.path, near=True, method=method)
+    return solution if solution.success else None
 
 
 def finer_solution(
@@ -153,17 +193,20 @@ def _solved(
     problem: TrajectoryProblem,
     path: DiscretePath,
     time_limit: float | None,
+    method: Method | None = None,
 ) -> FinerSolution | None:
     """The finer solution by a full solve, which may split intervals for limits.
 
     Its gains are half the integral of the squared difference of the torques.
     """
-    solution = solve_on_grid(fine, start, time_limit=time_limit, near=True)
+    solution = solve_on_grid(
+        fine, start, time_limit=time_limit, near=True, method=method, barrier=RICHER_BARRIER
+    )
     if not solution.success or solution.problem is None:
         return None
     coarse, finer = problem.trajectory(path), solution.trajectory
     k, s = sample_points(coarse)
-    t = np.clip(coarse.t[k] + s * coarse.grid.steps[k], 0.0, finer.duration)
+    t = np.clip(times_of(coarse, k, s), 0.0, finer.duration)
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
     known, cost = problem.ld.action(path), solution.cost

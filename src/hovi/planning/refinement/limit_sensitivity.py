@@ -20,8 +20,9 @@ def cost_of_tolerance(solution: Solution) -> float:
     """Relative change of the cost with a shift of all limits by SHIFT tolerances.
 
     By the envelope theorem dJ = sum_j h w_j |z_j| range_j SHIFT tolerance, over the quadrature
-    points and the bounds that are active there, with their multipliers z_j. 0 without limits, or
-    where none is active.
+    points and the bounds that are active there, with their multipliers z_j, and over the control
+    points, whose forces at instants of an interval add up: an upper bound, since these are not
+    tightened. 0 without limits, or where none is active.
     """
     problem = solution.problem
     assert problem is not None
@@ -29,11 +30,16 @@ def cost_of_tolerance(solution: Solution) -> float:
         return 0.0
     tolerance = TOLERANCE if problem.limits is None else problem.limits.tolerance
     jet_range, output_range = _ranges(problem)
-    change = 0.0
-    for weights, terms in zip(problem.ld.point_weights, solution.forces, strict=True):
+    change, at_points = 0.0, problem.ld.point_weights
+    for weights, terms in zip(at_points, solution.forces, strict=False):
         per_point = np.abs(terms.jet_gradient) @ jet_range
         per_point += np.abs(terms.output_gradient) @ output_range
         change += float(weights @ per_point)
+    if solution.instants is not None:
+        weights, terms = solution.instants.weights, solution.forces[len(at_points)]
+        forces = np.zeros((problem.grid.intervals, len(jet_range)))
+        np.add.at(forces, solution.instants.intervals, weights[:, None] * terms.jet_gradient)
+        change += float((np.abs(forces) @ jet_range).sum())
     return SHIFT * tolerance * change / abs(solution.cost)
 
 

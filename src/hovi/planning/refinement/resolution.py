@@ -15,7 +15,7 @@ import numpy as np
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.curve_integral import integral_along
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.motion_error import relative_difference
+from hovi.discrete.measures.motion_error import relative_difference
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -30,7 +30,8 @@ from hovi.planning.refinement.passive_torque import NEGLIGIBLE_SHARE, passive_to
 from hovi.planning.refinement.whirling import whirl, whirl_without_minimum
 from hovi.planning.solver.methods.method import Method, Report
 from hovi.planning.solver.methods.stationary import Stationary
-from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.receding.shift import Shift
+from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.blas_threads import one_blas_thread
@@ -157,7 +158,7 @@ def unresolved_if_whirling(solution: Solution) -> Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class Resolution:
+class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
@@ -176,6 +177,19 @@ class Resolution:
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
+
+    def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
+        """The same for the rest of the motion, where the error of the cost is as large.
+
+        Anything may be compared again where the motion is on another grid.
+        """
+        if len(self.path.q) != len(shift.problem.grid.t):
+            return resolved
+        path = shift.path(self.path)
+        cost = problem.ld.action(path)
+        least = max(_least_cost(problem), 1e-300)
+        estimate = self.estimate * abs(self.cost) / max(abs(cost), least)
+        return resolved if estimate > RESOLVED else Resolution(path, cost, estimate)
 
     def _is_near(self, solution: Solution) -> bool:
         problem, path = solution.problem, solution.trajectory.path
@@ -355,7 +369,8 @@ def _remedy(solution: Solution) -> str:
         return str(whirling)
     if solution.accuracy is None:
         return (
-            "use more intervals or a scheme with more points, such as 'galerkin-2x8', or name "
-            "neither, so that plan chooses"
+            "use more intervals or a scheme with more modes, or name neither, so that plan chooses"
         )
-    return "set limits or another initial guess, or try more starts"
+    limited = solution.problem is not None and solution.problem.limited
+    way = "try" if limited else "set limits or try"
+    return f"{way} another initial guess, more starts or smooth"

@@ -20,9 +20,10 @@ from hovi.planning.refinement.inactive_limits import (
     with_limits_again,
     without_limits,
 )
-from hovi.planning.search.free_duration import FreeDuration, SolveFor, solve_duration
+from hovi.planning.search.free_duration import FreeDuration, SolveFor
 from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.job import Job, Progress, split_for_charts
+from hovi.planning.search.joint_duration import best_duration_by, joint_minimum
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
 from hovi.planning.solver.status import Status
@@ -51,8 +52,10 @@ class FinalStages:
     deadline: Deadline
     progress: Progress
 
-    def to_requested_grid(self, found: list[Solution]) -> list[Solution]:
+    def to_requested_grid(self, found: list[Solution], free: bool = False) -> list[Solution]:
         """The best minima on the requested grid, ranked there.
+
+        free: whether each has a duration of its own; then their order is kept.
 
         If the time left is too short for a few steps there, the best motion so far.
         """
@@ -60,6 +63,8 @@ class FinalStages:
             reached = f"the requested grid of {self.fine.grid.intervals:,} intervals was reached"
             why = f"the time limit leaves too little time for a solve before {reached}"
             return [ended_early(found[0], Status.TIME_LIMIT, why)]
+        if free:
+            return self._with_their_durations(found[:MAX_REFINED])
         problem = self.fine.problem()
         guesses = [guess_path(problem, s.trajectory) for s in found[:MAX_REFINED]]
         self.progress(f"refining {len(guesses)} of {len(found)} minima", 0.9)
@@ -70,6 +75,16 @@ class FinalStages:
             why = f"the requested grid was not reached, since {solved.lost[0]}"
             return [ended_early(found[0], Status.INTERRUPTED, why)]
         return distinct(solved.solutions)
+
+    def _with_their_durations(self, found: list[Solution]) -> list[Solution]:
+        """Each on the requested grid, stretched to its duration; minima come first."""
+        self.progress(f"refining {len(found)} motions", 0.9)
+        solve_for = self._stretched(self.fine.grid)
+        refined = [
+            solve_for(each.trajectory.duration, each.trajectory)
+            for each in self._until_deadline(found)
+        ]
+        return sorted(refined, key=lambda each: not each.success)
 
     def _step_seconds(self, coarse: Solution) -> float:
         """Estimated time of a step on the requested grid, from that on a coarser one, in [s]."""
@@ -153,10 +168,17 @@ class FinalStages:
         first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
         if not solution.success and solution.status is not Status.INFEASIBLE:
             first = solve_for(self.fine.grid.duration, solution.trajectory)
+        jointly = partial(self._solve_jointly, free)
         if self.fine.tolerance is None:
-            return solve_duration(free, solve_for, first)
+            return best_duration_by(free, solve_for, first, jointly=jointly).with_time()
         refine = partial(self._refined, self.fine.tolerance, f"{which}: ")
-        return free_to_tolerance(free, self._stretched, refine, first)
+        return free_to_tolerance(free, self._stretched, refine, first, jointly)
+
+    def _solve_jointly(self, free: FreeDuration, first: Solution) -> Solution | None:
+        """A minimum in the motion and the duration from a motion; None where not supported."""
+        left, most = self.deadline.seconds_left, self.fine.options.max_iterations
+        problem, path = first.problem, first.trajectory.path
+        return None if problem is None else joint_minimum(free, problem, path, most, left, True)
 
     def _stretched(self, grid: Grid) -> SolveFor:
         """A solver on a grid that is scaled to each duration."""

@@ -1,4 +1,6 @@
-"""The duration of least cost plus weight times duration.
+"""The duration of least cost plus weight times duration, by solves for given durations.
+
+For problems whose duration cannot be an unknown of the motion: see joint_duration.
 
 With J(T) the minimal cost for the duration T, J(T) + w T has a minimum where J'(T) = -w, that is,
 where Pontryagin's Hamiltonian equals w. The derivative of the discrete action is exact (see
@@ -236,10 +238,10 @@ class _Search:
         except _StoppedError as stopped:
             return self._best().unfinished(stopped.status, stopped.reason)
         except OutOfTimeError:
-            return self._best().unfinished(Status.TIME_LIMIT, _reason(Status.TIME_LIMIT))
+            return self._best().unfinished(Status.TIME_LIMIT, ended_search(Status.TIME_LIMIT))
         except KeyboardInterrupt:  # between two solves, which handle their own
             record_interrupt()
-            return self._best().unfinished(Status.INTERRUPTED, _reason(Status.INTERRUPTED))
+            return self._best().unfinished(Status.INTERRUPTED, ended_search(Status.INTERRUPTED))
         return self._best()
 
     def _best(self) -> BestDuration:
@@ -345,7 +347,7 @@ class _Search:
         solution = self.solve(T, guess.solution.trajectory)
         self.steps += solution.nit
         if solution.status in STOPPED:
-            raise _StoppedError(solution.status, _reason(solution.status))
+            raise _StoppedError(solution.status, ended_search(solution.status))
         return _Trial(T, solution, self.free.weight, guess.duration)
 
     def _at_an_edge(self) -> BestDuration:
@@ -382,6 +384,7 @@ def _jumps(a: _Trial, b: _Trial) -> bool:
     return a.gap_to(b) <= JUMP_BRACKET and abs(a.total - b.total) > explained
 
 
-def _reason(status: Status) -> str:
+def ended_search(status: Status) -> str:
+    """Why a search ended, as a clause."""
     what = "was interrupted" if status is Status.INTERRUPTED else "reached the time limit"
     return f"the search for the best duration {what}"

@@ -18,7 +18,6 @@ from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits
 from hovi.planning.search.job import Job
 from hovi.robot.mass_matrix import MassMatrix
@@ -111,9 +110,9 @@ def finer_grids(job: Job) -> list[Stage]:
     while N >= 2 * MIN_INTERVALS:
         N = (N + 1) // 2
         grid = Grid.uniform(job.grid.duration, N, galerkin(2, job.grid.order))
-        if job.via:
+        if job.node_times:
             try:
-                grid = grid.with_nodes([via.time for via in job.via])
+                grid = grid.with_nodes(job.node_times)
             except InputError:  # too few nodes for the via points
                 break
         stages.append(Stage(f"{N} intervals", job.on(grid)))
@@ -143,6 +142,8 @@ def _without_torque_limits(job: Job) -> Job:
 
 def _widened(limits: Limits, share: float) -> Limits:
     """Limits whose ranges are `share` times as wide, with the same centers."""
+    if limits.parts:
+        return Limits.of_segments([_widened(p, share) for p in limits.parts], limits.ends)
     more = (share - 1) / 2 * limits.ranges
     return Limits(limits.lower - more, limits.upper + more, limits.tolerance)
 
@@ -150,8 +151,14 @@ def _widened(limits: Limits, share: float) -> Limits:
 def _with_duration(job: Job, share: float) -> Job:
     """The job with its duration times `share`, and velocities of its ends in proportion."""
     grid = Grid(share * job.grid.steps, job.grid.schemes)
-    via = tuple(Via(share * each.time, _rescaled(each.goal, share)) for each in job.via)
-    start, goal = _rescaled(job.start, share), _rescaled(job.goal, share)
+    via = tuple(
+        dataclasses.replace(each, time=share * each.time, goal=_rescaled(each.goal, share))
+        for each in job.via
+    )
+    start, goal, limits = _rescaled(job.start, share), _rescaled(job.goal, share), job.limits
+    if limits.parts:
+        ends = [share * end for end in limits.ends]
+        job = job.with_options(limits=Limits.of_segments(limits.parts, ends))
     return dataclasses.replace(job.with_options(via=via), grid=grid, start=start, goal=goal)
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Self
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
+from hovi.effects import Effect
 from hovi.errors import ChartError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
@@ -20,7 +21,9 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.solver import guess_path
+from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 
 Progress = Callable[[str, float], None]
 """Called with a line of text and the completed fraction, in [0, 1]."""
@@ -29,11 +32,45 @@ MAX_CHART_INTERVALS = 2000
 
 
 @dataclass(frozen=True, eq=False)
+class Part:
+    """A segment of a job.
+
+    end: when it ends, as a share of the duration, 1 for the last. acting: what acts in it.
+    """
+
+    end: float
+    acting: Acting
+
+
+@dataclass(frozen=True)
+class Acting:
+    """Effects beside those of a scene; one of the same kind takes the place of the scene's own.
+
+    effects: which are equal to others where they can be compared, and are.
+    """
+
+    effects: tuple[Effect, ...] = field(compare=False)
+    _key: Hashable = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        try:
+            hash(self.effects)
+            object.__setattr__(self, "_key", self.effects)
+        except TypeError:  # an array in one of them
+            object.__setattr__(self, "_key", tuple(map(id, self.effects)))
+
+    def on(self, scene: Scene) -> Scene:
+        """The scene with these effects, the same one for the same effects."""
+        return _with_effects(scene, self) if self.effects else scene
+
+
+@dataclass(frozen=True, eq=False)
 class Job:
     """A problem to be solved, which worker processes build for themselves.
 
     grid: replaces the scheme and the intervals of the options.
     options: of the plan, with limits and tolerance resolved for the scene's robot.
+    parts: the segments of a sequence; none for one motion in one scene.
     """
 
     scene: Scene
@@ -41,6 +78,7 @@ class Job:
     start: State
     goal: State | FrameGoal
     options: PlanOptions = field(default_factory=PlanOptions)
+    parts: tuple[Part, ...] = ()
 
     @property
     def limits(self) -> Limits:
@@ -51,6 +89,20 @@ class Job:
     def via(self) -> tuple[Via, ...]:
         """The via points, by ascending time."""
         return tuple(sorted(self.options.via, key=lambda each: each.time))
+
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The times at which its segments but the last end, ascending, in [s]."""
+        return tuple(part.end * self.grid.duration for part in self.parts[:-1])
+
+    @property
+    def node_times(self) -> list[float]:
+        """The times at which its grids have nodes: of via points and ends of segments, in [s]."""
+        T, ends = self.grid.duration, self.ends
+        between = [
+            each.time for each in self.via if all(abs(each.time - end) > 1e-9 * T for end in ends)
+        ]
+        return sorted([*between, *ends])
 
     @property
     def tolerance(self) -> Tolerance | None:
@@ -66,14 +118,21 @@ class Job:
         """The job on another grid."""
         return dataclasses.replace(self, grid=grid)
 
+    def lagrangian(self) -> Lagrangian:
+        """The effort of the scene, or of the scene of every segment."""
+        weight = self.options.weight
+        if not self.parts:
+            return self.scene.effort_lagrangian(weight)
+        scenes = [part.acting.on(self.scene) for part in self.parts]
+        return SegmentedLagrangian(tuple(x.effort_lagrangian(weight) for x in scenes), self.ends)
+
     def problem(self) -> TrajectoryProblem:
         """The trajectory problem, built on first use."""
         return self._problem
 
     @cached_property
     def _problem(self) -> TrajectoryProblem:
-        lagrangian = self.scene.effort_lagrangian(self.options.weight)
-        ld = DiscreteLagrangian(lagrangian, self.grid)
+        ld = DiscreteLagrangian(self.lagrangian(), self.grid)
         clearance = self.options.clearance
         return TrajectoryProblem(ld, self.start, self.goal, self.limits, self.via, clearance)
 
@@ -81,6 +140,13 @@ class Job:
         """The state without the problem, which worker processes build, and without the guess."""
         kept = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
         return kept | {"options": self.options.with_changes(guess="cubic")}
+
+
+@lru_cache(maxsize=64)
+def _with_effects(scene: Scene, acting: Acting) -> Scene:
+    keys = {effect.key for effect in acting.effects}
+    kept = [effect for effect in scene.effects if effect.key not in keys]
+    return dataclasses.replace(scene, effects=[*kept, *acting.effects])
 
 
 def split_for_charts(job: Job, guess: str | Trajectory) -> Job:

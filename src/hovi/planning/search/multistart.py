@@ -21,7 +21,9 @@ from hovi.discrete.guess import Curve, stretched, with_bump, with_turns
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress
+from hovi.planning.search.joint_duration import joint_minimum
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -56,12 +58,14 @@ class Solved:
 class Pool:
     """Solves a job from many guesses, in this process or in worker processes.
 
-    deadline: of all solves together.
+    deadline: of all solves together. free: a duration to be found along with each motion, whose
+    price is then part of the costs; None for the job's own.
     """
 
     job: Job
     processes: int
     deadline: Deadline = field(default_factory=Deadline)
+    free: FreeDuration | None = None
 
     def solve_all(self, guesses: Sequence[DiscretePath]) -> Solved:
         """The solutions from the guesses, without those whose process died.
@@ -87,7 +91,7 @@ class Pool:
         """Add the results of worker processes."""
         from hovi.workers.pool import results_in_workers  # not needed for one process
 
-        work = partial(_solve, self.job)
+        work = partial(_solve, self.job, self.free)
         found = results_in_workers(work, guesses, self.processes, self.deadline)
         with closing(found):
             results.update(found)
@@ -99,7 +103,7 @@ class Pool:
                 continue
             if results and self.deadline.passed:
                 return
-            results[i] = solution = _solve(self.job, guess, self.deadline.seconds_left)
+            results[i] = solution = _solve(self.job, self.free, guess, self.deadline.seconds_left)
             if solution.status is Status.INTERRUPTED:
                 return
 
@@ -112,11 +116,16 @@ def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> S
     return Solved(solutions, lost, ended)
 
 
-def _solve(job: Job, guess: DiscretePath, time_limit: float | None) -> Solution:
+def _solve(
+    job: Job, free: FreeDuration | None, guess: DiscretePath, time_limit: float | None
+) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
-    most = job.options.max_iterations
-    solution = solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=time_limit)
-    return dataclasses.replace(solution, problem=None)
+    problem, most = job.problem(), job.options.max_iterations
+    solution = None if free is None else joint_minimum(free, problem, guess, most, time_limit)
+    if solution is None:
+        solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=time_limit)
+    price = 0.0 if free is None else free.weight * solution.trajectory.duration
+    return dataclasses.replace(solution, problem=None, cost=solution.cost + price)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +141,14 @@ class Exploration:
     done: int
     interrupted: bool
     lost: tuple[str, ...] = ()
+
+    def without_price(self, free: FreeDuration) -> Exploration:
+        """The same with costs without the price of time, in the same order."""
+        minima = [
+            dataclasses.replace(s, cost=s.cost - free.weight * s.trajectory.duration)
+            for s in self.minima
+        ]
+        return dataclasses.replace(self, minima=minima)
 
 
 def explore(

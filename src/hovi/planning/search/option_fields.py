@@ -9,9 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-import numpy as np
-
-from hovi.checks.kinds import shown
+from hovi.checks.kinds import is_number, shown
 from hovi.errors import InputError, nearest
 
 MAX_WHOLE_NUMBER = 10**9
@@ -77,13 +75,11 @@ def keep_whole_numbers(options: Any) -> None:
 
 def _whole(name: str, known: OptionInfo, number: Any) -> int:
     least, most = known.least or 0, MAX_WHOLE_NUMBER if known.most is None else known.most
-    is_number = (isinstance(number, int) and not isinstance(number, bool)) or (
-        isinstance(number, float | np.number) and math.isfinite(number)
-    )
-    if is_number and number == int(number) and least <= number <= most:
+    finite = is_number(number) and (isinstance(number, int) or math.isfinite(number))
+    if finite and number == int(number) and least <= number <= most:
         return int(number)
     allowed = f"of {least} or more" if known.most is None else f"from {least} to {known.most:,}"
-    if is_number and known.most is None and number > most:
+    if finite and known.most is None and number > most:
         allowed = f"from {least} to {most:,}"
     raise InputError(f"{name} must be a whole number {allowed}, got {shown(number)}.")
 

@@ -6,17 +6,18 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, expect
+from hovi.errors import InputError, expect, nearest
 from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
-from hovi.planning.clearance.obstacles import Obstacle
+from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.notation.ends import as_via
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import seconds
 from hovi.planning.search.option_fields import (
@@ -30,24 +31,31 @@ from hovi.planning.search.option_fields import (
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
 
+if TYPE_CHECKING:
+    from hovi.planning.obstacles.grasped import Grasped
+
 DEFAULT_TOLERANCE = 1e-3
 """Relative tolerance of the cost if neither scheme, intervals nor tolerance are named."""
 DEFAULT_SCHEME = "galerkin-2"
 """Scheme if only the intervals are named."""
+LIMITED_SCHEME = "galerkin-2x8"
+"""The same for a motion with limits."""
 DEFAULT_INTERVALS = 16
 """Number of intervals if only the scheme is named, and of the first grid of a refinement."""
 TOLERANCE_AND_SCHEME = "tolerance chooses the scheme and the intervals; leave them out."
 """The message where a tolerance and a scheme are given together."""
+INTERVALS_TWICE = "`intervals` and `scheme.intervals` are the same: leave one of them out."
+"""The message where the number of intervals is given twice."""
 MAX_INTERVALS = 1_000_000
 """Maximum number of intervals that may be requested."""
 _CHECKED_HERE = (
-    *("via", "scheme", "intervals", "starts", "seed", "obstacles", "margin"),
+    *("via", "scheme", "intervals", "starts", "seed", "obstacles", "grasped", "margin"),
     *("max_iterations", "time_limit", "processes"),
 )
 """Options whose own checks say more than their annotations."""
 _EXCLUSIVE = "scheme", "tolerance"
 """Options of which at most one may be given."""
-_CLEARANCE_OPTIONS = ("obstacles", "margin", "self_collision")
+_CLEARANCE_OPTIONS = ("obstacles", "grasped", "margin", "self_collision")
 
 
 def _always(options: PlanOptions) -> bool:
@@ -73,11 +81,14 @@ class PlanOptions:
         SceneKey("a number, 0 or more: the cost per second"),
         least=0,
     )
-    via: Sequence[Via] = option((), "goals that the motion meets at given times.")
+    via: Sequence[Via] = option(
+        (), "goals that the motion meets at given times: Via, or tables as in a scene file."
+    )
     scheme: str | Scheme | None = option(
         None,
         "discretisation of the action: a name as for by_name, or a Scheme. Naming a scheme or a "
-        'number of intervals fixes the grid; "galerkin-2" if only `intervals` are named.',
+        'number of intervals fixes the grid; "galerkin-2" if only `intervals` are named, or '
+        '"galerkin-2x8" within limits.',
     )
     intervals: int | None = whole_number(
         None,
@@ -113,8 +124,13 @@ class PlanOptions:
     )
     obstacles: Sequence[Obstacle] = option(
         (),
-        "hovi.Sphere, hovi.Capsule or hovi.Box, from which the robot's collision shapes keep a "
+        "hovi.Sphere, hovi.Box or other obstacles, from which the robot's collision shapes keep a "
         "distance of `margin` along the whole motion.",
+    )
+    grasped: Sequence[Grasped] = option(
+        (),
+        "hovi.Grasped, objects that links of the robot carry along the whole motion: with mass, "
+        "shape, and names of what they may touch.",
     )
     margin: float = option(
         DEFAULT_MARGIN,
@@ -127,7 +143,11 @@ class PlanOptions:
         "whether the robot's links keep this distance from each other, too.",
         SceneKey("true or false", written=_if_clearance),
     )
-    guess: str | Trajectory = option("cubic", '"cubic", "minimum-jerk" or a Trajectory.')
+    guess: str | Trajectory = option(
+        "cubic",
+        '"cubic", "minimum-jerk" or a Trajectory.',
+        SceneKey('"cubic" or "minimum-jerk"'),
+    )
     turns: Mapping[str, int | Sequence[int]] | None = option(
         None, "full turns of the guess beyond the shortest path, by joint: see State."
     )
@@ -140,13 +160,21 @@ class PlanOptions:
         "duration: accelerations are zero at both ends, or as given, and torques are continuous.",
         SceneKey("true or false"),
     )
+    group: str | None = option(
+        None,
+        "a group of joints of the robot's SRDF, which alone move: the others are locked where they "
+        "are at the start, and the motion is that of a robot without them.",
+    )
     max_iterations: int = whole_number(
         500,
         "maximum number of steps of a solve; with limits, of each of its rounds.",
         least=1,
+        key=SceneKey("a whole number, 1 or more"),
     )
     time_limit: float | str | None = option(
-        None, 'of the whole plan, in [s] or as "2 min"; the best motion so far is returned.'
+        None,
+        'of the whole plan, in [s] or as "2 min"; the best motion so far is returned.',
+        SceneKey('a positive number of seconds, or a text such as "2 min"'),
     )
     processes: int | None = whole_number(
         None, "number of processes for the starts; all processors by default.", least=1
@@ -155,20 +183,39 @@ class PlanOptions:
         True,
         "if no start ends in a minimum, solve easier problems that lead to this one, in inertia, "
         "gravity, duration, intervals or limits; the message names the one that succeeded.",
+        SceneKey("true or false"),
     )
 
     def __post_init__(self) -> None:
+        if isinstance(self.scheme, Mapping):
+            self._take_scheme_table(self.scheme)
         keep_whole_numbers(self)
         via, limit = self.via, self.time_limit_seconds
-        if not isinstance(via, Sequence) or not all(isinstance(each, Via) for each in via):
+        if not isinstance(via, Sequence) or isinstance(via, str):
             raise InputError(f"via must be a list of hovi.Via(time, goal), got {via!r}.")
         if limit is not None and not limit > 0:
             raise InputError(f"time_limit must be positive, in seconds, got {self.time_limit}.")
-        object.__setattr__(self, "via", tuple(via))
+        object.__setattr__(self, "via", tuple(as_via(each, i) for i, each in enumerate(via)))
+        if not isinstance(self.grasped, tuple) or self.grasped:
+            from hovi.planning.obstacles.grasped import as_grasped  # 10 ms
+
+            object.__setattr__(self, "grasped", as_grasped(self.grasped))
         object.__setattr__(self, "obstacles", self.clearance.obstacles)
         expect(self.table, Scheme, "a name such as 'galerkin-2' as the scheme")
         if self.tolerance is not None and self.scheme is not None:
             raise InputError(TOLERANCE_AND_SCHEME)
+
+    def _take_scheme_table(self, table: Mapping[str, Any]) -> None:
+        """Set scheme and intervals from a table as in a scene file. Raises InputError."""
+        for key in table:
+            if key not in ("name", "intervals"):
+                hint = nearest(str(key), ("name", "intervals"))
+                raise InputError(f"unknown key `scheme.{key}`; {hint}")
+        if self.intervals is not None and "intervals" in table:
+            raise InputError(INTERVALS_TWICE)
+        object.__setattr__(self, "scheme", table.get("name"))
+        if "intervals" in table:
+            object.__setattr__(self, "intervals", table["intervals"])
 
     @property
     def time_limit_seconds(self) -> float | None:
@@ -194,7 +241,16 @@ class PlanOptions:
 
     @property
     def _scheme(self) -> str | Scheme:
-        return DEFAULT_SCHEME if self.scheme is None else self.scheme
+        if self.scheme is not None:
+            return self.scheme
+        return LIMITED_SCHEME if self._limited else DEFAULT_SCHEME
+
+    @property
+    def _limited(self) -> bool:
+        """Whether a motion has limits, between which more points leave it less room."""
+        if isinstance(self.limits, Limits):
+            return bool(self.limits.bounded.any())
+        return self.limits != "none"
 
     @property
     def interval_count(self) -> int:
@@ -210,7 +266,8 @@ class PlanOptions:
     @cached_property
     def clearance(self) -> Clearance:
         """Obstacles and self-collision, with their margin."""
-        return Clearance(self.obstacles, self.margin, self.self_collision)
+        touching = [(each.name, other) for each in self.grasped for other in each.may_touch]
+        return Clearance(self.obstacles, self.margin, self.self_collision, touching)
 
     def with_changes(self, **changes: Any) -> Self:
         """These options with some of them changed; a tolerance replaces a scheme, and vice versa.

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 import time
+import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, cast
 
-import numpy.typing as npt
-
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
-from hovi.discrete.state import State, as_state, warn_of_degrees
+from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, SceneError, expect
+from hovi.errors import HoviWarning, InputError, SceneError, expect
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.presolve.assumptions import assumptions
+from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
+from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
+from hovi.planning.search.group import in_group
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.search.smoothing import smoothed
-from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.solver import Solution, infeasible_at_once
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order
@@ -35,8 +39,8 @@ from hovi.system.interruption import interruptible
 
 MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
-Start = State | npt.ArrayLike | str
-Goal = State | FrameGoal | npt.ArrayLike | str
+STACK_LEVEL = 6
+"""Frames between a warning of `plan` and its caller: its decorators."""
 Keywords = ParamSpec("Keywords")
 
 
@@ -46,8 +50,8 @@ class _Plan(Protocol[Keywords]):
     def __call__(
         self,
         scene: Scene,
-        start: Start,
-        goal: Goal,
+        start: End,
+        goal: End,
         duration: Duration,
         progress: Progress | None = None,
         options: PlanOptions | None = None,
@@ -76,8 +80,8 @@ def _with_option_keywords(
 @interruptible
 def plan(
     scene: Scene,
-    start: Start,
-    goal: Goal,
+    start: End,
+    goal: End,
     duration: Duration,
     progress: Progress | None = None,
     options: PlanOptions | None = None,
@@ -85,15 +89,21 @@ def plan(
 ) -> Solution:
     """The motion of least 1/2 integral |tau|^2 from a state to a goal.
 
+    Where a FrameGoal is met in several configurations, coarse motions to the nearest ones are
+    compared, and the one that costs least is chosen: a start is that configuration, a goal begins
+    there and is free to change along all configurations that meet it.
+
     scene: the robot with its effects.
-    start, goal: a State, a configuration of shape (nq,) at rest, or the name of a pose; the goal
-        may be a FrameGoal.
+    start, goal: a State, a configuration of shape (nq,) at rest, the name of a pose, or a
+        FrameGoal; or a table of joint positions, or one with the keys of a scene file's [goal],
+        such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}.
     duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
         of these for a free duration.
     progress: called with a line of text and the completed fraction, in [0, 1].
     options: a PlanOptions; the following keywords override it.
     {options}
-    Raises InputError, ModelError, SceneError or SchemeError for invalid input.
+    Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
+    a start that no configuration meets.
     """
     began = time.perf_counter()
     if not isinstance(scene, Scene):
@@ -102,22 +112,46 @@ def plan(
         )
     options = PlanOptions() if options is None else options
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
-    chosen = options.with_changes(**changes).on(scene)
+    options = options.with_changes(**changes)
+    scene = holding(scene, options)
+    given = as_end(start, scene.robot, "start"), _goal(goal, scene.robot, options)
+    if options.group is not None:
+        scene, start_end, goal_end = in_group(scene, options.group, *given)
+        given = start_end, goal_end
+    chosen = options.on(scene)
     deadline = Deadline(chosen.time_limit_seconds)
     free, T = _time(scene, as_duration(duration), chosen)
-    ends = as_state(start, scene.robot), _goal(goal, scene.robot, chosen)
-    scene = smoothed(scene, *ends, T) if chosen.smooth else scene
-    grid = _grid(T, chosen, scene, free is not None)
-    with deadline.in_force():
-        scene.effort_lagrangian(chosen.weight)  # its functions may have to be compiled
-    job = split_for_charts(Job(scene, grid, *ends, chosen), chosen.guess)
+    search = _Planning(scene, *given, T, chosen, free)
+    job = search.job(nearest_ends(scene, *given, chosen), deadline)
     for bound in () if free is None else (free.lower, free.upper):
-        grid.stretched(bound)  # raises for steps that are too short or too long
-    search = Search(job, deadline, progress or _silent, free)
+        job.grid.stretched(bound)  # raises for steps that are too short or too long
     problem = job.problem()  # raises for invalid input before the search
-    _warn_of_degrees(scene.robot, *ends, chosen)
+    warn_of_ends(scene.robot, job.start, job.goal, chosen)
+    longest = problem if free is None else problem.on(problem.grid.stretched(free.upper))
+    found = findings(longest, *given)
+    for sentence in found.warnings:
+        warnings.warn(sentence, HoviWarning, stacklevel=STACK_LEVEL)
+    if found.reason:
+        nothing = infeasible_at_once(longest, chosen.guess, found.reason)
+        return _with_assumptions(nothing, job, time.perf_counter() - began)
+    if FrameGoal in map(type, given):
+        ends = chosen_ends(scene, *given, T, chosen, deadline)
+        job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
+    return _with_assumptions(run(Search(job, deadline, progress or silent, free), began), job)
+
+
+def _with_assumptions(found: Solution, job: Job, setup_seconds: float | None = None) -> Solution:
+    """The solution, with a message that ends with what its scene leaves unsaid."""
+    said = assumptions(job.scene, found.trajectory, job.options.weight is not None)
+    setup = found.setup_seconds if setup_seconds is None else setup_seconds
+    return dataclasses.replace(found, message=" ".join([found.message, *said]), setup_seconds=setup)
+
+
+def run(search: Search, began: float) -> Solution:
+    """The best solution of a search, with its times. began: of the plan, by the clock."""
+    problem = search.fine.problem()
     started = time.perf_counter()
-    with deadline.in_force():
+    with search.deadline.in_force():
         best, minima = search.run()
     return dataclasses.replace(
         best,
@@ -126,6 +160,39 @@ def plan(
         setup_seconds=started - began,
         solve_seconds=time.perf_counter() - started,
     )
+
+
+def holding(scene: Scene, options: PlanOptions) -> Scene:
+    """The scene with a robot that holds what is grasped."""
+    if not options.grasped:
+        return scene
+    from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
+
+    return scene_holding(scene, tuple(options.grasped))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Planning:
+    """What jobs are made of: see `plan`. duration: of the first solve, in [s]."""
+
+    scene: Scene
+    start: State | FrameGoal
+    goal: State | FrameGoal
+    duration: float
+    options: PlanOptions
+    free: FreeDuration | None
+
+    def job(
+        self, ends: tuple[State, State | FrameGoal], deadline: Deadline, scene: Scene | None = None
+    ) -> Job:
+        """The job between two ends. scene: with the cost on the jerk, if it is known."""
+        T, options = self.duration, self.options
+        if scene is None:
+            scene = smoothed(self.scene, *ends, T) if options.smooth else self.scene
+        grid = _grid(T, options, scene, self.free is not None)
+        with deadline.in_force():
+            scene.effort_lagrangian(options.weight)  # its functions may have to be compiled
+        return split_for_charts(Job(scene, grid, *ends, options), options.guess)
 
 
 def _time(
@@ -141,6 +208,12 @@ def _time(
         return None, T
     if options.via:
         raise InputError("via points need a fixed duration: give it as one number.")
+    moving = [each.name for each in options.clearance.obstacles if each.motion is not None]
+    if moving:
+        raise InputError(
+            f"obstacle {moving[0]!r} moves at given times, which a free duration does not allow; "
+            "give the duration as one number."
+        )
     free = FreeDuration(*T, options.time_weight)
     if scene.terms.timed:
         raise SceneError(
@@ -182,19 +255,17 @@ def _is_first_grid(grid: Grid, options: PlanOptions, order: int) -> bool:
     return refinable and options.interval_count < grid.intervals <= MAX_GUESS_INTERVALS
 
 
-def _goal(goal: Goal, robot: Robot, options: PlanOptions) -> State | FrameGoal:
+def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:
     """The goal, with the turns of the initial guess."""
-    if isinstance(goal, FrameGoal):
+    state = as_end(goal, robot, "goal")
+    if isinstance(state, FrameGoal):
         if options.turns is not None:
             raise InputError("turns need a joint goal: give a State instead of a FrameGoal.")
-        return goal
-    state = as_state(goal, robot)
+        return state
     return state if options.turns is None else dataclasses.replace(state, turns=options.turns)
 
 
-def _warn_of_degrees(
-    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions
-) -> None:
+def warn_of_ends(robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions) -> None:
     """Warn if the given configurations, in order of time, look like degrees."""
     stops = sorted(options.via, key=lambda via: via.time)
     given = [start, *(via.goal for via in stops), goal]
@@ -202,5 +273,5 @@ def _warn_of_degrees(
     warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
 
 
-def _silent(text: str, fraction: float) -> None:
+def silent(text: str, fraction: float) -> None:
     """Ignore progress."""

@@ -136,9 +136,9 @@ class Search:
         coarse = Grid.uniform(
             grid.duration, COARSE_INTERVALS, galerkin_with_more_points(2, grid.order)
         )
-        if self.fine.via:
+        if self.fine.node_times:
             try:
-                coarse = coarse.with_nodes([each.time for each in self.fine.via])
+                coarse = coarse.with_nodes(self.fine.node_times)
             except InputError:  # too few nodes for the via points
                 return self.fine
         job = split_for_charts(self.fine.on(coarse), self.fine.options.guess)
@@ -149,9 +149,10 @@ class Search:
         options = job.options
         whole = job is self.fine and job.tolerance is None and self.free is None
         deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
-        pool = Pool(job, options.processes or default_processes(), deadline)
+        pool = Pool(job, options.processes or default_processes(), deadline, self.free)
         first = guess_path(job.problem(), options.guess)
-        return explore(pool, first, options.starts, options.seed, self.progress)
+        explored = explore(pool, first, options.starts, options.seed, self.progress)
+        return explored if self.free is None else explored.without_price(self.free)
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
@@ -179,7 +180,8 @@ class Search:
             yield (found := stages.to_tolerance(self.fine.tolerance, found))
         elif job is not self.fine:
             raise_if_interrupted()
-            yield (found := self._continued(self.fine, stages.to_requested_grid(found)))
+            on_grid = stages.to_requested_grid(found, self.free is not None)
+            yield (found := self._continued(self.fine, on_grid))
         yield (found := [stages.in_charts(found[0]), *found[1:]])
         if self.free is not None:
             raise_if_interrupted()

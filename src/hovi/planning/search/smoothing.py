@@ -43,5 +43,11 @@ def smoothed(scene: Scene, start: State, goal: State | FrameGoal, duration: floa
     for kind in (robot.sliding, ~robot.sliding):
         if kind.any():
             inertia[kind] = np.linalg.eigvalsh(M[:, kind][:, :, kind]).max()
-    weight = (SMOOTHING_SHARE * duration * inertia) ** 2
+    with np.errstate(over="ignore", under="ignore"):
+        weight = (SMOOTHING_SHARE * duration * inertia) ** 2
+    if not (np.isfinite(weight).all() and (weight > 0).all()):
+        raise InputError(
+            "smooth = true weights the jerk by the square of the duration, which is too short or "
+            f"too long for that at {duration:.3g} s: change the duration."
+        )
     return dataclasses.replace(scene, effects=[*scene.effects, JerkCost(tuple(weight.tolist()))])

@@ -6,6 +6,7 @@ With equality constraints it is their augmented Lagrangian, see hovi.planning.so
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from functools import partial
 from typing import Literal
 
@@ -58,6 +59,7 @@ class ActionObjective(Objective[DiscretePath]):
         constraints).
     structure: of an earlier objective on the same grid, to be reused.
     multipliers: of the equality constraints, if any.
+    keep_points: whether expansions keep those at the points, from which `duration_border` follows.
     """
 
     def __init__(
@@ -66,9 +68,11 @@ class ActionObjective(Objective[DiscretePath]):
         algebra: LinearAlgebra | None = None,
         structure: ActionStructure | None = None,
         multipliers: Multipliers | None = None,
+        keep_points: bool = False,
     ) -> None:
         self.problem = problem
         self.multipliers = multipliers
+        self.keep_points = keep_points
         self.moments = problem.torque_moments
         on = problem.coordinates
         integrate = partial(without_checks(type(on).integrate), on)
@@ -184,13 +188,17 @@ class ActionObjective(Objective[DiscretePath]):
     ) -> QuadraticModel:
         """The quadratic model at x, its curvature weighted by the predicted outputs."""
         if previous is not None and step is not None and self._expansion is not None:
-            curvatures = self._predicted_slopes(self._expansion, previous.gather(step))
+            curvatures = self.predicted_slopes(previous.gather(step))
         else:
             curvatures = [self.output_slope(y, i) for i, y in enumerate(self.outputs(x))]
         return self.model_with(x, curvatures, None)
 
-    def _predicted_slopes(self, expansion: Expansion, step: Array) -> list[Array]:
-        """`output_slope` of the outputs that a step of an expansion predicts, per batch."""
+    def predicted_slopes(self, step: Array) -> list[Array]:
+        """`output_slope` of the outputs that a step of the last model predicts, per batch.
+
+        step: in the columns of the intervals, shape (N, m, n).
+        """
+        expansion = self.expansion
         if self.moments is not None:
             outputs = self.ld.predicted_outputs(expansion, step, self.coordinates)
             return [self.output_slope(y, i) for i, y in enumerate(outputs)]
@@ -204,16 +212,22 @@ class ActionObjective(Objective[DiscretePath]):
         x: DiscretePath,
         curvatures: list[Array] | None,
         terms: list[PointTerms] | None,
+        add: Callable[[Expansion], None] | None = None,
     ) -> QuadraticModel:
         """The model at x with given weights of the outputs' curvature and with terms of limits.
 
         curvatures: weights per batch, multipliers of constraints included. terms: at the points.
+        add: adds further terms to the expansion.
         """
         multipliers = self.multipliers
         if multipliers is not None:
             terms = self._with_moments(x, multipliers).added_to(terms)
         jets = self.jets(x)
-        self._expansion = _expand(self.ld, x, self.coordinates, curvatures, terms, jets)
+        self._expansion = _expand(
+            self.ld, x, self.coordinates, curvatures, terms, jets, self.keep_points
+        )
+        if add is not None:
+            add(self._expansion)
         if multipliers is not None:
             self._add_conditions(x, self._expansion, multipliers)
             if self.moments is not None:
@@ -272,11 +286,15 @@ class ActionObjective(Objective[DiscretePath]):
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""
+        return self.moved(x, model.gather(step))
+
+    def moved(self, x: DiscretePath, columns: Array) -> DiscretePath:
+        """The path moved by a step in the columns of the intervals, shape (N, m, n)."""
         if self.ld.k != 2:
             on = self.problem.coordinates
-            return move_any(x, model.gather(step), self.problem.grid.steps, on.curved_space)
+            return move_any(x, columns, self.problem.grid.steps, on.curved_space)
         nodal = self.coordinates == "nodal"
-        dq, *moved = move(x.arrays, model.gather(step), self.problem.grid.steps, nodal)
+        dq, *moved = move(x.arrays, columns, self.problem.grid.steps, nodal)
         path = _new_path(self._integrate(x.q, dq), *moved)
         if self.ld.chart is None:
             return path

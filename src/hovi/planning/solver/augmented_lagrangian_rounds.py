@@ -115,20 +115,25 @@ def minimize_constrained(
     ):
         reason = unmet_sentence(problem, path, residuals)
     elif result.stop is Stop.STATIONARY:
-        reason = _spurious_sentence(problem, path)
+        reason = spurious_sentence(problem, path)
     return ConstrainedResult(result, multipliers, residuals, reason)
 
 
 def first_multipliers(problem: TrajectoryProblem, path: DiscretePath) -> Multipliers:
     """Zero multipliers, with penalties scaled by the torque weights and the cost of a path."""
-    weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
-    weights = weights[weights > 0]
-    weight = float(weights.mean()) if len(weights) > 0 else 1.0
+    weight = mean_output_weight(problem)
     cost = max(abs(problem.ld.action(path)), 1e-6)
     zero = Multipliers.zero(problem, INITIAL_TORQUE_PENALTY * weight, INITIAL_NODE_PENALTY * cost)
     share = ActionObjective(problem, multipliers=zero).residuals(path).torque_share
     warm = share <= WARM_TORQUE_SHARE
     return zero.with_scaled_penalties(WARM_PENALTY_FACTOR, 1.0) if warm else zero
+
+
+def mean_output_weight(problem: TrajectoryProblem) -> float:
+    """The mean weight of the outputs in the cost, passive joints left out; 1 without any."""
+    weights = np.delete(problem.ld.lagrangian.output_weight, problem.passive)
+    weights = weights[weights > 0]
+    return float(weights.mean()) if len(weights) > 0 else 1.0
 
 
 def within(residuals: Residuals, torque_share: float, node_error: float) -> bool:
@@ -142,7 +147,7 @@ def _at_maximum_penalty(now: Multipliers, first: Multipliers, slow: list[bool]) 
     return any(each and size >= MAX_PENALTY_RATIO for each, size in zip(slow, grown, strict=True))
 
 
-def _spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
+def spurious_sentence(problem: TrajectoryProblem, path: DiscretePath) -> str:
     """Which condition holds at a spurious root, as a sentence without its end; "" if none does."""
     for each in problem.conditions:
         q, v = path.q[each.node], path.v[each.node]

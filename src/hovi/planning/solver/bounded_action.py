@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi._native import intervals as native
+from hovi.discrete.contraction import Expansion
+from hovi.discrete.discrete_lagrangian import Batch
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
 from hovi.optimize.barrier import Bounds
-from hovi.optimize.interior_point import BoundedObjective, Outputs
+from hovi.optimize.bounded_objective import BoundedObjective, Outputs, Refinement
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.planning.problem.limits import Limits, limited_columns
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective, LinearAlgebra
 from hovi.planning.solver.clearance_outputs import PointOutputs
+from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
 
@@ -27,7 +32,8 @@ Array = npt.NDArray[np.float64]
 class BoundedAction(BoundedObjective[DiscretePath]):
     """The discrete action, with (q, v, a, tau), or more, bounded at the quadrature points.
 
-    Further outputs y(q) >= 0, such as distances to obstacles, follow in the last columns.
+    What `rows` bound is bounded at all times instead. Further outputs y(q) >= 0, such as distances
+    to obstacles, follow in the last columns.
 
     problem: the trajectory problem.
     limits: the bounds.
@@ -35,6 +41,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         shape (2, N, kinds nv + more); none if None.
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
+    rows: control points, bounded instead of values at the points and refined in place; or None.
     """
 
     def __init__(
@@ -45,6 +52,7 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         algebra: LinearAlgebra | None = None,
         multipliers: Multipliers | None = None,
         more: PointOutputs | None = None,
+        rows: LimitRows | None = None,
     ) -> None:
         self.problem = problem
         self.limits = limits
@@ -53,7 +61,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         self.lagrangian = self.action.lagrangian
         self._jet_size = (self.lagrangian.order + 1) * self.lagrangian.nv
         self._size = self._jet_size + len(self.lagrangian.output_weight)
-        self._bounded = np.flatnonzero(limits.bounded.ravel())
+        bounded = limits.bounded if rows is None else rows.of.others(limits)
+        self._bounded = np.flatnonzero(bounded.ravel())
         columns = limited_columns(self.lagrangian.order, self.lagrangian.nv)
         self.columns = columns[self._bounded]
         if self.columns.max(initial=0) >= self._size:
@@ -62,11 +71,23 @@ class BoundedAction(BoundedObjective[DiscretePath]):
                 needed = "the torque rate need a Lagrangian of one scene with a cost on the jerk"
             raise InputError(f"limits on {needed}; leave them out.")
         self.more = more
-        self.bounds = self._bounds(margins)
+        self.rows = rows
+        self._row_columns = np.zeros((0, self.ld.columns))
+        self._at_points = self._point_bounds(margins)
+        self._with_rows()
         self._predicted: list[Array] | None = None
-        self._linear: list[Array] = []
-        self._rho = np.zeros(0)
         self._jacobian = np.zeros((0, 0, 0))
+
+    def _with_rows(self) -> None:
+        """The bounds of the outputs at the points, then those of the rows."""
+        lower, upper, weights = (part.ravel() for part in self._at_points)
+        rows = self.rows
+        if rows is not None and rows.size > 0:
+            low, high = rows.bounds
+            lower, upper = np.append(lower, low), np.append(upper, high)
+            weights = np.append(weights, rows.weights)
+            self._row_columns = rows.columns(self.action.coordinates)
+        self.bounds = Bounds(lower, upper, weights, self.problem.grid.duration)
 
     def outputs(self, x: DiscretePath) -> Outputs:
         """The discrete action, and the bounded outputs relative to their ranges."""
@@ -80,16 +101,18 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         y = self._scaled(np.concatenate(rows))
         if self.more is not None:
             y = np.concatenate([y, self.more.values(self._configurations(x))], axis=1)
+        y = y.ravel() if self.rows is None else np.append(y, self.rows.values(x))
         return Outputs(self.action.value_of(x, outputs), y)
 
     def model(
         self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
     ) -> QuadraticModel:
         """The model of the action with the terms of the bounds: see BoundedObjective.model."""
-        self._rho = rho
-        gradient = self._unscaled(rho, 1)
-        weight = self._unscaled(sigma, 2)
-        force = self._unscaled(multipliers, 1)
+        points = (self._of_points(part) for part in (sigma, rho, multipliers))
+        sigma_at, rho_at, multipliers_at = points
+        gradient = self._unscaled(rho_at, 1)
+        weight = self._unscaled(sigma_at, 2)
+        force = self._unscaled(multipliers_at, 1)
         terms, curvatures = [], []
         k = self._jet_size  # (q, v, a, ...) first, then tau
         for i, part in enumerate(self._parts):
@@ -97,22 +120,37 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             terms.append(PointTerms(slope[:, :k], curve[:, :k], slope[:, k:], curve[:, k:]))
             curvatures.append(self._slope(x, i) + force[part, k:])
         if self.more is not None:
-            terms = self._with_more(x, terms, sigma, rho, multipliers)
-        return self.action.model_with(x, curvatures, terms)
+            terms = self._with_more(x, terms, sigma_at, rho_at, multipliers_at)
+        return self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
+
+    def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
+        """What adds the terms of the rows to an expansion; None without rows."""
+        rows, J = self.rows, self._row_columns
+        if rows is None or rows.size == 0:
+            return None
+        first, weights = self._point_count, self.bounds.weights
+        slopes, curves = (weights[first:] * each[first:] for each in (rho, sigma))
+
+        def add(expansion: Expansion) -> None:
+            native.pull_rows(rows.intervals, rows.joints, J, slopes, expansion.gradient)
+            native.add_squares(rows.intervals, rows.joints, J, curves, expansion.hessian)
+
+        return add
 
     def forces(self, x: DiscretePath, multipliers: Array) -> list[PointTerms]:
         """The multipliers of bounds and constraints as terms in (q, v, a, tau) at the points.
 
-        multipliers: of the outputs, shape (P, K).
+        multipliers: of the outputs, shape (R,).
         """
-        force = self._unscaled(multipliers, 1)
+        at_points = self._of_points(multipliers)
+        force = self._unscaled(at_points, 1)
         k = self._jet_size
         zero = np.zeros_like(force)
         terms = [
             PointTerms(force[p, :k], zero[p, :k], force[p, k:], zero[p, k:]) for p in self._parts
         ]
         if self.more is not None:
-            terms = self._with_more(x, terms, np.zeros_like(multipliers), multipliers, multipliers)
+            terms = self._with_more(x, terms, np.zeros_like(at_points), at_points, at_points)
         known = self.action.multipliers
         return terms if known is None else known.added_to(terms)
 
@@ -138,39 +176,119 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             for term, part in zip(terms, self._parts, strict=True)
         ]
 
-    def linear_outputs(self, step: Array, model: QuadraticModel) -> tuple[float, Array]:
-        """First-order change of the action and of the bounded outputs."""
-        expansion = self.action.expansion
-        changes = self.ld.point_steps(model.gather(step), self.action.coordinates, expansion)
-        rows = []
-        self._linear = []
-        for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
-            dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
-            self._linear.append(dtau)
-            rows.append(np.concatenate([dx, dtau], axis=1))
-        changed = np.concatenate(rows)
-        dy = changed[:, self.columns] / self._ranges
-        if self.more is not None:
-            dq = changed[:, : self.lagrangian.nv, None]
-            dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
-        slope = float(np.vdot(model.gradient, step))
-        return slope - float(np.sum(self.bounds.weights * self._rho * dy)), dy
+    def push(self, step: Array, model: QuadraticModel) -> Array:
+        """First-order change of the bounded outputs, shape (R,)."""
+        columns, expansion = model.gather(step), self.action.expansion
+        if self.more is None and expansion.charts is None:
+            dy = self._pushed(columns)
+        else:
+            changes = self.ld.point_steps(columns, self.action.coordinates, expansion)
+            parts = []
+            for dx, (_tau, J) in zip(changes, expansion.outputs, strict=True):
+                dtau = np.matmul(J, dx[:, :, None])[:, :, 0]
+                parts.append(np.concatenate([dx, dtau], axis=1))
+            changed = np.concatenate(parts)
+            dy = changed[:, self.columns] * self._inverse_ranges
+            if self.more is not None:
+                dq = changed[:, : self.lagrangian.nv, None]
+                dy = np.concatenate([dy, np.matmul(self._jacobian, dq)[:, :, 0]], axis=1)
+        if self.rows is None or self.rows.size == 0:
+            return np.asarray(dy.ravel())
+        return np.append(dy, push_rows(self.rows, self._row_columns, columns))
 
-    def apply_fraction(self, fraction: float) -> None:
+    def _pushed(self, columns: Array) -> Array:
+        """The change at the points, (P, K), compiled."""
+        out = np.empty((self._points, len(self.columns)))
+        for batch, part, (_, J) in self._batches:
+            step = np.ascontiguousarray(columns[batch.index, : self.ld.k * 2 + batch.modes])
+            native.push(
+                *self._tables(batch), step, self.columns, self._inverse_ranges, J, out[part]
+            )
+        return out
+
+    def pull(self, forces: Array, model: QuadraticModel) -> Array:
+        """Gradient of sum of weights (forces y) in the unknowns."""
+        at_points, expansion = self._of_points(forces), self.action.expansion
+        local = np.zeros_like(model.intervals.gradient)
+        for i, (batch, part, (_, J)) in enumerate(self._batches):
+            here = np.ascontiguousarray(at_points[part])
+            if self.more is None and expansion.charts is None:
+                pulled = np.empty((len(batch.h), self.ld.k * 2 + batch.modes, self.lagrangian.nv))
+                tables = self._tables(batch)
+                native.pull(*tables, here, self.columns, self._inverse_ranges, J, pulled)
+            else:
+                gradient = self._point_gradient(here, J, part)
+                if expansion.charts is not None:
+                    pulled = expansion.charts[i].nodal_gradient(gradient)
+                else:
+                    pulled = batch.contracted(gradient, self.action.coordinates)
+            own = np.zeros_like(local[:, : pulled.shape[1]])
+            batch.add(pulled, own)
+            local[:, : pulled.shape[1]] += own
+        rows = self.rows
+        if rows is not None and rows.size > 0:
+            weighted = (self.bounds.weights * forces)[self._point_count :]
+            native.pull_rows(rows.intervals, rows.joints, self._row_columns, weighted, local)
+        return model.scatter(local)
+
+    def _point_gradient(self, forces: Array, jacobian: Array, part: slice) -> Array:
+        """sum forces dy / d(q, v, ...) at the points of a batch, (P, k + 1, nv)."""
+        k, nv = self._jet_size, self.lagrangian.nv
+        slope = self._unscaled(forces, 1)
+        gradient = slope[:, :k] + np.matmul(slope[:, None, k:], jacobian)[:, 0]
+        if self.more is not None:
+            further = forces[:, None, len(self.columns) :]
+            gradient[:, :nv] += np.matmul(further, self._jacobian[part])[:, 0]
+        return np.asarray(gradient.reshape(len(gradient), -1, nv))
+
+    def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the torques that the step predicts as weights of the next model's curvature."""
-        pairs = zip(self.action.expansion.outputs, self._linear, strict=True)
-        self._predicted = [
-            self.action.output_slope(tau + fraction * dtau, i)
-            for i, ((tau, _), dtau) in enumerate(pairs)
-        ]
+        self._predicted = self.action.predicted_slopes(model.gather(step))
+
+    def refine(self, x: DiscretePath, level: float) -> Refinement | None:
+        """Bound more control points of the motion: see LimitRows."""
+        if self.rows is None:
+            return None
+        found = self.rows.refine(x, level)
+        if found is None:
+            return None
+        self._with_rows()
+        first = self._point_count
+        kept = np.append(np.arange(first), first + found.kept)
+        return Refinement(kept, np.where(found.origin < 0, -1, first + found.origin))
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step."""
         return self.action.retract(x, step, model)
 
+    def _of_points(self, values: Array) -> Array:
+        """The values of the outputs at the points, (P, K)."""
+        return values[: self._point_count].reshape(self._points, -1)
+
+    @property
+    def _points(self) -> int:
+        """P, the number of points."""
+        return len(self._at_points[0])
+
+    @property
+    def _point_count(self) -> int:
+        """P K, the number of outputs at the points."""
+        return int(self._at_points[0].size)
+
+    @property
+    def _batches(self) -> Iterator[tuple[Batch, slice, tuple[Array, Array]]]:
+        """The batches, where their points are, and their outputs in the last expansion."""
+        return zip(self.ld.batches, self._parts, self.action.expansion.outputs, strict=True)
+
+    def _tables(self, batch: Batch) -> tuple[Array, Array, Array]:
+        """Table, weights and steps of a batch, as compiled functions take them."""
+        table = np.ascontiguousarray(batch.tables[self.action.coordinates])
+        return table, batch.contraction_weights, np.ascontiguousarray(batch.h)
+
     def _configurations(self, x: DiscretePath) -> Array:
-        """q at all quadrature points, (P, nq)."""
-        return np.concatenate([jet[0] for jet in self.action.jets(x)])
+        """q at all quadrature points, (P, nq), as the further outputs take it."""
+        q = np.concatenate([jet[0] for jet in self.action.jets(x)])
+        return q if self.more is None else self.more.at(q, np.concatenate(self.ld.point_times))
 
     def _slope(self, x: DiscretePath, batch: int) -> Array:
         """R y as predicted, or at x before the first step."""
@@ -181,8 +299,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return self.action.output_slope(outputs, batch)
 
     @cached_property
-    def _ranges(self) -> Array:
-        return np.asarray(self.limits.ranges.ravel()[self._bounded])
+    def _inverse_ranges(self) -> Array:
+        return np.asarray(1.0 / self.limits.ranges.ravel()[self._bounded])
 
     @cached_property
     def _parts(self) -> list[slice]:
@@ -197,15 +315,16 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         return np.where(np.isfinite(lower), lower, upper)[self._bounded]
 
     def _scaled(self, rows: Array) -> Array:
-        return (rows[:, self.columns] - self._origin) / self._ranges
+        return (rows[:, self.columns] - self._origin) * self._inverse_ranges
 
     def _unscaled(self, y: Array, power: int) -> Array:
         """Derivatives in scaled outputs as derivatives in (q, ..., q^(k), outputs), (P, size)."""
         full = np.zeros((len(y), self._size))
-        full[:, self.columns] = y[:, : len(self.columns)] / self._ranges**power
+        full[:, self.columns] = y[:, : len(self.columns)] * self._inverse_ranges**power
         return full
 
-    def _bounds(self, margins: Array | None) -> Bounds:
+    def _point_bounds(self, margins: Array | None) -> tuple[Array, Array, Array]:
+        """Lower and upper bounds and weights of the outputs at the points, (P, K) each."""
         size = 0 if self.more is None else self.more.size
         intervals = np.concatenate(self.ld.point_intervals)
         weights = np.concatenate(self.ld.point_weights)[:, None]
@@ -215,14 +334,16 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         if len(lower) > 1:  # they differ between segments
             lower, upper = lower[intervals], upper[intervals]
         shape = (len(intervals), lower.shape[1])
+        lower, upper, weights = (np.broadcast_to(x, shape) for x in (lower, upper, weights))
         if margins is None:
-            return Bounds(np.broadcast_to(lower, shape), np.broadcast_to(upper, shape), weights)
+            return lower, upper, weights
         tightening = margins.reshape(2, len(margins[0]), -1)
         first = self.limits.lower.size
         chosen = np.append(self._bounded, np.arange(first, first + size))
         tightening = tightening[:, :, chosen][:, intervals]
-        return Bounds(lower + tightening[0], upper - tightening[1], weights)
+        return lower + tightening[0], upper - tightening[1], weights
 
     def _rows_of(self, bound: Array) -> Array:
         """Bounds (N or 1, kinds, nv) in scaled outputs, shape (N or 1, K)."""
-        return (bound.reshape(len(bound), -1)[:, self._bounded] - self._origin) / self._ranges
+        chosen = bound.reshape(len(bound), -1)[:, self._bounded]
+        return (chosen - self._origin) * self._inverse_ranges

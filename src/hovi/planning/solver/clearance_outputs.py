@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -16,8 +17,6 @@ EXTRA_CLEARANCE = 5e-4
 """Clearance at the points beyond the margin, in DISTANCE_SCALE: 0.05 mm for the motion between."""
 CUTOFF = 1.0, 3.0
 """Excess over the margin, in DISTANCE_SCALE, from which outputs level off, and are constant."""
-NEGLIGIBLE_FORCE = 1e-2
-"""Share of the largest force below which the curvature of an output is omitted."""
 
 
 class PointOutputs(ABC):
@@ -27,6 +26,10 @@ class PointOutputs(ABC):
     @abstractmethod
     def size(self) -> int:
         """K, the number of outputs at a point."""
+
+    def at(self, q: Array, t: Array) -> Array:
+        """What the outputs take for configurations (P, nq) at times (P,): themselves by default."""
+        return q
 
     @abstractmethod
     def values(self, q: Array) -> Array:
@@ -53,30 +56,46 @@ class ClearanceOutputs(PointOutputs):
     def __init__(self, distances: Distances, least: float) -> None:
         self.distances = distances
         self.least = least
+        self._last: tuple[Array, Array] | None = None
+
+    def restricted(self, pairs: Sequence[int]) -> ClearanceOutputs:
+        """The outputs of some of the pairs, by their numbers."""
+        return ClearanceOutputs(self.distances.restricted(pairs), self.least)
+
+    def at(self, q: Array, t: Array) -> Array:
+        """With times where obstacles move."""
+        return self.distances.at(q, t)
 
     @property
     def size(self) -> int:
         """Number of pairs."""
         return len(self.distances.pairs)
 
+    @property
+    def reach(self) -> float:
+        """Distance beyond which an output is constant, in [m]."""
+        return self.least + CUTOFF[1] * DISTANCE_SCALE
+
     def values(self, q: Array) -> Array:
         """y, shape (P, K)."""
-        return _saturated(self._excess(self.distances.values(q)))[0]
+        return _saturated(self._excess(q))[0]
 
     def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
-        """Derivatives, and the curvature of near pairs with a force: see PointOutputs."""
-        d, jacobian = self.distances.expand(q, self.least + CUTOFF[1] * DISTANCE_SCALE)
-        y, slope, bend = _saturated(self._excess(d))
+        """Derivatives and curvature: see PointOutputs."""
+        _, slope, bend = _saturated(self._excess(q))
+        weights = force * slope / DISTANCE_SCALE
+        _, jacobian, curvature = self.distances.expansion(q, weights, self.reach)
         jacobian /= DISTANCE_SCALE
-        active = np.abs(force) > NEGLIGIBLE_FORCE * np.max(np.abs(force), initial=0.0)
-        weights = np.where(active & (y < CUTOFF[1]), force * slope / DISTANCE_SCALE, 0.0)
-        curvature = self.distances.curvature(q, weights)
         bending = (force * bend)[:, :, None] * jacobian
         curvature += np.matmul(jacobian.transpose(0, 2, 1), bending)
         return slope[:, :, None] * jacobian, curvature
 
-    def _excess(self, d: Array) -> Array:
-        return (d - self.least) / DISTANCE_SCALE
+    def _excess(self, q: Array) -> Array:
+        """Distances beyond the least one, in DISTANCE_SCALE; those of the last points are kept."""
+        if self._last is None or not np.array_equal(self._last[0], q):
+            distances = self.distances.values(q, self.reach)
+            self._last = q.copy(), (distances - self.least) / DISTANCE_SCALE
+        return self._last[1]
 
 
 def _saturated(y: Array) -> tuple[Array, Array, Array]:

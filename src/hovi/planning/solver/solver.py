@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import check_path, stretched
+from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.state import Periodic, State, as_state
@@ -23,20 +26,29 @@ from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import Accuracy
+from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for
+from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
-from hovi.planning.solver.nodal_momenta import accumulated_momenta
-from hovi.planning.solver.status import Status, unfinished
+from hovi.planning.solver.receding.ends import as_goal, first_state, inside_limits, is_near
+from hovi.planning.solver.receding.last_motion import last_motion, meets
+from hovi.planning.solver.receding.shift import Shift
+from hovi.planning.solver.status import Status, infeasible_sentence, unfinished
 from hovi.planning.solver.warm_start import follow
-from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
-from hovi.system.deadline import Deadline, OutOfTimeError
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import interruptible, record_interrupt
 
 MAX_CORRECTIONS = 6
 """Maximum number of quasi-Newton steps on the initial guess of `replan`."""
+LAST_BARRIER = 1e-8
+"""Last barrier parameter where nothing else is asked for, relative to the cost's mean density."""
+SOLVE_SHARE = 0.6
+"""Share of a time limit of `replan` and `advance` that is for the solve; the rest is for checks."""
 STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
@@ -58,7 +70,10 @@ class Solution:
     history: one record per step.
     setup_seconds, solve_seconds: wall time before and during the solve.
     problem: the trajectory problem; `replan` starts from it.
-    forces: multipliers of limits and of passive joints' torques at the quadrature points.
+    forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
+        limits at the instants between them at which these act.
+    instants: these instants; None for none.
+    central: the path of a barrier method towards this motion, from which `replan` starts.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
     """
 
@@ -77,7 +92,9 @@ class Solution:
     setup_seconds: float = 0.0
     solve_seconds: float = 0.0
     forces: list[PointTerms] | None = field(default=None, repr=False)
-    check: Callable[[Solution], Solution] | None = field(default=None, repr=False)
+    instants: Instants | None = field(default=None, repr=False)
+    central: CentralPath | None = field(default=None, repr=False)
+    check: Check | None = field(default=None, repr=False)
 
     @cached_property
     def effort(self) -> float | None:
@@ -96,7 +113,8 @@ class Solution:
         """
         if self.problem is None:
             raise InputError("this solution has no problem; call plan again instead.")
-        return self.problem.ld.duration_derivative(self.trajectory.path, self.forces)
+        ld = at_instants(self.problem, self.instants).ld
+        return ld.duration_derivative(self.trajectory.path, self.forces)
 
     @check_arguments
     def replan(
@@ -104,6 +122,7 @@ class Solution:
         start: State | npt.ArrayLike | str | None = None,
         goal: State | FrameGoal | Periodic | npt.ArrayLike | str | None = None,
         guess: Solution | None = None,
+        time_limit: float | None = None,
         **options: Any,
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
@@ -113,35 +132,152 @@ class Solution:
         evaluations, which do not: see hovi.planning.solver.warm_start.
         start, goal: a State, a configuration at rest or the name of a pose; the goal may be a
             FrameGoal or Periodic; unchanged if None.
-        guess: an earlier solution on the same grid; this one if None.
+        guess: an earlier solution on the same grid; this one if None. The duration is kept.
+        time_limit: for the whole call, in [s]. When it is reached the status is TIME_LIMIT, and
+            the motion the best one that meets the ends, the limits and the equations to 1e-6; if
+            there is none, this motion as it is, and the message says what it misses.
         options: as for `solve`.
         Raises InputError if this solution has no problem.
         """
-        if self.problem is None:
-            raise InputError("this solution has no problem; call plan again instead.")
-        old = self.problem
+        deadline = Deadline(time_limit)
+        old = self._solved_problem
         problem = old.between(
             old.start if start is None else as_state(start, old.coordinates),
-            old.goal if goal is None else _as_goal(goal, old.coordinates),
+            old.goal if goal is None else as_goal(goal, old.coordinates),
         )
+        origin = self if guess is None else guess
+        central = self.central if guess is None else None
+        again = _Again(problem, origin.trajectory.path, central, self.check)
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
-        origin = self if guess is None else guess
-        path = origin.trajectory.path
-        if isinstance(goal, FrameGoal):  # its equations also hold at half a turn: start at its root
+        return again.within(deadline, "this is the last motion", **options)
+
+    @check_arguments
+    def advance(
+        self,
+        elapsed: float,
+        start: State | npt.ArrayLike | None = None,
+        goal: State | FrameGoal | npt.ArrayLike | str | None = None,
+        *,
+        duration: float | None = None,
+        time_limit: float | None = None,
+        **options: Any,
+    ) -> Solution:
+        """The motion from a time on, from the state that was measured then: a receding horizon.
+
+        Intervals that have passed are dropped, and the one that has begun is shortened, or becomes
+        one with the next if less than a twentieth of it is left: the rest of the motion keeps its
+        nodes, and is as accurate as it was. Limits between the points, the barrier and multipliers
+        follow, so that a small disturbance takes a few steps.
+        elapsed: time since the start of this motion, in [s].
+        start: the State at that time, which must be within the limits; the motion's own one if
+            None. The acceleration of a smooth motion is the motion's own one if none is given.
+        goal: as for `replan`.
+        duration: of the new motion, in [s]; what is left of this one if None. With another one, as
+            for a horizon that moves, the rest is stretched and sampled again on as many intervals.
+        time_limit: as for `replan`; what comes back is this motion from that time on.
+        options: as for `solve`.
+        Via points that have passed are left out.
+        Raises InputError if this solution has no problem, if it ends before the time, or if it is
+        periodic, in segments, among moving obstacles, or of a scene that depends on time.
+        """
+        deadline = Deadline(time_limit)
+        old = self._solved_problem
+        shift = Shift.of(old, elapsed, duration)
+        path = shift.path(self.trajectory.path)
+        state = first_state(path)
+        if start is not None:
+            given = as_state(start, old.coordinates)
+            state = given if given.a is not None else dataclasses.replace(given, a=state.a)
+        to = old.goal if goal is None else as_goal(goal, old.coordinates)
+        assert not isinstance(to, Periodic)
+        problem = shift.between(inside_limits(state, old), to)
+        central = None if self.central is None else shift.central(self.central)
+        check = self.check
+        if isinstance(check, MotionCheck):
+            check = check.shifted(shift, problem)
+        if self.status is Status.STATIONARY:
+            options = {"method": Stationary()} | options
+        last = f"this is the last motion from {elapsed:g} s on"
+        return _Again(problem, path, central, check).within(deadline, last, **options)
+
+    @property
+    def _solved_problem(self) -> TrajectoryProblem:
+        """The problem. Raises InputError if there is none."""
+        if self.problem is None:
+            raise InputError("this solution has no problem; call plan again instead.")
+        return self.problem
+
+
+Check = Callable[[Solution], Solution]
+"""Returns a motion with its error estimate, or as UNRESOLVED."""
+
+
+class MotionCheck(ABC):
+    """A check that knows an earlier motion."""
+
+    @abstractmethod
+    def __call__(self, solution: Solution) -> Solution:
+        """The motion with its error estimate, or as UNRESOLVED."""
+
+    @abstractmethod
+    def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
+        """The check of motions near the rest of the earlier one; problem: of what is left."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Again:
+    """A solve that starts from the motion of a similar problem.
+
+    problem: to solve. path: the other motion, on its grid. central, check: see Solution.
+    """
+
+    problem: TrajectoryProblem
+    path: DiscretePath
+    central: CentralPath | None
+    check: Check | None
+
+    def within(self, deadline: Deadline, last: str, **options: Any) -> Solution:
+        """The solution, or what there is at the deadline. last: names the other motion."""
+        with deadline.in_force():
+            try:
+                raise_if_late()
+                found = self._solved(deadline.part(SOLVE_SHARE).seconds_left, options)
+                if found.status is not Status.TIME_LIMIT:
+                    return found if self.check is None else self.check(found)
+                if np.isfinite(found.cost) and self._meets(found):
+                    return self._kept(found)
+            except OutOfTimeError:
+                found = None
+        steps = 0 if found is None else found.nit
+        result = last_motion(self.problem, self.path, self.central, steps, last)
+        return dataclasses.replace(solution_of(result, 0.0, 0.0), check=self.check)
+
+    def _meets(self, found: Solution) -> bool:
+        return meets(found.problem or self.problem, found.trajectory.path)
+
+    def _solved(self, time_limit: float | None, options: dict[str, Any]) -> Solution:
+        problem, path, goal = self.problem, self.path, self.problem.goal
+        if isinstance(goal, FrameGoal) and not is_near(goal, problem, path):
             path = problem.moved_to_guesses(path)
+        if problem.limited and self.central is not None:
+            options = {"method": InteriorPoint(self.central)} | options
+        options = {"time_limit": time_limit} | options
         if problem.limited or not problem.plain:
-            found = solve_on_grid(problem, path, near=True, **options)
-        else:
-            found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
-            found = dataclasses.replace(found, nit=found.nit + 1)
-        return found if self.check is None else self.check(found)
+            return solve_on_grid(problem, path, near=True, **options)
+        found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
+        return dataclasses.replace(found, nit=found.nit + 1)
 
-
-def _as_goal(
-    goal: State | FrameGoal | Periodic | npt.ArrayLike | str, coordinates: Coordinates
-) -> State | FrameGoal | Periodic:
-    return goal if isinstance(goal, FrameGoal | Periodic) else as_state(goal, coordinates)
+    def _kept(self, found: Solution) -> Solution:
+        """The best motion at the deadline, with what the next one starts from."""
+        message = (
+            f"the time limit was reached after {found.nit} steps; the motion meets the ends and "
+            f"the limits to 1e-6, and has the cost {found.cost:.10g}."
+        )
+        central = self.central
+        if central is not None and found.trajectory.grid is self.problem.grid:
+            central = central.ending_at(found.trajectory.path)
+        return dataclasses.replace(found, message=message, central=central, check=self.check)
 
 
 @check_arguments
@@ -157,11 +293,14 @@ def solve_on_grid(
     report: Report | None = None,
     method: Method | None = None,
     near: bool | None = None,
+    barrier: float = LAST_BARRIER,
 ) -> Solution:
     """A motion that makes the discrete action stationary, without a check between the points.
 
     near: whether the guess is the motion of a similar problem, near which a minimum within limits
         is looked for; that is so for a Trajectory when None.
+    barrier: last barrier parameter within limits, relative to the mean density of the cost, which
+        exceeds its minimum by some ten times as much.
     Other arguments, cost and errors as of `hovi.solve`, which checks the motion.
     """
     began = time.perf_counter()
@@ -177,6 +316,7 @@ def solve_on_grid(
         time_limit=time_limit,
         escape_saddles=escape_saddles,
         near=isinstance(guess, Trajectory) if near is None else near,
+        barrier=barrier,
     )
     started = time.perf_counter()
     try:
@@ -187,37 +327,16 @@ def solve_on_grid(
         result = _the_guess(problem, path, Stop.INTERRUPTED)
     except OutOfTimeError:
         result = _the_guess(problem, path, Stop.TIME_LIMIT)
-    return _solution(result, started - began, time.perf_counter() - started)
+    return solution_of(result, started - began, time.perf_counter() - started)
 
 
-def _trajectory(result: MethodResult) -> Trajectory:
-    """The motion with its momenta and metadata."""
-    problem = result.problem
-    metadata: dict[str, Any] = {
-        "cost": result.cost,
-        "status": str(result.status),
-        "n_neg": result.n_neg,
-    }
-    if problem.limits is not None and problem.limited:
-        parts = problem.limits.parts
-        if parts:  # under another name: who draws limits draws one for the whole motion
-            metadata["segment_limits"] = [each.to_dict() for each in parts]
-        else:
-            metadata["limits"] = problem.limits.to_dict()
-    if problem.clearance is not None and problem.distances is not None:
-        metadata["clearance"] = problem.clearance.to_dict()
-    derivatives = problem.ld.derivatives(result.path, result.forces, result.jets)
-    momenta = accumulated_momenta(derivatives)
-    return problem.motion(result.path, momenta, metadata)
-
-
-def _solution(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
+def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float) -> Solution:
     """The result as a Solution."""
     return Solution(
         success=result.status in (Status.MINIMUM, Status.STATIONARY),
         status=result.status,
         message=result.message,
-        trajectory=_trajectory(result),
+        trajectory=motion_of(result),
         cost=result.cost,
         nit=result.nit,
         n_neg=result.n_neg,
@@ -227,6 +346,8 @@ def _solution(result: MethodResult, setup_seconds: float, solve_seconds: float) 
         setup_seconds=setup_seconds,
         solve_seconds=solve_seconds,
         forces=result.forces,
+        instants=result.instants,
+        central=result.central,
     )
 
 
@@ -240,7 +361,16 @@ def minimum_at(
     value = problem.ld.action(path)
     message = f"a minimum of cost {value:.10g} after {steps} steps."
     result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
-    return _solution(result, 0.0, seconds)
+    return solution_of(result, 0.0, seconds)
+
+
+def infeasible_at_once(
+    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
+) -> Solution:
+    """The guess of a problem that is known to have no motion. reason: as a clause."""
+    path, message = guess_path(problem, guess), infeasible_sentence(reason)
+    value = problem.ld.action(path)
+    return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)
 
 
 def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> MethodResult:

@@ -61,6 +61,11 @@ def unfinished(stop: Stop) -> tuple[Status, str]:
     return _UNFINISHED[stop]
 
 
+def infeasible_sentence(reason: str) -> str:
+    """The message about limits that no motion meets; reason: a clause."""
+    return f"no motion within the limits was found: {reason}."
+
+
 def diverged(reason: str, steps: int) -> str:
     """The message about a motion with a number that is not finite; reason: a clause."""
     return f"{reason}, after {steps} steps; try another initial guess."

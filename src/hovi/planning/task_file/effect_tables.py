@@ -23,7 +23,7 @@ from pydantic import (
 
 from hovi.effects import REGISTRY, Effect
 from hovi.errors import SceneError, nearest
-from hovi.planning.task_file.messages import TomlText, first_sentence
+from hovi.planning.task_file.messages import Keys, TomlText, first_sentence
 from hovi.planning.task_file.schema import Table
 from hovi.robot.robot import Robot
 
@@ -38,10 +38,14 @@ _NUMBERS = {
 
 
 def read_effects(
-    tables: Mapping[str, Mapping[str, Any]], robot: Robot, toml: TomlText
+    tables: Mapping[str, Mapping[str, Any]], robot: Robot, toml: TomlText, above: Keys = ()
 ) -> list[Effect]:
-    """The effects of a file, in its order, checked against the robot."""
-    return [_read_effect(name, table, robot, toml) for name, table in tables.items()]
+    """The effects of a file, in its order, checked against the robot.
+
+    above: the keys of the table in which they are.
+    """
+    keys = (*above, "effects")
+    return [_read_effect((*keys, name), table, robot, toml) for name, table in tables.items()]
 
 
 def effect_table(effect: Effect) -> dict[str, Any]:
@@ -50,8 +54,8 @@ def effect_table(effect: Effect) -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def _read_effect(name: str, table: Mapping[str, Any], robot: Robot, toml: TomlText) -> Effect:
-    keys = ("effects", name)
+def _read_effect(keys: Keys, table: Mapping[str, Any], robot: Robot, toml: TomlText) -> Effect:
+    name = str(keys[-1])
     if name not in REGISTRY:
         raise toml.error(keys, f"there is no effect {name!r}; {nearest(name, REGISTRY)}")
     schema = effect_schema(REGISTRY[name])

@@ -11,56 +11,57 @@ from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
+from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of, require_no_rates
 from hovi.planning.problem.units import seconds
-from hovi.planning.task_file.joint_tables import read_configuration, read_rates
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
-from hovi.planning.task_file.schema import EndTable, GoalTable, ViaTable
+from hovi.planning.task_file.schema import EndTable, ViaTable
 from hovi.robot.robot import Robot
+from hovi.robot.space.joint_table import JointError
 
-_OF_FRAMES = ("position", "rpy", "axis")
 _FREE = ("free", "free_velocity", "free_acceleration")
 
 
-def read_goal(goal: GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
-    """A state, or a task-space goal."""
-    if goal.frame is None:
-        for key in _OF_FRAMES:
-            if getattr(goal, key) is not None:
-                raise toml.error((*keys, key), f"`{key}` needs a `frame`")
-        return read_state(goal, keys, robot, toml)
-    for key in ("q", "v", "a", "free", "free_acceleration", "turns"):
-        if getattr(goal, key):
-            raise toml.error((*keys, key), f"a goal of a `frame` takes no `{key}`: leave it out")
-    rotation = None if goal.rpy is None else pin.rpy.rpyToMatrix(np.array(goal.rpy))
-    axis = None if goal.axis is None else (goal.axis.frame, goal.axis.world)
-    free = tuple(goal.free_velocity)
-    try:
-        chosen = FrameGoal(
-            goal.frame, position=goal.position, rotation=rotation, axis=axis, free_velocity=free
-        )
-        chosen.check(robot)
-    except HoviError as wrong:
-        raise toml.error((*keys, "frame"), str(wrong)) from None
-    return chosen
-
-
-def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlText) -> State:
-    """The state of [start], [goal] or [[via]]."""
+def read_end(end: EndTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
+    """The start, a goal or that of a via point: a state, or the target of a frame."""
     name = spelled(keys)
-    if end.q is None:
-        raise toml.error(keys, f"`{name}` needs q, or a frame and its target")
-    q = read_configuration(end.q, keys, robot, toml)
-    v, a = (
-        read_rates(x, (*keys, key), robot, toml) if isinstance(x, dict) else x
-        for key, x in (("v", end.v), ("a", end.a))
-    )
-    free = {key: tuple(getattr(end, key, ())) for key in _FREE}
-    turns: dict[str, Any] = dict(getattr(end, "turns", {}))
-    state = State(q, v, a=a, turns=turns, **free)
+    try:
+        chosen = end_of(_given(end), name)
+        if isinstance(chosen, FrameGoal):
+            chosen.check(robot)
+            return chosen
+        state = chosen.resolved(robot, name)
+    except EndError as wrong:
+        raise toml.error((*keys, *_key(wrong.key)), str(wrong)) from None
+    except JointError as wrong:
+        key = next(key for key in ("q", "v", "a") if f"{name}.{key}" in str(wrong))
+        raise toml.error((*keys, key, *_key(wrong.joint)), str(wrong)) from None
+    except HoviError as wrong:
+        raise toml.error((*keys, "q" if end.frame is None else "frame"), str(wrong)) from None
+    _check_state(state, keys, robot, toml)
+    return state
+
+
+def _given(end: EndTable) -> dict[str, Any]:
+    """What a table has, in the notation of `end_of`."""
+    table = {key: getattr(end, key) for key in END_KEYS if key in end.model_fields_set}
+    if end.axis is not None:
+        table["axis"] = (end.axis.frame, end.axis.world)
+    return table
+
+
+def _key(name: str | None) -> Keys:
+    return () if name is None else (name,)
+
+
+def _check_state(state: State, keys: Keys, robot: Robot, toml: TomlText) -> None:
+    """Raise SceneError, with the line, for a state that does not fit the robot."""
+    name = spelled(keys)
+    given: dict[str, Any] = {key: getattr(state, key) for key in ("q", "v", "a")}
+    rates = {key: np.zeros(robot.nv) if given[key] is None else given[key] for key in ("v", "a")}
     for key, check in (
-        ("q", lambda: robot.check_configuration(q, f"{name}.q")),
-        ("v", lambda: robot.check_velocity(np.zeros(robot.nv) if v is None else v, f"{name}.v")),
-        ("a", lambda: robot.check_velocity(np.zeros(robot.nv) if a is None else a, f"{name}.a")),
+        ("q", lambda: robot.check_configuration(given["q"], f"{name}.q")),
+        ("v", lambda: robot.check_velocity(rates["v"], f"{name}.v")),
+        ("a", lambda: robot.check_velocity(rates["a"], f"{name}.a")),
         ("free", lambda: state.free_on(robot, name, 3)),
         ("turns", lambda: state.turns_on(robot, name)),
     ):
@@ -68,7 +69,6 @@ def read_state(end: EndTable | GoalTable, keys: Keys, robot: Robot, toml: TomlTe
             check()
         except InputError as wrong:
             raise toml.error((*keys, key), str(wrong)) from None
-    return state
 
 
 def read_via(
@@ -81,10 +81,11 @@ def read_via(
         if time >= longest:
             sentence = f"the via point at {time:g} s is not inside the motion of {longest:g} s"
             raise toml.error(("via", i, "time"), sentence)
-        for key in ("a", "free_acceleration"):
-            if getattr(table, key):
-                raise toml.error(("via", i, key), f"a via point takes no `{key}`: leave it out")
-        goal = read_goal(table, ("via", i), robot, toml)
+        try:
+            require_no_rates(_given(table))
+        except EndError as wrong:
+            raise toml.error(("via", i, *_key(wrong.key)), str(wrong)) from None
+        goal = read_end(table, ("via", i), robot, toml)
         try:
             points.append(Via(time, goal))
         except InputError as wrong:
@@ -99,10 +100,10 @@ def _time(given: float | str, keys: Keys, toml: TomlText) -> float:
         raise toml.error(keys, str(wrong)) from None
 
 
-def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:
-    """The table from which `read_goal` reads this goal."""
+def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any]:
+    """The table from which `read_end` reads a start or a goal. name: of it in messages."""
     if isinstance(goal, State):
-        return state_table(goal, robot, "goal")
+        return state_table(goal, robot, name)
     table: dict[str, Any] = {"frame": goal.frame}
     if goal.position is not None:
         table["position"] = _floats(goal.position)
@@ -117,19 +118,20 @@ def goal_table(goal: State | FrameGoal, robot: Robot) -> dict[str, Any]:
 
 def via_table(via: Via, robot: Robot) -> dict[str, Any]:
     """The table [[via]] of a via point."""
-    table = goal_table(via.goal, robot)
+    table = end_table(via.goal, robot, "via")
     if isinstance(via.goal, State) and via.goal.v is not None:
-        table["v"] = _floats(via.goal.v)
+        table["v"] = _floats(via.goal.on(robot, "via")[1])
     return {"time": float(via.time), **table}
 
 
 def state_table(state: State, robot: Robot, name: str) -> dict[str, Any]:
     """The table of a state; a velocity and an acceleration of zero are left out."""
+    state = state.resolved(robot, name)
     q, v = state.on(robot, name)
     table: dict[str, Any] = {"q": _floats(q)}
     if np.any(v):
         table["v"] = _floats(v)
-    if state.a is not None and np.any(state.a):
+    if state.a is not None and np.any(np.asarray(state.a)):
         table["a"] = _floats(state.a)
     for key in _FREE:
         if getattr(state, key):

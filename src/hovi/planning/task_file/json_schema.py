@@ -12,7 +12,7 @@ from pydantic import Field, create_model
 
 from hovi.effects import REGISTRY
 from hovi.planning.task_file.effect_tables import effect_schema
-from hovi.planning.task_file.schema import LimitsName, LimitsTable, Table, TaskTable
+from hovi.planning.task_file.schema import LimitsName, LimitsTable, SegmentTable, Table, TaskTable
 
 _NO_DEFAULT = ("default", None)
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -25,11 +25,18 @@ def json_schema() -> dict[str, Any]:
         for key, effect in REGISTRY.items()
     }
     limits = LimitsName | LimitsTable
+    simulated = create_model("EffectsTable", __base__=Table, **effects) | None
+    own: dict[str, Any] = {
+        "effects": (simulated, Field(default=None, description="tables of effects")),
+        "limits": (limits | None, SegmentTable.model_fields["limits"]),
+    }
+    segment = create_model("Segment", __base__=SegmentTable, __doc__="[[segments]].", **own)
     keys: dict[str, Any] = {
         "effects": (
-            create_model("EffectsTable", __base__=Table, **effects) | None,
+            simulated,
             Field(default=None, description="tables [effects.NAME]: what is simulated"),
         ),
+        "segments": (list[segment], TaskTable.model_fields["segments"]),  # type: ignore[valid-type]
         "limits": (limits, Field(default="urdf", description="what bounds the motion")),
         "tolerance": (
             float | str | None,
@@ -37,7 +44,8 @@ def json_schema() -> dict[str, Any]:
         ),
     }
     whole = create_model("SceneFile", __base__=TaskTable, __doc__="A scene file of hovi.", **keys)
-    return {"$schema": DIALECT, **_without_null(whole.model_json_schema())}
+    motions = [{"required": ["duration", "goal"]}, {"required": ["segments"]}]
+    return {"$schema": DIALECT, **_without_null(whole.model_json_schema()), "oneOf": motions}
 
 
 def _without_null(part: Any) -> Any:

@@ -12,31 +12,33 @@ from hovi.errors import InputError, nearest
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.planning.problem.limits import KINDS, Limits, as_limits
 from hovi.planning.task_file.effect_tables import plain
-from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml
+from hovi.planning.task_file.messages import Keys, TomlText, first_sentence, in_toml, spelled
 from hovi.planning.task_file.schema import LimitsTable
 from hovi.robot.robot import Robot
 
 NAMES = ("urdf", "none", *ARMS)
 
 
-def read_limits(given: Any, robot: Robot, toml: TomlText) -> str | dict[str, Any]:
-    """The value of `limits` in a file, as `hovi.plan` accepts it."""
+def read_limits(
+    given: Any, robot: Robot, toml: TomlText, keys: Keys = ("limits",)
+) -> str | dict[str, Any]:
+    """The value of `limits` in a file, as `hovi.plan` accepts it. keys: where it is."""
     if isinstance(given, str) and given in NAMES:
-        _check(("limits",), given, robot, toml)
+        _check(keys, given, robot, toml)
         return given
     if not isinstance(given, dict):
         expected = '"urdf", "none", the name of an arm or a table [limits]'
         hint = f": {nearest(given, NAMES)}" if isinstance(given, str) else ""
-        sentence = f"`limits` must be {expected}, but it is {in_toml(given)}{hint}"
-        raise toml.error(("limits",), sentence)
+        sentence = f"`{spelled(keys)}` must be {expected}, but it is {in_toml(given)}{hint}"
+        raise toml.error(keys, sentence)
     try:
         LimitsTable.model_validate(given)
     except ValidationError as invalid:
-        raise first_sentence(invalid, LimitsTable, toml, above=("limits",)) from None
+        raise first_sentence(invalid, LimitsTable, toml, above=keys) from None
     limits = {key: _by_joint(value, robot) for key, value in given.items()}
     for kind in KINDS:
-        _check_kind(kind, limits.get(kind, {}), robot, toml)
-    _check(("limits",), limits, robot, toml)
+        _check_kind(keys, kind, limits.get(kind, {}), robot, toml)
+    _check(keys, limits, robot, toml)
     return limits
 
 
@@ -65,13 +67,13 @@ def _by_joint(value: Any, robot: Robot) -> Any:
     return value
 
 
-def _check_kind(kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
+def _check_kind(keys: Keys, kind: str, given: Any, robot: Robot, toml: TomlText) -> None:
     """Check a kind, joint by joint if joints are named, so that errors have their line."""
     if isinstance(given, dict):
         for joint, bound in given.items():
-            _check(("limits", kind, joint), {"base": "none", kind: {joint: bound}}, robot, toml)
+            _check((*keys, kind, joint), {"base": "none", kind: {joint: bound}}, robot, toml)
     else:
-        _check(("limits", kind), {"base": "none", kind: given}, robot, toml)
+        _check((*keys, kind), {"base": "none", kind: given}, robot, toml)
 
 
 def _check(keys: Keys, limits: str | Mapping[str, Any], robot: Robot, toml: TomlText) -> None:

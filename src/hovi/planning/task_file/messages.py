@@ -51,8 +51,11 @@ class TomlText:
             line, here = padded.strip(), table
             if header := _HEADER.match(line):
                 name: Keys = _split(header[2])
-                here = table = name if header[1] == "[" else (*name, tables[name])
-                tables[name] += 1
+                if header[1] == "[":
+                    here = table = _numbered(name, tables)
+                else:
+                    here = table = (*name, tables[name])
+                    tables[name] += 1
             elif entry := _ENTRY.match(line):
                 here = table + _split(entry[1])
             else:
@@ -128,7 +131,8 @@ def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:
             continue  # into a list of tables, whose class is known
         field = model.model_fields.get(key)
         annotation = field.annotation if field else None
-        kinds = [kind for kind in (annotation, *get_args(annotation)) if isinstance(kind, type)]
+        members = (getattr(each, "__origin__", each) for each in get_args(annotation))
+        kinds = [kind for kind in (annotation, *members) if isinstance(kind, type)]
         tables = [kind for kind in kinds if issubclass(kind, BaseModel)]
         if not tables:
             return None
@@ -138,6 +142,17 @@ def _model_at(model: type[BaseModel], keys: Keys) -> type[BaseModel] | None:
 
 def _fields_of(model: type[BaseModel] | None) -> list[str]:
     return list(model.model_fields) if model else []
+
+
+def _numbered(name: Keys, tables: Counter[Keys]) -> Keys:
+    """The keys of a table, with the number of the table of an array in which it is, if any.
+
+    tables: how many tables every array has so far.
+    """
+    for i in range(1, len(name)):
+        if tables[name[:i]]:
+            return (*name[:i], tables[name[:i]] - 1, *name[i:])
+    return name
 
 
 def _split(dotted: str) -> tuple[str, ...]:

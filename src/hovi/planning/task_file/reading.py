@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import tomllib
 from pathlib import Path
@@ -12,15 +11,18 @@ from pydantic import ValidationError
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
+from hovi.planning.obstacles.grasped import Grasped
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
-from hovi.planning.search.options import TOLERANCE_AND_SCHEME, PlanOptions
+from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
-from hovi.planning.task_file.goal_tables import read_goal, read_state, read_via
+from hovi.planning.task_file.goal_tables import read_end, read_via
+from hovi.planning.task_file.grasped_tables import read_grasped
 from hovi.planning.task_file.limit_tables import read_limits
-from hovi.planning.task_file.messages import TomlText, first_sentence, in_toml
+from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.obstacle_tables import read_obstacles
-from hovi.planning.task_file.schema import PLAIN, ShapedTable, TaskTable
+from hovi.planning.task_file.schema import PLAIN, SchemeTable, ShapedTable, TaskTable
+from hovi.planning.task_file.segment_tables import check_keys, read_segments
 from hovi.planning.task_file.task import Task
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -45,32 +47,55 @@ def load_task(path: str | Path) -> Task:
     toml = _read_text(Path(path))
     table = _validated(toml)
     _check_scheme(table, toml)
-    robot, duration = _load_robot(table, toml), _duration(table.duration, toml)
+    check_keys(table, toml)
+    robot, name = _load_robot(table, toml), toml.path.stem
+    grasped, held = read_grasped(table.grasped, robot, toml)
+    scene, start = _scene(table, robot, toml), read_end(table.start, ("start",), held, toml)
+    if table.segments:
+        segments = read_segments(table.segments, held, toml)
+        whole = sum(each.duration for each in segments)
+        options = _options(table, whole, held, grasped, toml)
+        return Task.of_segments(scene, start, segments, options, name)
+    assert table.goal is not None
+    duration = _duration(table.duration, toml)
     return Task(
-        scene=_scene(table, robot, toml),
-        start=read_state(table.start, ("start",), robot, toml),
-        goal=read_goal(table.goal, ("goal",), robot, toml),
+        scene=scene,
+        start=start,
+        goal=read_end(table.goal, ("goal",), held, toml),
         duration=duration,
-        options=_options(table, duration, robot, toml),
-        name=toml.path.stem,
+        options=_options(table, duration, held, grasped, toml),
+        name=name,
     )
 
 
 def _options(
-    table: ShapedTable, duration: float | tuple[float, float], robot: Robot, toml: TomlText
+    table: ShapedTable,
+    duration: float | tuple[float, float],
+    robot: Robot,
+    grasped: tuple[Grasped, ...],
+    toml: TomlText,
 ) -> PlanOptions:
-    """The options of a file: single values unchanged, the others from their tables."""
-    options = PlanOptions(**{name: getattr(table, name) for name in PLAIN})
+    """The options of a file: single values unchanged, the others from their tables.
+
+    robot: with what it holds.
+    """
+    try:
+        options = PlanOptions(**{name: getattr(table, name) for name in PLAIN}, grasped=grasped)
+    except InputError as wrong:
+        key = next((name for name in PLAIN if str(wrong).startswith(name)), "")
+        raise toml.error((key,), str(wrong)) from None
     tolerance = _read_tolerance(table.tolerance, robot, toml)
-    if tolerance is not None and table.scheme.name is not None:
+    scheme = _scheme(table)
+    if tolerance is not None and scheme.name is not None:
         raise toml.error(("tolerance",), TOLERANCE_AND_SCHEME.removesuffix("."))
     return options.with_changes(
         via=read_via(table.via, duration, robot, toml),
-        scheme=table.scheme.name,
-        intervals=table.scheme.intervals,
+        scheme=scheme.name,
+        intervals=scheme.intervals,
         limits=read_limits(table.limits, robot, toml),
         obstacles=read_obstacles(table.obstacles, options.clearance, robot, toml),
         tolerance=tolerance,
+        group=table.group,
     )
 
 
@@ -85,14 +110,9 @@ def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:
 def _duration(given: Any, toml: TomlText) -> float | tuple[float, float]:
     """A duration in [s], or the bounds of a free one."""
     try:
-        T = as_duration(given)
+        return as_duration(given)
     except InputError as wrong:
         raise toml.error(("duration",), str(wrong)) from None
-    ends = T if isinstance(T, tuple) else (T,)
-    if not all(math.isfinite(each) and each > 0 for each in ends) or ends != tuple(sorted(ends)):
-        expected, came = TaskTable.model_fields["duration"].description, in_toml(given)
-        raise toml.error(("duration",), f"`duration` must be {expected}, but it is {came}")
-    return T
 
 
 def _read_text(path: Path) -> TomlText:
@@ -136,13 +156,26 @@ def _syntax_sentence(toml: TomlText, reason: str) -> str:
 
 
 def _check_scheme(table: ShapedTable, toml: TomlText) -> None:
-    """Check the name of the scheme, before the robot is loaded."""
-    if table.scheme.name is None:
+    """Check the scheme, before the robot is loaded."""
+    scheme = _scheme(table)
+    if table.intervals is not None and scheme.intervals != table.intervals:
+        raise toml.error(("intervals",), INTERVALS_TWICE)
+    if scheme.name is None:
         return
     try:
-        by_name(table.scheme.name)
+        by_name(scheme.name)
     except SchemeError as unknown:
         raise toml.error(("scheme", "name"), str(unknown)) from None
+
+
+def _scheme(table: ShapedTable) -> SchemeTable:
+    """The table [scheme], also where its keys are given by themselves."""
+    scheme = table.scheme if isinstance(table.scheme, SchemeTable) else None
+    if scheme is None:
+        return SchemeTable(name=str(table.scheme), intervals=table.intervals)
+    if scheme.intervals is None:
+        return SchemeTable(name=scheme.name, intervals=table.intervals)
+    return scheme
 
 
 def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
@@ -154,7 +187,7 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
             package_dirs=tuple(folder / each for each in table.package_dirs),
             free_flyer=table.free_flyer,
             mimic=table.mimic,
-            locked=tuple(table.locked),
+            locked=table.locked,
             srdf=None if table.srdf is None else folder / table.srdf,
         )
     except HoviError as refused:

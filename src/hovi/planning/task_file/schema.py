@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
 from hovi.planning.problem.arms.limit_set import LimitSetName
+from hovi.planning.problem.units import DURATION_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
@@ -80,40 +81,19 @@ _ACCELERATION = (
 )
 
 
-class EndTable(Table):
-    """[start] or [goal]."""
-
-    q: Configuration = Field(
-        description="a list of finite numbers, one per coordinate, a table of joint names, or the "
-        "name of a pose"
-    )
-    v: Coordinates | None = Field(
-        default=None,
-        description="a list of finite numbers, one per velocity, or a table of joint names",
-    )
-    a: Coordinates | None = Field(default=None, description=_ACCELERATION)
-    free_acceleration: list[str] = Field(default=[], description=_JOINTS)
-
-
-class StartTable(EndTable):
-    """[start]."""
-
-    free: list[str] = Field(default=[], description=_JOINTS)
-    free_velocity: list[str] = Field(default=[], description=_JOINTS)
-
-
 Direction = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[FiniteFloat], Field(min_length=4, max_length=4)]
 
 
 class AxisTable(Table):
-    """axis of a goal."""
+    """axis of a frame's target."""
 
     frame: Direction = Field(description="a list of three finite numbers: a direction in the frame")
     world: Direction = Field(description="a list of three finite numbers: a direction in the world")
 
 
-class GoalTable(Table):
-    """[goal], or the goal of a table [[via]]: a state or a task-space goal."""
+class EndTable(Table):
+    """[start], [goal], or the goal of a table [[via]]: a state or the target of a frame."""
 
     q: Configuration | None = Field(
         default=None,
@@ -128,16 +108,31 @@ class GoalTable(Table):
     free_acceleration: list[str] = Field(default=[], description=_JOINTS)
     free: list[str] = Field(default=[], description=_JOINTS)
     free_velocity: list[str] = Field(default=[], description=_JOINTS)
-    turns: ByJoint = Field(
-        default={}, description="a table of joint names with full turns of the first guess"
-    )
     frame: str | None = Field(default=None, description="the name of a frame of the robot")
     position: Direction | None = Field(default=None, description="a list of three finite numbers")
     rpy: Direction | None = Field(
         default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
     )
+    quaternion_xyzw: Quaternion | None = Field(
+        default=None, description="a list of four finite numbers: x, y, z, w of a unit quaternion"
+    )
+    quaternion_wxyz: Quaternion | None = Field(
+        default=None, description="a list of four finite numbers: w, x, y, z of a unit quaternion"
+    )
     axis: AxisTable | None = Field(
         default=None, description="a table with two directions, `frame` and `world`"
+    )
+
+
+class StartTable(EndTable):
+    """[start]."""
+
+
+class GoalTable(EndTable):
+    """[goal], or the goal of a table [[via]]."""
+
+    turns: ByJoint = Field(
+        default={}, description="a table of joint names with full turns of the first guess"
     )
 
 
@@ -147,6 +142,23 @@ class ViaTable(GoalTable):
     time: PositiveSeconds = Field(
         description='a positive number of seconds, or a text such as "500 ms"'
     )
+
+
+class SegmentTable(Table):
+    """[[segments]]: the segments of a sequence."""
+
+    name: str = Field(default="", description="a text")
+    duration: PositiveSeconds = Field(
+        description='a positive number of seconds, or a text such as "500 ms"'
+    )
+    goal: GoalTable | None = Field(
+        default=None,
+        description="a table with q and, if moving, v, or with a frame and its target",
+    )
+    limits: Any = Field(
+        default=None, description='"urdf", "none", the name of an arm or a table of limits'
+    )
+    effects: dict[str, dict[str, Any]] = Field(default={}, description="tables of effects")
 
 
 class SchemeTable(Table):
@@ -183,13 +195,36 @@ class LimitsTable(Table):
     tolerance: FiniteFloat = Field(default=1e-6, gt=0, description="a positive share of the range")
 
 
+class GraspedTable(Table):
+    """[[grasped]]."""
+
+    name: str = Field(default="grasped", description="the name of the object's link")
+    frame: str = Field(description="the name of a link of the robot")
+    mass: FiniteFloat = Field(gt=0, description="a positive number of kilograms")
+    shape: Any = Field(description="a table such as an obstacle's, or a list of them")
+    position: Direction | None = Field(default=None, description="a list of three finite numbers")
+    rpy: Direction | None = Field(
+        default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"
+    )
+    center: Direction | None = Field(default=None, description="a list of three finite numbers")
+    inertia: list[FiniteFloat] | None = Field(
+        default=None, description="a list of six finite numbers: Ixx, Iyy, Izz, Ixy, Ixz, Iyz"
+    )
+    may_touch: list[str] = Field(default=[], description="a list of obstacles and links")
+
+
 class ShapedTable(Table):
     """The keys of a file except for the options that are single values."""
 
     robot: str = Field(
         description="the path of a .urdf relative to this file, or a name of example-robot-data"
     )
-    locked: list[str] = Field(default=[], description="a list of joint names")
+    locked: Annotated[
+        Annotated[list[str], Tag("<list>")] | Annotated[dict[str, FiniteFloat], Tag("<table>")],
+        Discriminator(_kind),
+    ] = Field(
+        default=[], description="a list of joint names, or a table of joint names with positions"
+    )
     package_dirs: list[str] = Field(
         default=[], description="a list of folders relative to this file"
     )
@@ -197,21 +232,40 @@ class ShapedTable(Table):
     free_flyer: bool = Field(default=False, description="true or false")
     mimic: bool = Field(default=False, description="true or false")
     passive: list[str] = Field(default=[], description="a list of joint names")
-    duration: Duration = Field(
-        description='a positive number of seconds, a text such as "2 s", or a list [lower, upper] '
-        "of two"
+    duration: Duration | None = Field(default=None, description=DURATION_IN_WORDS)
+    group: str | None = Field(
+        default=None, description="the name of a group of joints in the robot's SRDF"
     )
     limits: Any = Field(
         default="urdf", description='"urdf", "none", the name of an arm or a table [limits]'
     )
     obstacles: list[dict[str, Any]] = Field(default=[], description="tables [[obstacles]]")
-    start: StartTable = Field(description="a table [start] with q and, if moving, v")
-    goal: GoalTable = Field(
-        description="a table [goal] with q and, if moving, v, or with a frame and its target"
+    grasped: list[GraspedTable] = Field(
+        default=[], description="tables [[grasped]] with frame, mass and shape"
+    )
+    start: StartTable = Field(
+        description="a table [start] with q and, if moving, v, or with a frame and its target"
+    )
+    goal: GoalTable | None = Field(
+        default=None,
+        description="a table [goal] with q and, if moving, v, or with a frame and its target",
+    )
+    segments: list[SegmentTable] = Field(
+        default=[], description="tables [[segments]] with a duration and a goal each"
     )
     via: list[ViaTable] = Field(default=[], description="tables [[via]] with time and a goal")
-    scheme: SchemeTable = Field(
-        default=SchemeTable(), description="a table [scheme] with name and intervals"
+    scheme: Annotated[
+        Annotated[SchemeTable, Tag("<table>")] | Annotated[str, Tag("<text>")],
+        Discriminator(_kind_or_text),
+    ] = Field(
+        default=SchemeTable(),
+        description="a table [scheme] with name and intervals, or the name of a scheme",
+    )
+    intervals: int | None = Field(
+        default=None,
+        ge=1,
+        le=MAX_INTERVALS,
+        description=f"a whole number from 1 to {MAX_INTERVALS:,}",
     )
     tolerance: Any = Field(
         default=None, description='a number, or a text such as "0.1 mm" or "0.01 deg"'
@@ -225,10 +279,17 @@ PLAIN: dict[str, SceneKey] = {
 """The options that are single values in a file."""
 
 
+_KINDS: dict[str, Any] = {
+    "time_limit": PositiveSeconds | None,
+    "guess": Literal["cubic", "minimum-jerk"],
+}
+"""Types of options that the type of their default does not tell."""
+
+
 def _plain_field(name: str) -> tuple[Any, Any]:
     """The field of an option, with the type of its default and its bounds."""
     default, known = getattr(PlanOptions, name), option_infos(PlanOptions)[name]
-    kind = FiniteFloat if isinstance(default, float) else type(default)
+    kind = FiniteFloat if isinstance(default, float) else _KINDS.get(name, type(default))
     must_be, least, most = PLAIN[name].must_be, known.least, known.most
     return kind, Field(default=default, description=must_be, ge=least, le=most)
 

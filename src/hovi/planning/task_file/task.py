@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -12,41 +12,67 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import State
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
+from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, duration_of
 from hovi.scene.scene import Scene
 
 
-@check_arguments_except("duration")
+@check_arguments_except("start", "goal", "duration")
 @dataclass(frozen=True, eq=False)
 class Task:
     """A planning task, valid once built.
 
     scene: the robot and the effects that act on it.
-    start, goal: the ends of the motion, q in [rad] or [m], v in [rad/s] or [m/s]; the goal may be
-        a FrameGoal.
+    start, goal: the ends of the motion, q in [rad] or [m], v in [rad/s] or [m/s], or a FrameGoal;
+        whatever else `hovi.plan` takes is converted.
     duration: in [s], or the bounds of a free duration; a text such as "1.5 s" is converted.
     options: of the plan; `with_options` changes some of them.
     name: of the task in reports.
+    segments: of a sequence, as for `hovi.plan_sequence`: see `of_segments`.
     Raises InputError for an invalid duration and for options that do not fit the robot.
     """
 
     scene: Scene
-    start: State
+    start: State | FrameGoal
     goal: State | FrameGoal
     duration: float | tuple[float, float]
     options: PlanOptions = field(default_factory=PlanOptions)
     name: str = "task"
+    segments: tuple[Segment, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duration", as_duration(self.duration))
-        ends = self.duration if isinstance(self.duration, tuple) else (self.duration,)
-        if not all(math.isfinite(each) and each > 0 for each in ends):
+        for name in ("start", "goal"):
+            given = as_end(getattr(self, name), self.scene.robot, name)
+            object.__setattr__(self, name, given)
+        if self.segments and self.duration != duration_of(self.segments):
             raise InputError(
-                f"the duration must be a positive number of seconds, got {self.duration}."
+                f"the duration of a sequence is that of its segments, "
+                f"{duration_of(self.segments):g} s, got {self.duration}: change theirs."
             )
         self.options.on(self.scene)
+
+    @classmethod
+    def of_segments(
+        cls,
+        scene: Scene,
+        start: State | FrameGoal,
+        segments: Sequence[Segment],
+        options: PlanOptions | None = None,
+        name: str = "task",
+    ) -> Self:
+        """The task of a sequence, which ends at the goal of its last segment.
+
+        Arguments as for `hovi.plan_sequence`, and the name of the task in reports.
+        Raises InputError for an invalid sequence.
+        """
+        chosen = PlanOptions() if options is None else options
+        parts = checked_segments(segments, chosen)
+        goal = as_goal(parts[-1].goal, scene.robot)
+        return cls(scene, start, goal, duration_of(parts), chosen, name, parts)
 
     def __getattr__(self, name: str) -> Any:
         """An option by its own name, as tasks had it before: deprecated, use task.options."""
@@ -55,6 +81,34 @@ class Task:
         message = f"task.{name} is now task.options.{name}, and task.with_options changes it."
         warnings.warn(message, DeprecationWarning, stacklevel=2)
         return getattr(self.options, name)
+
+    def require_one_motion(self, what: str) -> None:
+        """Raise InputError for a sequence. what: needs one motion, such as "an effect study"."""
+        if self.segments:
+            raise InputError(
+                f"{what} takes one motion, and task {self.name!r} has {len(self.segments)} "
+                "segments: give it a scene file without [[segments]]."
+            )
+
+    @property
+    def held_scene(self) -> Scene:
+        """The scene with what its robot holds."""
+        if not self.options.grasped:
+            return self.scene
+        from hovi.planning.obstacles.grasped import scene_holding  # 10 ms
+
+        return scene_holding(self.scene, tuple(self.options.grasped))
+
+    @property
+    def start_state(self) -> State:
+        """The start, where it has to be a state. Raises InputError for a FrameGoal."""
+        if isinstance(self.start, State):
+            return self.start
+        raise InputError(
+            f"task {self.name!r} starts where frame {self.start.frame!r} is at its target, which "
+            "only a plan chooses: give the start joint positions, such as those of "
+            "hovi.inverse_kinematics."
+        )
 
     def with_options(self, **changes: Any) -> Self:
         """The task with some of its options changed.

@@ -7,6 +7,7 @@ from typing import Any
 from hovi.checks.arguments import check_arguments
 from hovi.planning.search.job import Progress
 from hovi.planning.search.planner import plan
+from hovi.planning.sequence.sequence_planner import plan_sequence
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
@@ -15,10 +16,13 @@ from hovi.planning.task_file.task import Task
 def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> Solution:
     """Plan a task with its options.
 
-    task: the scene, the ends, the duration and the options.
+    task: the scene, the ends, the duration or the segments, and the options.
     progress: called with a line of text and the completed fraction, in [0, 1].
     changes: options that override those of the task.
     Raises as `plan` does.
     """
+    if task.segments:
+        given = task.scene, task.start, task.segments
+        return plan_sequence(*given, progress=progress, options=task.options, **changes)
     ends = task.start, task.goal, task.duration
     return plan(task.scene, *ends, progress=progress, options=task.options, **changes)

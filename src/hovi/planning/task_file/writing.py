@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
+from tomlkit.items import InlineTable
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import SceneError, SchemeError
@@ -14,9 +15,11 @@ from hovi.planning.problem.tolerance import as_number_or_text
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.task_file.effect_tables import effect_table
-from hovi.planning.task_file.goal_tables import goal_table, state_table, via_table
+from hovi.planning.task_file.goal_tables import end_table, via_table
 from hovi.planning.task_file.limit_tables import limits_value
+from hovi.planning.task_file.obstacle_tables import obstacle_table
 from hovi.planning.task_file.schema import PLAIN
+from hovi.planning.task_file.segment_tables import segments_value
 from hovi.planning.task_file.task import Task
 from hovi.robot.example_robots import example_robot
 from hovi.robot.source import RobotSource
@@ -24,7 +27,7 @@ from hovi.robot.srdf import read_srdf_file
 from hovi.schemes import by_name
 from hovi.system.files import reason, whole_file
 
-_TABLES = ("limits", "start", "goal", "via", "obstacles", "scheme")
+_TABLES = ("limits", "start", "goal", "segments", "via", "obstacles", "grasped", "scheme")
 """Keys that may hold tables, in the order in which the tables are written."""
 _EMPTY: tuple[Any, ...] = (None, [])
 
@@ -54,10 +57,11 @@ def _document(task: Task, folder: Path) -> tomlkit.TOMLDocument:
     robot = task.scene.robot
     keys = {
         **_robot_keys(task, folder),
-        "duration": _duration(task.duration),
-        **_option_keys(task),
-        "start": state_table(task.start, robot, "start"),
-        "goal": goal_table(task.goal, robot),
+        "duration": None if task.segments else _duration(task.duration),
+        **_option_keys(task, folder),
+        "start": end_table(task.start, robot, "start"),
+        "goal": None if task.segments else end_table(task.goal, robot, "goal"),
+        "segments": segments_value(task.segments, robot),
     }
     plain = {key: value for key, value in keys.items() if not _is_table(value)}
     tables = {key: keys[key] for key in _TABLES if _is_table(keys.get(key))}
@@ -78,7 +82,7 @@ def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
     source = task.scene.robot.source
     return {
         "robot": source.reference,
-        "locked": list(source.locked),
+        "locked": _locked(source),
         "package_dirs": _relative(source, folder),
         "srdf": None if _own_srdf(source) is None else _srdf_name(source),
         "free_flyer": source.free_flyer or None,
@@ -87,7 +91,16 @@ def _robot_keys(task: Task, folder: Path) -> dict[str, Any]:
     }
 
 
-def _option_keys(task: Task) -> dict[str, Any]:
+def _locked(source: RobotSource) -> Any:
+    """The names of the locked joints, or a table in one line with their positions."""
+    if not source.locked_at:
+        return list(source.locked)
+    table = tomlkit.inline_table()
+    table.update(source.held)
+    return table
+
+
+def _option_keys(task: Task, folder: Path) -> dict[str, Any]:
     """The options by key: single values by their own rule, and those with a special form."""
     options, robot = task.options, task.scene.robot
     plain = {name: _plain(name, options) for name in PLAIN}
@@ -95,9 +108,11 @@ def _option_keys(task: Task) -> dict[str, Any]:
         "limits": limits_value(options.limits, robot),
         "tolerance": as_number_or_text(options.tolerance),
         "via": [via_table(each, robot) for each in options.via],
-        "obstacles": [each.to_dict() for each in options.obstacles],
+        "obstacles": [obstacle_table(each, folder) for each in options.obstacles],
+        "grasped": [each.to_dict() for each in options.grasped],
         "scheme": _scheme_table(options),
         "intervals": None,
+        "group": options.group,
     }
     keys = plain | shaped
     for name in option_infos(PlanOptions):
@@ -113,7 +128,15 @@ def _plain(name: str, options: PlanOptions) -> Any:
     """The value to be written; None to leave the key out."""
     key, default = PLAIN[name], getattr(PlanOptions, name)
     named = not _is_default(name, options) if key.written is None else key.written(options)
-    return type(default)(getattr(options, name)) if named else None
+    if not named:
+        return None
+    value = getattr(options, name)
+    if name == "guess" and not isinstance(value, str):
+        raise SceneError(
+            "scene files have no key for a motion as option 'guess': pass it to hovi.plan_task, "
+            "and save the task without it."
+        )
+    return value if default is None else type(default)(value)
 
 
 def _is_default(name: str, options: PlanOptions) -> bool:
@@ -150,6 +173,8 @@ def _duration(duration: float | tuple[float, float]) -> float | list[float]:
 
 def _is_table(value: Any) -> bool:
     """Whether TOML stores a value as a table or an array of tables."""
+    if isinstance(value, InlineTable):
+        return False
     return isinstance(value[0] if isinstance(value, list) and value else value, dict)
 
 

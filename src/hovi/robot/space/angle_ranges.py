@@ -67,3 +67,18 @@ def angles_in_degrees(
         f"{names[i]} is {largest:g} rad in a given configuration{more}, which looks like degrees: "
         f"{largest:g} degrees are {np.radians(largest):.4g} rad"
     )
+
+
+def rpy_in_degrees(rpy: Array) -> str:
+    """Roll, pitch and yaw that look like degrees, as a clause; "" if they do not.
+
+    Each is a multiple of DEGREE_STEP, and one is more than a turn.
+    """
+    largest = float(np.abs(rpy).max())
+    if not 2 * np.pi < largest <= MAX_SUSPICIOUS:
+        return ""
+    whole = np.abs(np.remainder(rpy / DEGREE_STEP + 0.5, 1.0) - 0.5) < 1e-9
+    if not whole.all():
+        return ""
+    shown, radians = (", ".join(f"{x:.4g}" for x in each) for each in (rpy, np.radians(rpy)))
+    return f"rpy = ({shown}) rad looks like degrees: these degrees are ({radians}) rad"

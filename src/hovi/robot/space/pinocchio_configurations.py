@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.checks.shapes import numbers_of
+from hovi.checks.shapes import numbers_of, require_rows
 from hovi.errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -48,6 +48,20 @@ def frame_positions(model: pin.Model, frames: Sequence[int], q: Array) -> Array:
         for place, frame in zip(places, frames, strict=True):
             place[:] = pin.updateFramePlacement(model, data, frame).translation
     return positions
+
+
+def frame_poses(model: pin.Model, frame: int, q: Array) -> Array:
+    """Homogeneous matrices of a frame in the world: q (..., nq) -> (..., 4, 4).
+
+    Raises InputError for another shape.
+    """
+    require_rows((("q", q, model.nq),))
+    data, rows = model.createData(), q.reshape(int(np.prod(q.shape[:-1])), model.nq)
+    poses = np.empty((len(rows), 4, 4))
+    for pose, one in zip(poses, rows, strict=True):
+        pin.forwardKinematics(model, data, one)
+        pose[:] = pin.updateFramePlacement(model, data, frame).homogeneous
+    return poses.reshape(*q.shape[:-1], 4, 4)
 
 
 def check_vector(value: npt.ArrayLike, name: str, entries: Sequence[str], hint: str = "") -> Array:

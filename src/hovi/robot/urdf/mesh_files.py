@@ -61,7 +61,8 @@ def is_inside(path: Path, folder: Path) -> bool:
 def _check_named(mesh: Path, name: str, root: Path, must_exist: bool) -> None:
     try:
         file = mesh.parent / name
-        if not is_inside(file, root):
+        instead = [] if file.exists() else [each for each in _instead(mesh, name) if each.exists()]
+        if not all(is_inside(each, root) for each in (file, *instead)):
             raise ModelError(
                 f"mesh {mesh.name!r} names {name!r}, which lies outside {str(root)!r}: "
                 "what a mesh names must stay inside its package; copy that file there."
@@ -74,6 +75,19 @@ def _check_named(mesh: Path, name: str, root: Path, must_exist: bool) -> None:
             f"mesh {mesh.name!r} names {name!r}, which cannot be read ({why}): "
             "put that file there, or remove its name from the mesh."
         ) from error
+
+
+def _instead(mesh: Path, name: str) -> Iterator[Path]:
+    """The files that Assimp tries where one that a mesh names is missing.
+
+    They are in the folder of the mesh: the ends of the path from every slash on, and these cut to
+    the length of the file's own name.
+    """
+    path = f"{mesh.parent}/{name}"
+    size = len(path) - path.rfind("/")
+    for slash in re.finditer("/", path):
+        end = path[slash.end() :]
+        yield from (mesh.parent / end, mesh.parent / end[:size])
 
 
 def _check_text(mesh: str, content: bytes) -> None:

@@ -10,6 +10,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
 from hovi.planning.solver.methods.choice import METHODS, method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.methods.trust_region import TrustRegion
 from hovi.planning.solver.solver import solve_on_grid
@@ -19,7 +20,7 @@ from hovi.robot.bundled_models import example
 
 EXPECTED = {
     "two_link_reach": TrustRegion,
-    "cart_pole_swing_up": AugmentedLagrangian,
+    "cart_pole_swing_up": LagrangeNewton,
     "ur5_reach": InteriorPoint,
 }
 

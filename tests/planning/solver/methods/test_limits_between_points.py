@@ -27,7 +27,7 @@ def test_limits_that_hold_at_the_points_only_are_not_met(
     """Without a round that tightens bounds, the solve ends with the motion and says so."""
     monkeypatch.setattr(limits_between_points, "MAX_ROUNDS", rounds)
     ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(1)))
-    limits = as_limits(arm_scene.robot, {"base": "none", "a": 30.0})
+    limits = as_limits(arm_scene.robot, {"base": "none", "tau": 9.0})
     problem = TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits)
     found = solve_on_grid(problem)
     excess = excess_along(found.trajectory, limits).worst

@@ -53,7 +53,7 @@ class AugmentedLagrangian(Method):
         objective = ActionObjective(problem, multipliers=rounds.multipliers)
         n_neg = negative_eigenvalues(objective, outcome)
         outcome.value, outcome.iterations = problem.ld.action(outcome.x), len(history)
-        status, message = _status(problem, rounds, n_neg)
+        status, message = constrained_status(problem, rounds, n_neg)
         polish = POLISHING_STEPS if status is Status.MINIMUM else 0
         x, known = _polished(problem, outcome.x, rounds.multipliers, polish)
         value = problem.ld.action(x)
@@ -74,14 +74,14 @@ def _rounds(
         objective = ActionObjective(problem, multipliers=known)
         tolerance, left = max(decrease, options.decrease), deadline.seconds_left
         chosen = dataclasses.replace(options, decrease=tolerance, time_limit=left)
-        outcome = minimize(objective, x, chosen, _with_offset(report, len(history)))
+        outcome = minimize(objective, x, chosen, with_offset(report, len(history)))
         history.extend(outcome.history)
         return outcome
 
     return minimize_constrained(problem, path, minimize_round), history
 
 
-def _status(
+def constrained_status(
     problem: TrajectoryProblem, rounds: ConstrainedResult[Outcome[DiscretePath]], n_neg: int
 ) -> tuple[Status, str]:
     """Status and message; INFEASIBLE if the constraints cannot be met."""
@@ -94,7 +94,7 @@ def _status(
     return status, message
 
 
-def _with_offset(report: Report | None, done: int) -> Report | None:
+def with_offset(report: Report | None, done: int) -> Report | None:
     """A report whose step numbers continue from earlier rounds."""
     if report is None:
         return None

@@ -9,20 +9,27 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.instants import Instants
+from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.interior_point import BoundedOutcome, Outputs, minimize_bounded
+from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
+from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
-from hovi.planning.problem.contradictions import static_sentence
 from hovi.planning.problem.limit_violation import excess_along, worst_sentence
 from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import LinearAlgebra
 from hovi.planning.solver.augmented_lagrangian_rounds import minimize_constrained
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.limits.row_forces import forces_of
 from hovi.planning.solver.methods.method import Report
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.scene.lagrangian import PointTerms
@@ -33,6 +40,12 @@ Bounded = BoundedOutcome[DiscretePath]
 
 STOPPED = Stop.TIME_LIMIT, Stop.INTERRUPTED
 """Reasons that end the whole search."""
+ROUND_BARRIER = 3e-7
+"""Least last barrier parameter in rounds of an augmented Lagrangian, relative to the density."""
+FIRST_HALVINGS = 0, 1
+"""Number of halvings of intervals for limits on positions, and on their derivatives."""
+FINE_HALVINGS = 2, 3
+"""The same where a motion within such limits was not found."""
 WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
 
@@ -50,6 +63,7 @@ class BoundedSearch:
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve.
+    along, level: see InteriorPoint. plain: see minimize_bounded.
     """
 
     problem: TrajectoryProblem
@@ -60,6 +74,9 @@ class BoundedSearch:
     iterations: int = 0
     multipliers: Multipliers | None = None
     unmet: str = ""
+    along: CentralPath | None = None
+    level: float | None = None
+    plain: bool = False
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.options.time_limit)
@@ -72,6 +89,7 @@ class BoundedSearch:
                 distances, self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
             )
         self.margins = self.no_margins()
+        self.rows = self.coarse_rows()
         self.tightened: tuple[Array, Array] | None = None
 
     @property
@@ -85,11 +103,45 @@ class BoundedSearch:
         pairs = 0 if self.clearance is None else self.clearance.size
         return np.zeros((2, self.problem.grid.intervals, self.limits.lower.size + pairs))
 
-    def objective(self, known: Multipliers | None) -> BoundedAction:
+    def coarse_rows(self) -> LimitRows:
+        """Limits at all times, by few control points."""
+        return self._rows(FIRST_HALVINGS)
+
+    def fine_rows(self) -> LimitRows:
+        """Limits at all times, by more control points, which are nearer to the motion."""
+        return self._rows(FINE_HALVINGS)
+
+    def _rows(self, halvings: tuple[int, int]) -> LimitRows:
+        problem = self.problem
+        given = isinstance(problem.start, State), isinstance(problem.goal, State)
+        space = problem.coordinates.curved_space
+        return LimitRows(problem.grid, self.limits, space, given, halvings)
+
+    def objective(
+        self, known: Multipliers | None, algebra: LinearAlgebra | None = None
+    ) -> BoundedAction:
         """The action with the tightened bounds. known: multipliers of the constraints."""
         return BoundedAction(
-            self.problem, self.limits, self.margins, multipliers=known, more=self.clearance
+            self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
         )
+
+    def central_path(self, outcome: Bounded) -> CentralPath:
+        """The points at which the barrier of a solve was larger, and its solution."""
+        density = mean_density(outcome.outputs, self.objective(self.multipliers))
+        points = [(product / density, x) for product, x in outcome.marks]
+        last = (outcome.barrier.mu / density, outcome.x)
+        barrier = None if self.clearance is not None else outcome.barrier
+        return CentralPath((*self._before(points), *points, last), self.rows, barrier, self.margins)
+
+    def _before(self, points: list[tuple[float, DiscretePath]]) -> list[tuple[float, DiscretePath]]:
+        """Points of the path along which the solve began, whose barriers are larger than its own.
+
+        They are on the central path of a similar problem only, but the next solve may need room.
+        """
+        if self.along is None or self.along.last.q.shape != points[0][1].q.shape:
+            return []
+        larger = [(level, x) for level, x in self.along.points if level > points[0][0]]
+        return [(level, self.problem.moved(x)) for level, x in larger]
 
     def remaining_options(self) -> Options:
         """The options with the remaining time as time limit."""
@@ -103,10 +155,12 @@ class BoundedSearch:
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
             nonlocal start
             objective, options = self.objective(known), self.remaining_options()
-            options = dataclasses.replace(options, decrease=max(decrease, options.decrease))
+            decrease, mu = max(decrease, options.decrease), max(ROUND_BARRIER, options.barrier)
+            options = dataclasses.replace(options, decrease=decrease, barrier=mu)
             outcome = self._minimized(objective, x, options, start)
             mu = WARM_MU_RANGE[1] * mean_density(outcome.outputs, objective)
-            start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
+            y, barrier = outcome.outputs.y, outcome.barrier
+            start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
             return outcome
 
         rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
@@ -117,14 +171,26 @@ class BoundedSearch:
         self, objective: BoundedAction, path: DiscretePath, options: Options, start: Barrier | None
     ) -> Bounded:
         raise_if_late()  # the outputs at the guess alone may take seconds
-        outcome = minimize_bounded(objective, path, options, self.report, start)
+        if start is not None and len(start.s) != len(objective.bounds.lower):
+            start = None  # rows were added in a solve that failed
+        outcome = minimize_bounded(objective, path, options, self.report, start, self.plain)
         self.iterations += outcome.iterations
         self.history += outcome.history
         self.last = self.problem, outcome.x
         return outcome
 
-    def forces(self, outcome: Bounded) -> list[PointTerms]:
-        """Multipliers of limits and constraints, penalty terms of the constraints included."""
+    def forces(self, outcome: Bounded) -> tuple[Instants | None, list[PointTerms]]:
+        """The instants between the points at which limits act, and all multipliers.
+
+        Those of limits and constraints, penalty terms of the constraints included.
+        """
+        multipliers = outcome.barrier.multipliers
+        rows = multipliers[len(multipliers) - self.rows.size :]
+        instants, further = forces_of(self.problem, self.rows, rows)
+        return instants, self._forces_at_points(outcome) + further
+
+    def _forces_at_points(self, outcome: Bounded) -> list[PointTerms]:
+        """Those of limits at the quadrature points and of constraints."""
         known = self.multipliers
         if known is not None:
             action = self.objective(known).action
@@ -140,11 +206,8 @@ class BoundedSearch:
         mergeable = self.problem.plain and self.problem.ld.k == 2
         if not mergeable and isinstance(outcome.model, BandModel):
             return outcome.model.negative_eigenvalues()
-        objective = BoundedAction(
-            self.problem, self.limits, self.margins, "tree", more=self.clearance
-        )
-        barrier: Barrier = outcome.barrier
-        model = objective.model(outcome.x, barrier.sigma, barrier.gradient, barrier.multipliers)
+        objective = self.objective(None, "tree")
+        model = objective.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def excess(self, path: DiscretePath) -> Array:
@@ -174,5 +237,5 @@ class BoundedSearch:
 
 
 def mean_density(outputs: Outputs, objective: BoundedAction) -> float:
-    """|objective| / sum of all weights: its mean density."""
-    return max(abs(outputs.value), 1e-12) / float(np.sum(objective.bounds.weights))
+    """|objective| / duration: its mean density."""
+    return max(abs(outputs.value), 1e-12) / objective.bounds.measure

@@ -9,12 +9,14 @@ import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
+from hovi.optimize.bounded_objective import Outputs
 from hovi.optimize.trust_region import Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import ClearanceOutputs
 from hovi.planning.solver.methods.bounded_search import (
     STOPPED,
@@ -22,13 +24,16 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
+from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import PenalizedAction
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the mean density, if the interior point fails."""
-PENALTY_STEPS = 150
+PENALTY_STEPS = 40
 """Maximum number of steps with each penalty."""
-BUMPED_GUESSES = 3
+PENALTY_DECREASE = 0.9
+"""Ratio of violations above which a larger penalty would not help."""
+BUMPED_GUESSES = 1
 """Number of perturbed guesses that are tried before limits are reported as infeasible."""
 STAGE_DEPTH = 0.04
 """Depth by which a motion is moved out of obstacles in one stage, in [m]."""
@@ -39,16 +44,35 @@ STAGE_STEPS = 80
 NEARBY_MU = 1e-2
 """First barrier parameter from a motion that nearly is a solution, relative to the mean density of
 the objective: a larger one moves it away from its bounds, and perhaps to another minimum."""
+SHIFT_LEVEL = 1.0
+"""Barrier parameter at which a moved problem is begun, relative to the largest move of an
+output."""
+SHIFT_LEVELS = 1e-5, 3e-2
+"""Least and largest such parameter."""
+WARM_SHIFT = 1e-3
+"""Largest move of an output, as a share of its range, after which a solve begins at a solution."""
+WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
+"""Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
+cost exceeds its minimum by less than 1e-6."""
+WARM_MARGIN = 1e-6
+"""Least distance of its slacks from their bounds."""
+WARM_STEPS = 100
+"""Its maximum number of steps."""
+SHIFT_MARGIN = 0.1
+"""Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
-    """A motion from the guess within bounds at the points, and the reason if there is none."""
+    """A motion from the guess within bounds at points and control points, or why there is none."""
     path = search.guess
     if search.clearance is not None:
         path = _moved_out_of_obstacles(search, path, search.clearance)
     outcome = _solved_nearby(search, path) or search.solve(path)
+    if outcome.stop is Stop.DIVERGED and outcome.corrected:
+        search.plain, search.rows = True, search.fine_rows()
+        outcome = search.solve(path)
     if outcome.feasible or outcome.stop is not Stop.DIVERGED:
         return outcome, ""
     return _restored(search, outcome)
@@ -58,9 +82,76 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
     if not search.options.near or search.clearance is not None or search.problem.constrained:
         return None
-    outcome = solved_from(search, path)
-    found = outcome.feasible and outcome.stop is Stop.STATIONARY
-    return outcome if found or outcome.stop in STOPPED else None
+    if search.along is None:
+        outcome = solved_from(search, path)
+    else:
+        outcome = _solved_along(search, search.along)
+    return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
+
+
+def _is_found(outcome: Bounded) -> bool:
+    return outcome.feasible and outcome.stop is Stop.STATIONARY
+
+
+def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
+    """Solve near the solution of a central path, from it if that suffices, else further back."""
+    _adopt(search, along)
+    level = search.level
+    if level is None:
+        objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
+        change = objective.outputs(moved).y - objective.outputs(along.last).y
+        shift = float(np.max(np.abs(change), initial=0.0))
+        level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
+        if along.barrier is not None and shift <= WARM_SHIFT:
+            outcome = _solved_warm(search, along.barrier, moved)
+            if _is_found(outcome) or outcome.stop in STOPPED:
+                return outcome
+            _adopt(search, along)
+    return _solved_from_level(search, along, level)
+
+
+def _adopt(search: BoundedSearch, along: CentralPath) -> None:
+    """Take over the rows and the tightened bounds of a similar problem on as many intervals."""
+    if along.rows is not None:
+        search.rows = along.rows.copied()
+    if along.margins is not None and along.margins.shape == search.margins.shape:
+        search.margins = along.margins
+
+
+def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> Bounded:
+    """Solve from a solution itself, whose slacks and multipliers are known.
+
+    A few steps are enough, or there is another way; and they end where they change the cost by
+    less than the barrier does.
+    """
+    whole, mu = search.options, max(search.options.barrier, WARM_BARRIER)
+    search.options = dataclasses.replace(
+        whole,
+        barrier=mu,
+        enough=WARM_DECREASE,
+        max_iterations=min(WARM_STEPS, whole.max_iterations),
+    )
+    objective = search.objective(search.multipliers)
+    outputs = objective.outputs(path)
+    start = None
+    if len(known.s) == len(outputs.y):
+        mu *= mean_density(outputs, objective)
+        start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
+    outcome = search.solve(path, start)
+    search.options = whole
+    return outcome
+
+
+def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
+    """Solve from the point of a central path with a barrier as large as a level."""
+    problem, objective = search.problem, search.objective(search.multipliers)
+    share, point = along.at(level)
+    path = problem.moved(point)
+    outputs = objective.outputs(path)
+    density = mean_density(outputs, objective)
+    margin = min(INITIAL_MARGIN, SHIFT_MARGIN * share)
+    start = Barrier.central(objective.bounds, outputs.y, share * density, density, margin)
+    return search.solve(path, start)
 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
@@ -112,6 +203,7 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     """Further attempts from motions of small violation; or the reason for infeasibility."""
     constrained = search.problem.constrained
     known = first_multipliers(search.problem, outcome.x) if constrained else None
+    search.rows = search.coarse_rows()
     objective = search.objective(known)
     density = mean_density(outcome.outputs, objective)
     least = np.inf
@@ -121,14 +213,35 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
             outcome.stop = stop
             return outcome, ""
         if violation <= SMALL_VIOLATION:
-            search.multipliers = None
+            search.multipliers, search.rows = None, search.coarse_rows()
             again = search.solve(path)
             if again.feasible or again.stop in STOPPED:
                 return again, ""
+            if violation == 0.0 and stop is Stop.STATIONARY:
+                return unlimited_minimum(search, path), ""
         if violation < least:
             least, outcome.x = violation, path
-    outcome.outputs = objective.outputs(outcome.x)
+    _, outcome.outputs, outcome.barrier = _without_forces(search, known, outcome.x)
     return outcome, search.worst(outcome.x)
+
+
+def unlimited_minimum(search: BoundedSearch, path: DiscretePath) -> Bounded:
+    """A minimum that no limit touches, which is one without limits as well."""
+    objective, outputs, barrier = _without_forces(search, None, path)
+    found = Bounded(path, outputs, barrier, Stop.STATIONARY)
+    none = np.zeros_like(outputs.y)
+    found.model = objective.model(path, none, none, none)
+    return found
+
+
+def _without_forces(
+    search: BoundedSearch, known: Multipliers | None, path: DiscretePath
+) -> tuple[BoundedAction, Outputs, Barrier]:
+    """The objective with its first rows, its outputs at a path, and a barrier without forces."""
+    search.rows = search.coarse_rows()
+    objective = search.objective(known)
+    outputs = objective.outputs(path)
+    return objective, outputs, Barrier.inactive(objective.bounds, outputs.y)
 
 
 def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
@@ -144,13 +257,18 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
 def _penalized(
     search: BoundedSearch, objective: BoundedAction, path: DiscretePath, density: float
 ) -> tuple[DiscretePath, float, Stop]:
-    """A motion of small violation, by growing penalties; its violation, and why it stopped."""
+    """A motion of small violation, by growing penalties; its violation, and why it stopped.
+
+    A penalty that does not reduce the violation is the last.
+    """
+    violation = np.inf
     for penalty in PENALTIES:
         penalized = PenalizedAction(objective, penalty * density)
         options = dataclasses.replace(search.remaining_options(), max_iterations=PENALTY_STEPS)
         result = minimize(penalized, path, options, None)
         path = result.x
         search.iterations += result.iterations
-        if result.stop in STOPPED:
+        before, violation = violation, penalized.violation(path)
+        if result.stop in STOPPED or violation > PENALTY_DECREASE * before:
             break
-    return path, penalized.violation(path), result.stop
+    return path, violation, result.stop

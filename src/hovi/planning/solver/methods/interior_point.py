@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from functools import partial
 
 import numpy as np
@@ -11,13 +12,15 @@ from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.methods.active_pairs import with_active_pairs
 from hovi.planning.solver.methods.bounded_search import STOPPED, BoundedSearch
 from hovi.planning.solver.methods.feasibility import feasible_motion
 from hovi.planning.solver.methods.limits_between_points import tightened, usable
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
-from hovi.planning.solver.status import Status, diverged, unfinished
+from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
 from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
@@ -27,7 +30,15 @@ class InteriorPoint(Method):
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
+
+    along: the central path of a similar problem on the same intervals, where it starts; None to
+        start from the guess. level: the barrier parameter at which it starts, relative to the mean
+        density of the cost; None to infer it from how far the ends have moved.
     """
+
+    def __init__(self, along: CentralPath | None = None, level: float | None = None) -> None:
+        self.along = along
+        self.level = level
 
     def supports(self, problem: TrajectoryProblem) -> bool:
         """Problems with limits or obstacles, with or without equality constraints."""
@@ -41,7 +52,7 @@ class InteriorPoint(Method):
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; the guess may violate the limits, and intervals may be split."""
-        solve = partial(self._minimize, report=report)
+        solve = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
         return with_torque_rates_last(solve, problem, path, options)
 
     def _minimize(
@@ -55,8 +66,11 @@ class InteriorPoint(Method):
         reason = contradiction(problem, limits)
         if reason:
             value = problem.ld.action(path)
-            return MethodResult(problem, path, value, Status.INFEASIBLE, _infeasible(reason))
+            return MethodResult(
+                problem, path, value, Status.INFEASIBLE, infeasible_sentence(reason)
+            )
         search = BoundedSearch(problem, limits, options, report, path)
+        search.along, search.level = self.along, self.level
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own
@@ -70,7 +84,7 @@ def _searched(search: BoundedSearch) -> MethodResult:
     """Run all stages."""
     outcome, reason = feasible_motion(search)
     reason, excess = reason or search.unmet, 0.0
-    if not reason and usable(outcome):
+    if not reason and usable(outcome) and not search.rows.fixed:
         outcome, reason, excess = tightened(search, outcome)
         reason = reason or search.unmet
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
@@ -79,15 +93,21 @@ def _searched(search: BoundedSearch) -> MethodResult:
     if broken:  # by an effect, not by the limits
         status, message = Status.DIVERGED, diverged(broken, nit)
     elif reason:
-        status, message = Status.INFEASIBLE, _infeasible(reason)
+        status, message = Status.INFEASIBLE, infeasible_sentence(reason)
     elif outcome.stop is not Stop.STATIONARY:
         status, message = _unfinished(outcome.stop, nit, value)
     elif n_neg == 0:
         status, message = Status.MINIMUM, _minimum(search, value, excess)
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
-    forces = search.forces(outcome)
-    return MethodResult(problem, x, value, status, message, nit, n_neg, search.history, forces)
+    instants, forces = None, None
+    if outcome.stop is not Stop.TIME_LIMIT:
+        instants, forces = search.forces(outcome)
+    history, central = search.history, None
+    if status is Status.MINIMUM:
+        central = search.central_path(outcome)
+    result = MethodResult(problem, x, value, status, message, nit, n_neg, history, forces, instants)
+    return dataclasses.replace(result, central=central)
 
 
 def _ended(search: BoundedSearch, stop: Stop) -> MethodResult:
@@ -107,10 +127,6 @@ def _non_finite(search: BoundedSearch, path: DiscretePath, cost: float, excess: 
         return ""
     at_points = non_finite_sentence(search.problem, path)
     return at_points or f"{search.worst(path)}, between the quadrature points"
-
-
-def _infeasible(reason: str) -> str:
-    return f"no motion within the limits was found: {reason}."
 
 
 def _unfinished(stop: Stop, nit: int, cost: float) -> tuple[Status, str]:

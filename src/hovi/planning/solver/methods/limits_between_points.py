@@ -94,7 +94,8 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
     mu = share * mean_density(outcome.outputs, objective)
-    start = outcome.barrier.warm(objective.bounds, outcome.outputs.y, mu)
+    y, barrier = objective.outputs(outcome.x).y, outcome.barrier
+    start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
     return search.solve(outcome.x, start)
 
 
@@ -131,6 +132,7 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     search.guess = search.problem.path(guess)
     search.multipliers = None
     search.margins, search.tightened = search.no_margins(), None
+    search.rows = search.coarse_rows()
     if usable(outcome) and by_interval.max() <= WARM_EXCESS:
         again = solved_from(search, search.problem.path(motion))
         if usable(again) or again.stop in STOPPED:

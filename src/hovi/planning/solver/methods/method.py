@@ -7,9 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from hovi.discrete.grid import DiscretePath
+from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
 from hovi.optimize.trust_region import Iteration, Options
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
 
@@ -25,8 +27,11 @@ class MethodResult:
     status, message: the outcome, as a word and in a sentence.
     nit: steps. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
     history: one record per step.
-    forces: multipliers of limits and constraints at the quadrature points; None without any.
+    forces: multipliers of limits and constraints at the quadrature points, then of limits at
+        instants between them; None without any.
+    instants: these instants; None without any.
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
+    central: the path of a barrier method towards the motion, for warm starts.
     """
 
     problem: TrajectoryProblem
@@ -38,7 +43,9 @@ class MethodResult:
     n_neg: int = -1
     history: list[Iteration] = field(default_factory=list)
     forces: list[PointTerms] | None = None
+    instants: Instants | None = None
     jets: list[Jet] | None = None
+    central: CentralPath | None = None
 
 
 class Method(ABC):

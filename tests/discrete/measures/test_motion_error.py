@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pinocchio as pin
 import pytest
 
-from hovi.discrete.motion_error import deviation, relative_difference, sample_points
+from hovi.discrete.measures.motion_error import deviation, relative_difference, sample_points
 from hovi.discrete.state import State
 from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Gravity

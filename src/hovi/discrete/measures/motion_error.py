@@ -17,6 +17,8 @@ from hovi.robot.robot import Robot
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
+FROM_NODES = 1e-9
+"""Distance from the nodes, in intervals, at which motions in segments are compared."""
 MIN_SAMPLES = 9
 """Minimum number of sample points per interval, both ends included."""
 
@@ -133,8 +135,14 @@ def _at_samples(reference: Trajectory, trajectory: Trajectory, k: Index, s: Arra
     """The reference at sample points of the other motion's intervals."""
     if np.array_equal(reference.grid.steps, trajectory.grid.steps):
         return reference.sample_intervals(k, s)
-    t = trajectory.t[k] + s * trajectory.grid.steps[k]
-    return reference.sample(np.clip(t, 0.0, reference.duration))
+    return reference.sample(np.clip(times_of(trajectory, k, s), 0.0, reference.duration))
+
+
+def times_of(trajectory: Trajectory, k: Index, s: Array) -> Array:
+    """The times of points in intervals, (M,); in segments none at nodes, where torques may jump."""
+    if trajectory.segments is not None:
+        s = np.clip(s, FROM_NODES, 1 - FROM_NODES)
+    return np.asarray(trajectory.t[k] + s * trajectory.grid.steps[k])
 
 
 def _by_interval(trajectory: Trajectory, errors: Array) -> Array:

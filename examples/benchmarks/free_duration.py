@@ -1,0 +1,116 @@
+"""A free duration against the same plan for its best duration, both from the cubic guess."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from measuring import alone, print_machine, print_table
+
+import hovi
+from hovi.effects import Armature, Gravity
+
+SCENES: dict[str, tuple[float, dict[str, Any]]] = {
+    "two_link_reach": (20.0, {"limits": "none"}),
+    "two_link_elbow_limited": (20.0, {}),
+    "ur5_reach": (50.0, {"limits": "none"}),
+    "ur5_reach_limited": (50.0, {}),
+    "panda_reach": (50.0, {"limits": "none"}),
+    "panda_reach_limited": (50.0, {}),
+}
+"""Price of time, and options instead of the scene's."""
+BOUNDS = 0.5, 6.0
+GRIDS: dict[str, dict[str, Any]] = {"24 intervals": {"intervals": 24}, "to 0.1 %": {}}
+ROBOTS = {"ur5": 100.0, "panda": 50.0}
+REACHES = 6
+RUNS = 3
+
+Row = list[float]
+"""T, steps and seconds with it free and given, |dS/dT + w| / w; and whether both succeeded."""
+
+
+def compare(ends: Sequence[Any], weight: float, options: dict[str, Any], runs: int = RUNS) -> Row:
+    """One row for a problem."""
+    free, seconds = timed(ends, BOUNDS, options | {"time_weight": weight}, runs)
+    T = free.trajectory.duration
+    fixed, given = timed(ends, T, options, runs)
+    slope = abs(free.duration_derivative / weight + 1)
+    return [T, free.nit, fixed.nit, seconds, given, slope, free.success and fixed.success]
+
+
+def timed(
+    ends: Sequence[Any], duration: Any, options: dict[str, Any], runs: int
+) -> tuple[hovi.Solution, float]:
+    """A plan and the least processor time of some runs, in [s]."""
+    times = []
+    for _ in range(runs):
+        began = time.process_time()
+        found = hovi.plan(*ends, duration, processes=1, **options)
+        times.append(time.process_time() - began)
+    return found, min(times)
+
+
+def scene_row(name: str, grid: str) -> Row:
+    """A bundled scene; that of a Panda without limits with rotors, without which it whirls."""
+    weight, options = SCENES[name]
+    task = hovi.load_task(hovi.example(name))
+    scene = task.scene
+    if name == "panda_reach":
+        scene = hovi.Scene(scene.robot, [*scene.effects, Armature(0.1)])
+    options = {"limits": task.options.limits} | options | GRIDS[grid]
+    return compare((scene, task.start, task.goal), weight, options)
+
+
+def random_rows(name: str) -> list[Row]:
+    """Reaches between random configurations, within the limits of the URDF."""
+    robot = hovi.load_robot(name)
+    scene = hovi.Scene(robot, [Gravity()])
+    lower = np.maximum(robot.model.lowerPositionLimit, -np.pi)
+    upper = np.minimum(robot.model.upperPositionLimit, np.pi)
+    random = np.random.default_rng(5)
+    rows = []
+    for _ in range(REACHES):
+        q0, q1 = 0.8 * random.uniform(lower, upper), 0.8 * random.uniform(lower, upper)
+        rows.append(compare((scene, q0, q1), ROBOTS[name], {"intervals": 24}, 1))
+    return rows
+
+
+def cells(row: Row) -> list[str]:
+    """The numbers of a row as text, ratios included."""
+    T, steps, given_steps, seconds, given, slope, success = row
+    steps_ratio, ratio = steps / given_steps, seconds / given
+    marked = "" if success else " (not resolved)"
+    return [
+        f"{T:.3f}{marked}",
+        *(f"{steps:.0f}", f"{given_steps:.0f}", f"{steps_ratio:.1f}"),
+        *(f"{1e3 * seconds:.0f}", f"{1e3 * given:.0f}", f"{ratio:.1f}"),
+        f"{slope:.0e}",
+    ]
+
+
+def main() -> None:
+    print("`plan` with a duration between 0.5 and 6 s, and with the best one given; one thread.\n")
+    columns = ["T [s]", "steps", "given", "ratio", "ms", "given", "ratio", "abs(dS/dT + w) / w"]
+    rows = [
+        [f"`{name}`, {grid}", *cells(alone(scene_row, name, grid))]
+        for grid in GRIDS
+        for name in SCENES
+    ]
+    print_table(["scene and grid", *columns], rows)
+    print(f"{REACHES} random reaches within the limits of the URDF, 24 intervals.\n")
+    rows = []
+    for name in ROBOTS:
+        found = np.array(alone(random_rows, name), dtype=float)
+        steps, times = found[:, 1] / found[:, 2], found[:, 3] / found[:, 4]
+        good = f"{int(found[:, 6].sum())} of {REACHES}"
+        ratios = [f"{f(x):.1f}" for x in (steps, times) for f in (np.median, np.max)]
+        rows.append([f"`{name}`", good, *ratios, f"{found[:, 5].max():.0e}"])
+    names = ["successes", "steps, median", "largest", "time, median", "largest"]
+    print_table(["robot", *names, "largest abs(dS/dT + w) / w"], rows)
+    print_machine()
+
+
+if __name__ == "__main__":
+    main()

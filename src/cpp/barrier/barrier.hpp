@@ -1,0 +1,203 @@
+// The logarithmic barrier of slacks between bounds: its Newton steps and their lengths.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+namespace hovi::barrier {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double least_gap = 1e-16;  // the rounding unit at a bound of one
+
+// R slacks s with multipliers zl, zu; infinite bounds are none.
+struct Slacks {
+  std::size_t count;
+  const double *lower, *upper, *s, *zl, *zu;
+
+  double below(std::size_t i) const { return std::max(s[i] - lower[i], least_gap); }
+  double above(std::size_t i) const { return std::max(upper[i] - s[i], least_gap); }
+  bool has_lower(std::size_t i) const { return lower[i] > -infinity; }
+  bool has_upper(std::size_t i) const { return upper[i] < infinity; }
+};
+
+// Newton's direction of slacks and multipliers.
+struct Direction {
+  double *s, *zl, *zu;
+};
+
+// sigma = zl/below + zu/above, rho = mu/above - mu/below + sigma (y - s), force = zu - zl.
+inline void condense(const Slacks& at, const double* y, double mu, double* sigma, double* rho,
+                     double* force) {
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = 1.0 / at.below(i), above = 1.0 / at.above(i);
+    sigma[i] = at.zl[i] * below + at.zu[i] * above;
+    rho[i] = mu * above - mu * below + sigma[i] * (y[i] - at.s[i]);
+    force[i] = at.zu[i] - at.zl[i];
+  }
+}
+
+// rho for products z gap that aim at `lower` and `upper` instead of mu, less rho.
+inline void shift(const Slacks& at, double mu, const double* lower, const double* upper,
+                  double* out) {
+  for (std::size_t i = 0; i < at.count; ++i)
+    out[i] = (upper[i] - mu) / at.above(i) - (lower[i] - mu) / at.below(i);
+}
+
+// The largest share of a change that keeps a gap nonnegative.
+inline void limit(double gap, double change, double& share) {
+  if (change < 0.0) share = std::min(share, -gap / change);
+}
+
+struct Lengths {
+  double primal = 1.0, dual = 1.0, largest_force = 0.0, largest_residual = 0.0;
+};
+
+// The direction in which the products aim at their targets, and the lengths up to the boundary:
+// slacks that differ from their outputs by more than `matched` do not limit it, but take at most
+// `keep` of their gaps. The largest force is that of the whole direction.
+inline Lengths aim(const Slacks& at, const double* y, const double* dy, const double* lower,
+                   const double* upper, double matched, double keep, const Direction& d) {
+  Lengths lengths;
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = at.below(i), above = at.above(i), residual = y[i] - at.s[i];
+    const bool equal = std::abs(residual) <= matched;
+    const auto dzl = [&](double ds) {
+      return at.has_lower(i) ? (lower[i] - at.zl[i] * ds) / below - at.zl[i] : 0.0;
+    };
+    const auto dzu = [&](double ds) {
+      return at.has_upper(i) ? (upper[i] + at.zu[i] * ds) / above - at.zu[i] : 0.0;
+    };
+    const double whole = dy[i] + residual;
+    const double ds = equal ? whole : std::clamp(whole, -keep * below, keep * above);
+    d.s[i] = ds, d.zl[i] = dzl(ds), d.zu[i] = dzu(ds);
+    if (equal) {
+      limit(below, ds, lengths.primal);
+      limit(above, -ds, lengths.primal);
+    }
+    limit(at.zl[i], d.zl[i], lengths.dual);
+    limit(at.zu[i], d.zu[i], lengths.dual);
+    const double force = std::abs(at.zu[i] + dzu(whole) - at.zl[i] - dzl(whole));
+    lengths.largest_force = std::max(lengths.largest_force, force);
+    lengths.largest_residual = std::max(lengths.largest_residual, std::abs(residual));
+  }
+  return lengths;
+}
+
+// The mean product of multipliers and gaps after shares of a direction.
+inline double mean_product(const Slacks& at, const Direction& d, double primal, double dual) {
+  double sum = 0.0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = at.below(i), above = at.above(i);
+    const double ds = std::clamp(primal * d.s[i], -0.99 * below, 0.99 * above);
+    if (at.has_lower(i)) sum += (at.zl[i] + dual * d.zl[i]) * (below + ds), ++count;
+    if (at.has_upper(i)) sum += (at.zu[i] + dual * d.zu[i]) * (above - ds), ++count;
+  }
+  return count ? sum / double(count) : 0.0;
+}
+
+// The largest |z gap - mu|.
+inline double largest_miss(const Slacks& at, double mu) {
+  double largest = 0.0;
+  for (std::size_t i = 0; i < at.count; ++i) {
+    if (at.has_lower(i)) largest = std::max(largest, std::abs(at.zl[i] * at.below(i) - mu));
+    if (at.has_upper(i)) largest = std::max(largest, std::abs(at.zu[i] * at.above(i) - mu));
+  }
+  return largest;
+}
+
+// Targets that make up for the second-order terms of a direction: mu -/+ ds dz.
+inline void correct(const Slacks& at, const double* y, const Direction& d, double mu,
+                    double matched, double* lower, double* upper) {
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const bool equal = std::abs(y[i] - at.s[i]) <= matched;
+    lower[i] = mu - (equal ? d.s[i] * d.zl[i] : 0.0);
+    upper[i] = mu + (equal ? d.s[i] * d.zu[i] : 0.0);
+  }
+}
+
+// How far a product is outside of [mu/10, 10 mu]; at most 10 mu are taken off.
+inline double outside(double product, double mu) {
+  if (product < 0.1 * mu) return 0.1 * mu - product;
+  return product > 10.0 * mu ? std::max(10.0 * mu - product, -10.0 * mu) : 0.0;
+}
+
+// Targets that bring those products nearer to mu that longer shares of a direction would spoil.
+inline void centre(const Slacks& at, const double* y, const Direction& d, double primal,
+                   double dual, double mu, double matched, double* lower, double* upper) {
+  for (std::size_t i = 0; i < at.count; ++i) {
+    if (std::abs(y[i] - at.s[i]) > matched) continue;
+    const double ds = primal * d.s[i];
+    if (at.has_lower(i))
+      lower[i] += outside((at.zl[i] + dual * d.zl[i]) * (at.below(i) + ds), mu);
+    if (at.has_upper(i))
+      upper[i] += outside((at.zu[i] + dual * d.zu[i]) * (at.above(i) - ds), mu);
+  }
+}
+
+// sum w log(gap), with one logarithm for several gaps of the same weight.
+class LogSum {
+ public:
+  void add(double weight, double gap) {
+    if (weight != weight_ || product_ < 1e-200 || product_ > 1e200) flush(weight);
+    product_ *= gap;
+  }
+  double total() {
+    flush(0.0);
+    return total_;
+  }
+
+ private:
+  void flush(double weight) {
+    if (product_ != 1.0) total_ += weight_ * std::log(product_);
+    weight_ = weight, product_ = 1.0;
+  }
+  double weight_ = 0.0, product_ = 1.0, total_ = 0.0;
+};
+
+// -mu sum w log(gaps) + penalty sum w |y - s| after a share of a direction, of which every slack
+// takes at most `keep` of its gap.
+inline double merit(const Slacks& at, const double* weights, const double* y, const double* dy,
+                    const double* ds, double share, double keep, double mu, double penalty) {
+  LogSum logs;
+  double misfit = 0.0;
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = at.below(i), above = at.above(i);
+    const double step = std::clamp(share * ds[i], -keep * below, keep * above);
+    if (at.has_lower(i)) logs.add(weights[i], below + step);
+    if (at.has_upper(i)) logs.add(weights[i], above - step);
+    misfit += weights[i] * std::abs(y[i] + share * dy[i] - at.s[i] - step);
+  }
+  return penalty * misfit - mu * logs.total();
+}
+
+inline double barrier_of(const Slacks& at, std::size_t i, double below, double above) {
+  return (at.has_lower(i) ? std::log(below) : 0.0) + (at.has_upper(i) ? std::log(above) : 0.0);
+}
+
+// Slacks and multipliers after shares of a direction. A slack becomes its output y where that is
+// inside of the bounds and lowers the merit, and z gap stays within `ratio` of mu.
+inline void move(const Slacks& at, const double* y, const Direction& d, double primal, double dual,
+                 double keep, double mu, double penalty, double ratio, const Direction& out) {
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = at.below(i), above = at.above(i);
+    double s = at.s[i] + std::clamp(primal * d.s[i], -keep * below, keep * above);
+    const double low = y[i] - at.lower[i], high = at.upper[i] - y[i];
+    if (y[i] != s && low > least_gap && high > least_gap) {
+      const double here = penalty * std::abs(y[i] - s) -
+                          mu * barrier_of(at, i, std::max(s - at.lower[i], least_gap),
+                                          std::max(at.upper[i] - s, least_gap));
+      if (-mu * barrier_of(at, i, low, high) < here) s = y[i];
+    }
+    out.s[i] = s;
+    const double centre_low = mu / std::max(s - at.lower[i], least_gap);
+    const double centre_high = mu / std::max(at.upper[i] - s, least_gap);
+    const double zl = at.zl[i] + dual * d.zl[i], zu = at.zu[i] + dual * d.zu[i];
+    out.zl[i] = at.has_lower(i) ? std::clamp(zl, centre_low / ratio, centre_low * ratio) : 0.0;
+    out.zu[i] = at.has_upper(i) ? std::clamp(zu, centre_high / ratio, centre_high * ratio) : 0.0;
+  }
+}
+
+}  // namespace hovi::barrier

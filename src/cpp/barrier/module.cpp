@@ -1,0 +1,162 @@
+// The Python binding, which checks its arguments against each other.
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/tuple.h>
+
+#include <tuple>
+
+#include "barrier.hpp"
+#include "simd/arrays.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace hovi::arrays;
+using hovi::barrier::Direction;
+using hovi::barrier::Slacks;
+
+namespace {
+
+using Vector = Input<1>;
+using Out = Output<1>;
+
+Slacks slacks_of(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+                 const Vector& zu) {
+  s.require_kind("s");
+  const std::size_t R = s.shape(0);
+  lower.require("lower", {R});
+  upper.require("upper", {R});
+  zl.require("zl", {R});
+  zu.require("zu", {R});
+  return {R, lower.data(), upper.data(), s.data(), zl.data(), zu.data()};
+}
+
+Direction direction_of(std::size_t R, const Out& ds, const Out& dzl, const Out& dzu) {
+  ds.require("ds", {R});
+  dzl.require("dzl", {R});
+  dzu.require("dzu", {R});
+  return {ds.data(), dzl.data(), dzu.data()};
+}
+
+const double* vector(const char* name, std::size_t R, const Vector& x) {
+  x.require(name, {R});
+  return x.data();
+}
+
+double* vector(const char* name, std::size_t R, const Out& x) {
+  x.require(name, {R});
+  return x.data();
+}
+
+void require_share(double keep) {
+  if (!(keep >= 0.0)) refuse("keep must be a share of the gaps, 0 or more.");
+}
+
+void condense(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+              const Vector& zu, const Vector& y, double mu, const Out& sigma, const Out& rho,
+              const Out& force) {
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  hovi::barrier::condense(at, vector("y", R, y), mu, vector("sigma", R, sigma),
+                          vector("rho", R, rho), vector("force", R, force));
+}
+
+void shift(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+           const Vector& zu, double mu, const Vector& lower_targets, const Vector& upper_targets,
+           const Out& out) {
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  hovi::barrier::shift(at, mu, vector("lower_targets", R, lower_targets),
+                       vector("upper_targets", R, upper_targets), vector("out", R, out));
+}
+
+std::tuple<double, double, double, double> aim(
+    const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl, const Vector& zu,
+    const Vector& y, const Vector& dy, const Vector& lower_targets, const Vector& upper_targets,
+    double matched, double keep, const Out& ds, const Out& dzl, const Out& dzu) {
+  require_share(keep);
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  const auto lengths = hovi::barrier::aim(
+      at, vector("y", R, y), vector("dy", R, dy), vector("lower_targets", R, lower_targets),
+      vector("upper_targets", R, upper_targets), matched, keep, direction_of(R, ds, dzl, dzu));
+  return {lengths.primal, lengths.dual, lengths.largest_force, lengths.largest_residual};
+}
+
+double mean_product(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+                    const Vector& zu, const Out& ds, const Out& dzl, const Out& dzu, double primal,
+                    double dual) {
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  return hovi::barrier::mean_product(at, direction_of(at.count, ds, dzl, dzu), primal, dual);
+}
+
+double largest_miss(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+                    const Vector& zu, double mu) {
+  return hovi::barrier::largest_miss(slacks_of(lower, upper, s, zl, zu), mu);
+}
+
+void correct(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+             const Vector& zu, const Vector& y, const Out& ds, const Out& dzl, const Out& dzu,
+             double mu, double matched, const Out& lower_targets, const Out& upper_targets) {
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  hovi::barrier::correct(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), mu, matched,
+                         vector("lower_targets", R, lower_targets),
+                         vector("upper_targets", R, upper_targets));
+}
+
+void centre(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+            const Vector& zu, const Vector& y, const Out& ds, const Out& dzl, const Out& dzu,
+            double primal, double dual, double mu, double matched, const Out& lower_targets,
+            const Out& upper_targets) {
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  hovi::barrier::centre(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, mu,
+                        matched, vector("lower_targets", R, lower_targets),
+                        vector("upper_targets", R, upper_targets));
+}
+
+double merit(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+             const Vector& zu, const Vector& weights, const Vector& y, const Vector& dy,
+             const Vector& ds, double share, double keep, double mu, double penalty) {
+  require_share(keep);
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  return hovi::barrier::merit(at, vector("weights", R, weights), vector("y", R, y),
+                              vector("dy", R, dy), vector("ds", R, ds), share, keep, mu, penalty);
+}
+
+void move(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+          const Vector& zu, const Vector& y, const Out& ds, const Out& dzl, const Out& dzu,
+          double primal, double dual, double keep, double mu, double penalty, double ratio,
+          const Out& new_s, const Out& new_zl, const Out& new_zu) {
+  require_share(keep);
+  if (!(mu >= 0.0 && ratio >= 1.0)) refuse("mu must be 0 or more, and ratio 1 or more.");
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
+                      vector("new_zu", R, new_zu)};
+  hovi::barrier::move(at, vector("y", R, y), direction_of(R, ds, dzl, dzu), primal, dual, keep, mu,
+                      penalty, ratio, out);
+}
+
+}  // namespace
+
+NB_MODULE(barrier, m) {
+  m.def("condense", &condense, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "mu"_a,
+        "sigma"_a, "rho"_a, "force"_a);
+  m.def("shift", &shift, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "mu"_a, "lower_targets"_a,
+        "upper_targets"_a, "out"_a);
+  m.def("aim", &aim, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "dy"_a,
+        "lower_targets"_a, "upper_targets"_a, "matched"_a, "keep"_a, "ds"_a, "dzl"_a, "dzu"_a);
+  m.def("mean_product", &mean_product, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "ds"_a,
+        "dzl"_a, "dzu"_a, "primal"_a, "dual"_a);
+  m.def("largest_miss", &largest_miss, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "mu"_a);
+  m.def("correct", &correct, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
+        "dzu"_a, "mu"_a, "matched"_a, "lower_targets"_a, "upper_targets"_a);
+  m.def("centre", &centre, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
+        "dzu"_a, "primal"_a, "dual"_a, "mu"_a, "matched"_a, "lower_targets"_a, "upper_targets"_a);
+  m.def("merit", &merit, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "weights"_a, "y"_a, "dy"_a,
+        "ds"_a, "share"_a, "keep"_a, "mu"_a, "penalty"_a);
+  m.def("move", &move, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
+        "dzu"_a, "primal"_a, "dual"_a, "keep"_a, "mu"_a, "penalty"_a, "ratio"_a, "new_s"_a,
+        "new_zl"_a, "new_zu"_a);
+}

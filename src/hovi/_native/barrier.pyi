@@ -1,0 +1,126 @@
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+def condense(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    y: Array,
+    mu: float,
+    sigma: Array,
+    rho: Array,
+    force: Array,
+) -> None: ...
+def shift(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    mu: float,
+    lower_targets: Array,
+    upper_targets: Array,
+    out: Array,
+) -> None: ...
+def aim(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    y: Array,
+    dy: Array,
+    lower_targets: Array,
+    upper_targets: Array,
+    matched: float,
+    keep: float,
+    ds: Array,
+    dzl: Array,
+    dzu: Array,
+) -> tuple[float, float, float, float]: ...
+def mean_product(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    ds: Array,
+    dzl: Array,
+    dzu: Array,
+    primal: float,
+    dual: float,
+) -> float: ...
+def largest_miss(
+    lower: Array, upper: Array, s: Array, zl: Array, zu: Array, mu: float
+) -> float: ...
+def correct(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    y: Array,
+    ds: Array,
+    dzl: Array,
+    dzu: Array,
+    mu: float,
+    matched: float,
+    lower_targets: Array,
+    upper_targets: Array,
+) -> None: ...
+def centre(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    y: Array,
+    ds: Array,
+    dzl: Array,
+    dzu: Array,
+    primal: float,
+    dual: float,
+    mu: float,
+    matched: float,
+    lower_targets: Array,
+    upper_targets: Array,
+) -> None: ...
+def merit(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    weights: Array,
+    y: Array,
+    dy: Array,
+    ds: Array,
+    share: float,
+    keep: float,
+    mu: float,
+    penalty: float,
+) -> float: ...
+def move(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    y: Array,
+    ds: Array,
+    dzl: Array,
+    dzu: Array,
+    primal: float,
+    dual: float,
+    keep: float,
+    mu: float,
+    penalty: float,
+    ratio: float,
+    new_s: Array,
+    new_zl: Array,
+    new_zu: Array,
+) -> None: ...

@@ -1,0 +1,127 @@
+"""Objectives with bounds on outputs, and what their minimisation returns."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize.barrier import Barrier, Bounds
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.trust_region import Iteration, Stop
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+X = TypeVar("X")
+
+FEASIBILITY_TOLERANCE = 1e-8
+"""Largest |y - s| of a solution, relative to the range of a bound."""
+
+KEPT = 1e-6
+"""Excess over a bound, relative to its range, up to which a point keeps it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outputs:
+    """The objective and the bounded outputs at a point.
+
+    value: the objective. y: outputs in units of their ranges, shape (R,).
+    """
+
+    value: float
+    y: Array
+
+
+class Refinement(NamedTuple):
+    """Outputs that took the place of others.
+
+    kept: numbers of those that remain, ascending; the new ones follow them.
+    origin: number of the former output at the place of each new one; -1 for none.
+    """
+
+    kept: Index
+    origin: Index
+
+
+class BoundedObjective(ABC, Generic[X]):
+    """An objective with bounded outputs."""
+
+    bounds: Bounds
+
+    @abstractmethod
+    def outputs(self, x: X) -> Outputs:
+        """The objective and the outputs at x."""
+
+    @abstractmethod
+    def model(self, x: X, sigma: Array, rho: Array, multipliers: Array) -> QuadraticModel:
+        """The objective's quadratic model plus sum of weights (rho dy + sigma dy^2/2).
+
+        multipliers: weights of the outputs' curvature, shape (R,).
+        """
+
+    @abstractmethod
+    def push(self, step: Array, model: QuadraticModel) -> Array:
+        """First-order change of the outputs in a step of the last model, shape (R,)."""
+
+    @abstractmethod
+    def pull(self, forces: Array, model: QuadraticModel) -> Array:
+        """Gradient of sum of weights (forces y) in the unknowns of the last model."""
+
+    @abstractmethod
+    def accept(self, step: Array, model: QuadraticModel) -> None:
+        """Take note of a step of the last model, for lifted variables, if any."""
+
+    @abstractmethod
+    def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
+        """The point that a step of a model leads to."""
+
+    def refine(self, x: X, level: float) -> Refinement | None:
+        """Replace outputs by others, which come after those that remain and bound x less.
+
+        Returns None if nothing changed.
+        level: mean product z gap at x, relative to the mean density of the objective.
+        """
+        return None
+
+
+@dataclass(eq=False)
+class BoundedOutcome(Generic[X]):
+    """The final point, its multipliers, and why the iteration ended.
+
+    corrected: whether some steps were corrected ones, without which it may end otherwise.
+    marks: the points on the way at which the mean product z gap had halved, with that product.
+    kept: the point of least objective so far that keeps the bounds to KEPT, and the outputs there;
+        None for none. It is the final point where time runs out.
+    """
+
+    x: X
+    outputs: Outputs
+    barrier: Barrier
+    stop: Stop
+    iterations: int = 0
+    history: list[Iteration] = field(default_factory=list)
+    model: QuadraticModel | None = None
+    corrected: bool = False
+    marks: list[tuple[float, X]] = field(default_factory=list)
+    kept: tuple[X, Outputs] | None = None
+
+    def keep_best(self, bounds: Bounds) -> None:
+        """Keep the current point if it is within the bounds, and better than the one kept."""
+        if self.kept is not None and self.kept[1].value <= self.outputs.value:
+            return
+        y = self.outputs.y
+        if max(np.max(bounds.lower - y, initial=0.0), np.max(y - bounds.upper, initial=0.0)) < KEPT:
+            self.kept = self.x, self.outputs
+
+    @property
+    def violation(self) -> Array:
+        """|y - s|, shape (R,)."""
+        return np.abs(self.outputs.y - self.barrier.s)
+
+    @property
+    def feasible(self) -> bool:
+        """Whether the outputs equal their slacks to tolerance, and so satisfy the bounds."""
+        return bool(self.violation.max(initial=0.0) <= FEASIBILITY_TOLERANCE)

@@ -1,0 +1,184 @@
+"""Steps of an interior point: directions of the primal-dual system, and how far to follow them.
+
+See hovi.optimize.interior_point for the method.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize.barrier import Barrier, Direction, Pair
+from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.trust_region import Options, Trial, solve_subproblem
+
+Array = npt.NDArray[np.float64]
+X = TypeVar("X")
+
+LEAST_CENTRING = 1e-3
+"""Smallest ratio of mu in one step."""
+CORRECTIONS = 3
+"""Maximum number of corrections of outliers in one step."""
+MAX_STRETCH = 1.5
+"""Largest length of a corrected step, relative to the radius."""
+LONG_STEP = 0.95
+"""Shares of a direction above which it needs no correction."""
+SHORTER_SHARES = 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 0.01, 1e-3
+"""Shares of the longest step that are tried: of a plain one as long as they predict more, so that
+it ends away from the bounds; of a corrected one until one of them predicts a decrease."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoundedStep:
+    """A step of the primal-dual system, shortened such that the slacks stay inside.
+
+    along: the whole direction. share: of it that is taken. mu: at which it aims.
+    decrease: predicted decrease of the merit function.
+    remaining: decrease that the whole direction predicts for the objective with its barrier.
+    """
+
+    trial: Trial
+    along: Direction
+    share: float
+    mu: float
+    decrease: float
+    remaining: float
+
+
+class BoundedSteps(Generic[X]):
+    """The steps of an interior point: plain ones of one mu, and corrected ones that lower it.
+
+    objective: with its bounds. outcome: the current point and its barrier. options: see Options.
+    density: mean density of the objective, its scale.
+    """
+
+    def __init__(
+        self,
+        objective: BoundedObjective[X],
+        outcome: BoundedOutcome[X],
+        options: Options,
+        density: float,
+    ) -> None:
+        self.objective = objective
+        self.outcome = outcome
+        self.options = options
+        self.density = density
+        self.final_mu = options.barrier * density
+        self.product = outcome.barrier.mean_product()
+        self.radius = options.radius
+        self.shift = 0.0
+        self.penalty = 0.0
+        self.cautious = False
+
+    def model(self) -> QuadraticModel:
+        """The model at the current point, whose multipliers of the bounds steps start from."""
+        outcome = self.outcome
+        sigma, rho, force = outcome.barrier.condensed(outcome.outputs.y)
+        self.sigma, self.rho = sigma, rho
+        return self.objective.model(outcome.x, sigma, rho, force)
+
+    def step(self, model: QuadraticModel) -> BoundedStep:
+        """A corrected step towards a smaller mu if the model is convex, else a plain one."""
+        trial = solve_subproblem(model, self.radius, self.shift)
+        ahead = self.product > 2.0 * self.final_mu or self.outcome.barrier.mu > 1.01 * self.final_mu
+        if trial.newton and not self.cautious and ahead:
+            step = self._corrected(trial, model)
+            short = step.share * step.trial.norm <= MAX_STRETCH * self.radius
+            if short and step.decrease > -10 * self.noise:
+                self.outcome.corrected = True
+                return step
+        self.cautious = True
+        barrier = self.outcome.barrier
+        return self._shortened(trial, trial.step, None, barrier.central_targets(), model)
+
+    def _corrected(self, trial: Trial, model: QuadraticModel) -> BoundedStep:
+        """A predictor, its second-order correction, and corrections of outliers."""
+        barrier, y, product = self.outcome.barrier, self.outcome.outputs.y, self.product
+        zero = np.zeros_like(y)
+        affine, _, _ = self._direction(trial, (zero, zero), model)
+        after = barrier.mean_product(affine)
+        centring = min(1.0, max((after / product) ** 3, LEAST_CENTRING)) if product > 0 else 1.0
+        mu = max(self.final_mu, centring * product)
+        targets = barrier.corrected_targets(y, affine, mu)
+        along, s, pulled = self._direction(trial, targets, model)
+        for _ in range(CORRECTIONS):
+            if min(along.primal, along.dual) > LONG_STEP:
+                break
+            further = barrier.centred_targets(y, along, mu, targets)
+            other, other_s, other_pulled = self._direction(trial, further, model)
+            if other.primal + other.dual < along.primal + along.dual + 1e-3:
+                break
+            targets, along, s, pulled = further, other, other_s, other_pulled
+        barrier = barrier.with_mu(mu)
+        return self._shortened(trial, s, pulled, targets, model, barrier, along)
+
+    def _direction(
+        self, trial: Trial, targets: Pair, model: QuadraticModel
+    ) -> tuple[Direction, Array, Array]:
+        """The direction for given targets, its step, and the change of the gradient."""
+        barrier, y = self.outcome.barrier, self.outcome.outputs.y
+        assert trial.factor is not None
+        pulled = self.objective.pull(barrier.shift(barrier.mu, targets), model)
+        s = trial.step - trial.factor.solve(pulled)
+        return barrier.aim(y, self.objective.push(s, model), targets), s, pulled
+
+    def _shortened(
+        self,
+        trial: Trial,
+        s: Array,
+        pulled: Array | None,
+        targets: Pair,
+        model: QuadraticModel,
+        barrier: Barrier | None = None,
+        along: Direction | None = None,
+    ) -> BoundedStep:
+        """The longest step inside the bounds, or a shorter one if that predicts no decrease.
+
+        s: the step, for the model's gradient plus `pulled`. barrier: with the mu that it aims at.
+        along: its direction, if it is known.
+        """
+        barrier = barrier or self.outcome.barrier
+        y, weights = self.outcome.outputs.y, self.objective.bounds.weights
+        along = along or barrier.aim(y, self.objective.push(s, model), targets)
+        self.penalty = 1.2 * along.largest_force  # of this step alone
+        slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
+        gradient = model.gradient if pulled is None else model.gradient + pulled
+        norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
+        whole = -float(np.vdot(gradient, s))
+        square = whole - trial.shift * norm2
+        square -= float(np.vdot(weights * self.sigma, along.dy**2))
+        before = barrier.merit(y, self.penalty, along, 0.0)
+
+        def decrease(share: float) -> float:
+            smooth = share * slope + 0.5 * share**2 * square
+            return before - barrier.merit(y, self.penalty, along, share) - smooth
+
+        longest = min(1.0, barrier.boundary_fraction * along.primal)
+        share, predicted = longest, decrease(longest)
+        for shorter in SHORTER_SHARES:
+            if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):
+                break
+            other = decrease(shorter * longest)
+            if other < predicted:
+                break
+            share, predicted = shorter * longest, other
+        trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
+        return BoundedStep(trial, along, share, barrier.mu, predicted, 0.5 * whole)
+
+    def scale(self) -> float:
+        """Magnitude of the objective, to which decreases are relative; positive."""
+        return max(abs(self.outcome.outputs.value), 1e-10 * self.density * self._measure)
+
+    @property
+    def noise(self) -> float:
+        """Change of the merit function that is none."""
+        return 1e-2 * self.options.decrease * self.scale()
+
+    @property
+    def _measure(self) -> float:
+        return self.objective.bounds.measure

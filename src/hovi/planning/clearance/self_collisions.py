@@ -1,0 +1,78 @@
+"""The pairs of a robot's own shapes that are kept apart."""
+
+from __future__ import annotations
+
+import warnings
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.errors import HoviWarning
+from hovi.planning.clearance.convex_shapes import convex_geometry
+from hovi.planning.clearance.pair_distances import PairDistances
+from hovi.robot.robot import Robot
+from hovi.robot.srdf import checked_pairs
+
+Array = npt.NDArray[np.float64]
+
+SAMPLES = 128
+"""Number of random configurations at which pairs are looked at."""
+FIRST_SAMPLES = 8
+"""Number of those at which all pairs are; most are apart at one of them."""
+
+
+@lru_cache(maxsize=16)
+def self_collision_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
+    """Pairs of shapes, by index in the convex geometry, that a motion can keep apart.
+
+    All pairs of shapes on joints of which neither is the parent of the other, except those that the
+    SRDF disables, and those that overlap at every one of many configurations: a warning names them.
+    """
+    geometry = convex_geometry(robot)
+    pairs = checked_pairs(robot.model, geometry, robot.semantics.disabled)
+    touching = _always_overlapping(robot, geometry, pairs)
+    if touching:
+        warnings.warn(_sentence(robot, geometry, touching), HoviWarning, stacklevel=2)
+    return tuple(pair for pair in pairs if pair not in touching)
+
+
+def _always_overlapping(
+    robot: Robot, geometry: pin.GeometryModel, pairs: list[tuple[int, int]]
+) -> list[tuple[int, int]]:
+    paired = geometry.copy()
+    for i, j in pairs:
+        paired.addCollisionPair(pin.CollisionPair(i, j))
+    distances, q = PairDistances(robot, paired), _samples(robot)
+    left = np.arange(len(pairs))
+    for some in (q[:FIRST_SAMPLES], q[FIRST_SAMPLES:]):
+        left = left[(distances.values(some, left, 0.0) <= 0.0).all(axis=0)]
+    return [pairs[k] for k in left]
+
+
+def _samples(robot: Robot) -> Array:
+    """Random configurations within the limits, (SAMPLES, nq)."""
+    random, model = np.random.default_rng(0), robot.model
+    neutral = np.tile(np.asarray(pin.neutral(model)), (SAMPLES, 1))
+    q = robot.integrate(neutral, random.uniform(-np.pi, np.pi, (SAMPLES, robot.nv)))
+    for joint in list(model.joints)[1:]:
+        i = joint.idx_q
+        if joint.nq == joint.nv == 1:
+            lower, upper = model.lowerPositionLimit[i], model.upperPositionLimit[i]
+            if upper - lower < 2 * np.pi:
+                q[:, i] = random.uniform(lower, upper, SAMPLES)
+    return q
+
+
+def _sentence(robot: Robot, geometry: pin.GeometryModel, touching: list[tuple[int, int]]) -> str:
+    shapes = geometry.geometryObjects
+    links = [
+        tuple(str(robot.model.frames[shapes[k].parentFrame].name) for k in pair)
+        for pair in touching
+    ]
+    names = ", ".join(f"{a!r} and {b!r}" for a, b in dict.fromkeys(links))
+    return (
+        f"the collision shapes of robot {robot.name!r} overlap at every configuration between "
+        f"links {names}: these pairs are not kept apart; disable them in an SRDF."
+    )

@@ -1,0 +1,138 @@
+"""Several configurations in which a frame meets its goal, by the compiled search where it can.
+
+The compiled search runs Levenberg and Marquardt's method within the limits, first from the given
+configuration, then from those of a table whose poses are the nearest to the goal, then from random
+ones; and ends when a number of seeds in a row have led to no new configuration.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import kinematics as native
+from hovi.dynamics.kinematic_chain import KinematicChain, read_kinematic_chain
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.kinematics.damped_newton import candidates, inside
+from hovi.robot.robot import Robot
+from hovi.system.deadline import raise_if_late
+
+Array = npt.NDArray[np.float64]
+
+PATIENCE = 60
+"""Seeds in a row without a new configuration after which the search ends."""
+PYTHON_PATIENCE = 8
+"""The same where the search runs in Python."""
+GOAL_TOLERANCE = 1e-9
+"""Largest distance [m] and angle [rad] of a configuration that meets a goal."""
+PYTHON_TOLERANCE = 1e-6
+"""The same where the search runs in Python, which may not come closer where J is singular."""
+ISOLATED = 1e-3
+"""Configurations that differ less in every joint are one, in [rad] or [m], ..."""
+IN_A_FAMILY = 0.3
+"""... and where the joints are more than the equations, so that configurations form families."""
+LENGTH = 0.5
+"""A distance by it counts as an angle of 1 rad in the search, in [m]."""
+BEYOND_REACH = 64
+"""Number of seeds where the goal is farther away than the joints can reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class Branches:
+    """What a search found.
+
+    q: distinct configurations that meet the goal, in the order in which they were found, (K, nq).
+    best: the configuration that comes nearest to the goal, (nq,).
+    """
+
+    q: Array
+    best: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _CompiledChain:
+    chain: KinematicChain
+    kernel: native.InverseKinematicsKernel
+
+
+def find_branches(
+    robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
+) -> Branches:
+    """Up to `most` configurations that meet a goal, from at most `seeds` seeds.
+
+    near: the first seed, shape (nq,); joints that do not move the frame keep its values.
+    bounds: lower and upper position limits, shape (nv,).
+    """
+    raise_if_late()
+    near = inside(robot, near, *bounds)
+    lower, upper = bounds
+    compiled = _compiled(robot, goal.frame, lower.tobytes(), upper.tobytes())
+    if compiled is None:
+        return _in_python(robot, goal, near, bounds, most, seeds)
+    chain, size = compiled.chain, goal.equations
+    if _beyond_reach(chain, goal):
+        seeds = min(seeds, BEYOND_REACH)
+    found, best = np.empty((most, chain.n)), np.empty(chain.n)
+    count, _ = compiled.kernel.search(
+        position=_contiguous(goal.position),
+        rotation=_contiguous(goal.rotation),
+        axis=None if goal.axis is None else np.array(goal.axis),
+        weight=1 / LENGTH,
+        near=chain.angles(near),
+        apart=ISOLATED if chain.n <= size else IN_A_FAMILY,
+        seeds=seeds,
+        patience=PATIENCE,
+        configurations=found,
+        best=best,
+    )
+    q = chain.configurations(np.vstack([found[:count], best]), near)
+    return Branches(q[:-1], q[-1])
+
+
+@lru_cache(maxsize=64)
+def _compiled(robot: Robot, frame: str, lower: bytes, upper: bytes) -> _CompiledChain | None:
+    """The compiled search for a frame, with the table of its seeds; None where there is none."""
+    chain = read_kinematic_chain(robot.model, frame)
+    if chain is None:
+        return None
+    bounds = (np.frombuffer(each)[chain.velocities] for each in (lower, upper))
+    return _CompiledChain(chain, chain.compiled(*bounds))
+
+
+def _contiguous(value: npt.ArrayLike | None) -> Array | None:
+    return None if value is None else np.ascontiguousarray(value)
+
+
+def _beyond_reach(chain: KinematicChain, goal: FrameGoal) -> bool:
+    if goal.position is None:
+        return False
+    first = chain.translations[0]
+    return bool(np.linalg.norm(np.asarray(goal.position) - first) > chain.reach + GOAL_TOLERANCE)
+
+
+def _in_python(
+    robot: Robot, goal: FrameGoal, near: Array, bounds: tuple[Array, Array], most: int, seeds: int
+) -> Branches:
+    """The same without the compiled search."""
+    condition = goal.condition(robot)
+    apart = ISOLATED if robot.nv <= goal.equations else IN_A_FAMILY
+    found: list[Array] = []
+    best, least, since = near, np.inf, 0
+    for q in itertools.islice(candidates(robot, goal, near, *bounds), seeds):
+        error, since = sum(condition.pose_error(q)), since + 1
+        if error < least:
+            best, least = q, error
+        if error <= PYTHON_TOLERANCE and _is_new(robot, q, found, apart):
+            found.append(q)
+            since = 0
+        if len(found) == most or (found and since > PYTHON_PATIENCE):
+            break
+    return Branches(np.array(found).reshape(-1, robot.nq), best)
+
+
+def _is_new(robot: Robot, q: Array, found: list[Array], apart: float) -> bool:
+    return all(np.abs(robot.difference(other, q)).max() >= apart for other in found)

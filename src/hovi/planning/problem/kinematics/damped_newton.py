@@ -1,0 +1,89 @@
+"""Inverse kinematics of any robot: Levenberg-Marquardt from several seeds, in Python.
+
+For frames whose joints the compiled search does not know: those on a floating base, or that mimic
+other joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.planning.problem.frame_goal import FrameCondition, FrameGoal
+from hovi.robot.robot import Robot
+from hovi.system.deadline import raise_if_late
+
+Array = npt.NDArray[np.float64]
+
+MAX_SEEDS = 160
+"""Maximum number of random seeds after the first."""
+MAX_ITERATIONS = 100
+"""Maximum number of steps per seed."""
+RESIDUAL_TOLERANCE = 1e-13
+"""Largest component of the residual at convergence, in [m] or [rad]."""
+MAX_STEP = 0.5
+"""Maximum step of a joint, in [rad] or [m]."""
+STALL_RATIO = 0.98
+"""Ratio of successive residuals above which a step counts as stalled."""
+MAX_STALLED_STEPS = 8
+"""Consecutive stalled steps after which a seed is given up."""
+
+
+def candidates(
+    robot: Robot, goal: FrameGoal, near: Array, lower: Array, upper: Array
+) -> Iterator[Array]:
+    """Where the search from each seed ends: configurations (nq,), whether or not they meet a goal.
+
+    near: the first seed, shape (nq,).
+    lower, upper: position limits, shape (nv,), applied to joints whose q is a plain number.
+    """
+    condition = goal.condition(robot)
+    for seed in seeds(robot, near, lower, upper):
+        raise_if_late()
+        yield _newton(robot, condition, inside(robot, seed, lower, upper), lower, upper)
+
+
+def seeds(robot: Robot, near: Array, lower: Array, upper: Array) -> Iterator[Array]:
+    """The configuration `near`, then reproducible random ones."""
+    yield near
+    random = np.random.default_rng(0)
+    low, high = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    middle, half = (low + high) / 2, (high - low) / 2
+    for i in range(MAX_SEEDS):
+        if i % 2 == 0 or not robot.vector_joints:
+            yield robot.integrate(near, random.uniform(-1, 1, robot.nv) * min(1.0, 0.2 * (i + 1)))
+        else:
+            yield middle + half * random.uniform(-1, 1, robot.nv)
+
+
+def inside(robot: Robot, q: Array, lower: Array, upper: Array) -> Array:
+    """A configuration (nq,) with the joints whose q is a plain number within their limits."""
+    indices, velocities = robot.space.plain
+    clipped = q.copy()
+    clipped[indices] = np.clip(q[indices], lower[velocities], upper[velocities])
+    return clipped
+
+
+def _newton(robot: Robot, condition: FrameCondition, q: Array, lower: Array, upper: Array) -> Array:
+    """Levenberg-Marquardt steps, clipped to the limits."""
+    v = np.zeros(robot.nv)
+    c, J = condition.evaluate(q, v)
+    damping, stalled = 1e-2, 0
+    for _ in range(MAX_ITERATIONS):
+        if np.max(np.abs(c)) <= RESIDUAL_TOLERANCE:
+            break
+        A = J[:, 0]
+        step = -A.T @ np.linalg.solve(A @ A.T + damping * np.eye(len(c)), c)
+        step *= min(1.0, MAX_STEP / max(float(np.max(np.abs(step))), 1e-300))
+        candidate = inside(robot, robot.integrate(q, step), lower, upper)
+        new, slope = condition.evaluate(candidate, v)
+        share = np.linalg.norm(new) / np.linalg.norm(c)
+        if share < 1.0:
+            q, c, J = candidate, new, slope
+        damping = max(0.2 * damping, 1e-14) if share < 1.0 else 8.0 * damping
+        stalled = stalled + 1 if share > STALL_RATIO else 0
+        if stalled >= MAX_STALLED_STEPS:
+            break
+    return q

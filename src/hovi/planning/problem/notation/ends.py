@@ -1,0 +1,123 @@
+"""Starts, goals and via points from tables, in the words of a scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy.typing as npt
+
+from hovi.checks.kinds import shown
+from hovi.discrete.state import State, as_state
+from hovi.errors import InputError, nearest
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.goals import Via
+from hovi.planning.problem.kinematics.orientation import ORIENTATIONS
+from hovi.robot.robot import Robot
+
+End = State | FrameGoal | npt.ArrayLike | str | Mapping[str, Any]
+"""A start or a goal as it may be given."""
+
+FRAME_KEYS = ("pose", "position", "rotation", *ORIENTATIONS, "axis", "guess")
+"""Keys of a table that belong to a frame's target; free_velocity belongs to both."""
+STATE_KEYS = ("q", "v", "a", "free", "free_acceleration", "turns")
+"""Keys of a table that belong to a state."""
+_NAMES = {"free", "free_velocity", "free_acceleration"}
+"""Keys with names of joints."""
+END_KEYS = ("frame", "free_velocity", *FRAME_KEYS, *STATE_KEYS)
+
+
+class EndError(InputError):
+    """A table of an end is wrong at one of its keys: `key`, or None for the whole table."""
+
+    def __init__(self, sentence: str = "", key: str | None = None) -> None:
+        super().__init__(sentence)
+        self.key = key
+
+    def __reduce__(self) -> tuple[type[EndError], tuple[str, str | None]]:
+        """Pickled with its key."""
+        return type(self), (str(self), self.key)
+
+
+def as_end(given: End, robot: Robot, name: str) -> State | FrameGoal:
+    """A start or a goal from a state, a frame goal, a configuration, a pose's name or a table.
+
+    A table has joint names and positions, or the keys of [start] and [goal] in a scene file.
+    name: "start" or "goal". Raises InputError.
+    """
+    if isinstance(given, FrameGoal):
+        return given
+    if isinstance(given, Mapping) and _is_end_table(given, robot):
+        given = end_of(given, name)
+        if isinstance(given, FrameGoal):
+            given.check(robot)
+            return given
+    state = as_state(given, robot, name)
+    if not isinstance(given, State):
+        state.on(robot, name)
+    return state
+
+
+def as_via(given: Any, number: int) -> Via:
+    """A via point from a Via, or from a table as [[via]] in a scene file. Raises InputError."""
+    if isinstance(given, Via):
+        return given
+    if not isinstance(given, Mapping):
+        raise InputError(
+            "via must be a list of hovi.Via(time, goal), or of tables with a time and a goal, got "
+            f"{shown(given)}."
+        )
+    name, table = f"via[{number}]", dict(given)
+    if "time" not in table:
+        raise EndError(f"`{name}.time` is missing.", "time")
+    time = table.pop("time")
+    require_no_rates(table)
+    return Via(time, end_of(table, name))
+
+
+def require_no_rates(table: Mapping[str, Any]) -> None:
+    """Raise EndError for keys of a state that via points do not take."""
+    for key in ("a", "free_acceleration"):
+        if _is_given(table.get(key)):
+            raise EndError(f"a via point takes no `{key}`: leave it out.", key)
+
+
+def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
+    """The state or the frame goal of a table with END_KEYS. name: in messages, such as "start".
+
+    Raises InputError for unknown keys, keys that do not belong together, and invalid values.
+    """
+    given = {key: value for key, value in table.items() if _is_given(value)}
+    for key in _NAMES & given.keys():
+        given[key] = tuple(given[key]) if isinstance(given[key], list) else given[key]
+    for key in given:
+        if key not in END_KEYS:
+            raise EndError(f"unknown key `{name}.{key}`; {nearest(str(key), END_KEYS)}", None)
+    if "frame" not in given:
+        for key in FRAME_KEYS:
+            if key in given:
+                raise EndError(f"`{key}` needs a `frame`.", key)
+        if "q" not in given:
+            raise EndError(f"`{name}` needs q, or a frame and its target.")
+        return State(given.pop("q"), given.pop("v", None), **given)
+    for key in STATE_KEYS:
+        if key in given:
+            what = "a start" if name == "start" else "a goal"
+            raise EndError(f"{what} of a `frame` takes no `{key}`: leave it out.", key)
+    axis = given.get("axis")
+    if isinstance(axis, Mapping):
+        if axis.keys() != {"frame", "world"}:
+            raise EndError(f"`{name}.axis` needs two directions, `frame` and `world`.", "axis")
+        given["axis"] = (axis["frame"], axis["world"])
+    return FrameGoal(given.pop("frame"), **given)
+
+
+def _is_end_table(given: Mapping[str, Any], robot: Robot) -> bool:
+    """Whether a mapping is a table of an end rather than of joints."""
+    joints = set(robot.joint_names)
+    return not any(key in joints for key in given) and any(key in END_KEYS for key in given)
+
+
+def _is_given(value: Any) -> bool:
+    """Whether there is a value, be it an empty one."""
+    return value is not None

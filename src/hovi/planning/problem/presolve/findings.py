@@ -1,0 +1,70 @@
+"""What is found about a problem before it is solved: why it has no motion, and what looks wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hovi.discrete.state import Periodic, State
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.problem.presolve.end_torques import held_still
+from hovi.planning.problem.presolve.legs import Stop, frame_too_far
+from hovi.planning.problem.presolve.length_slips import length_slips
+from hovi.planning.problem.problem import TrajectoryProblem
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What is known before a solve.
+
+    reason: why there is no motion, as a clause; "" if nothing is known against it.
+    warnings: sentences about what is possible, but probably not what was meant.
+    """
+
+    reason: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def findings(
+    problem: TrajectoryProblem, start: State | FrameGoal, goal: State | FrameGoal | Periodic
+) -> Findings:
+    """What is found about a problem of a robot, within a fraction of a second.
+
+    start, goal: as they were given; those of the problem may be one of several configurations.
+    """
+    limits = problem.limits or no_limits(problem.coordinates)
+    warnings = [*_slips(problem)]
+    if not problem.limited:
+        return Findings("", tuple(warnings))
+    at_frame = isinstance(start, FrameGoal)  # of which the problem has one configuration alone
+    reason = "" if at_frame else contradiction(problem, limits)
+    if reason or isinstance(goal, Periodic):
+        return Findings(reason, tuple(warnings))
+    stops = [Stop("start", 0.0, start), *(_via(problem)), Stop("goal", problem.grid.duration, goal)]
+    short = frame_too_far(problem.robot, stops, limits)
+    if short is not None and short.certain:
+        return Findings(short.clause, tuple(warnings))
+    if short is not None:
+        warnings.append(f"{short.clause}.")
+    if not at_frame:
+        warnings += [
+            f"{clause}: the motion has to begin or end with an acceleration there, and may not "
+            "exist; reduce the load, or change the ends or the limits."
+            for clause in held_still(problem, limits)
+        ]
+    return Findings("", tuple(warnings))
+
+
+def _via(problem: TrajectoryProblem) -> list[Stop]:
+    stops = [Stop(f"via point at {via.time:g} s", via.time, via.goal) for via in problem.via]
+    return sorted(stops, key=lambda stop: stop.time)
+
+
+def _slips(problem: TrajectoryProblem) -> list[str]:
+    states = [(x.goal, x.name) for x in _via(problem) if isinstance(x.goal, State)]
+    inner = [state.on(problem.robot, name)[0] for state, name in states]
+    q = [problem.boundary[0], *inner]
+    ends = [] if isinstance(problem.goal, FrameGoal) else [problem.boundary[2]]
+    return list(length_slips(problem.scene, problem.clearance or Clearance(), [*q, *ends]))

@@ -1,0 +1,246 @@
+"""Durations that are too short: lower bounds of the time between what a motion has to meet.
+
+Between two states the bound is that of the slowest joint. From a state to a frame at its goal the
+joints have to be within what they travel in the time: if inverse kinematics finds no configuration
+there, a proof is tried, and what is not proven is a warning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.state import State
+from hovi.dynamics.kinematic_chain import read_kinematic_chain
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.kinematics.branches import find_branches
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.presolve.least_time import Pace, Rests
+from hovi.planning.problem.presolve.reach_in_boxes import proven_out_of_reach
+from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
+from hovi.robot.tip_frame import moves_frame
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+SEEDS = 1000
+"""Number of seeds of inverse kinematics within what the joints travel."""
+BRANCHES = 16
+"""Number of configurations whose times are compared."""
+BISECTIONS = 6
+"""Halvings of the least time at which inverse kinematics finds a configuration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stop:
+    """What a motion meets at a time, in [s]. name: in messages, such as "goal"."""
+
+    name: str
+    time: float
+    goal: State | FrameGoal
+
+    def position(self, on: Coordinates) -> tuple[Array, Mask]:
+        """The configuration (nq,), and which of its entries are prescribed, (nv,)."""
+        assert isinstance(self.goal, State)
+        q, _ = self.goal.on(on, self.name)
+        return q, ~self.goal.free_on(on, self.name)[0]
+
+    def rests(self, on: Coordinates) -> Mask:
+        """At which joints the velocity is prescribed to be zero, (nv,)."""
+        inner = self.name not in ("start", "goal")
+        goal = self.goal
+        if inner and (isinstance(goal, FrameGoal) or goal.v is None):
+            return np.zeros(on.nv, dtype=bool)
+        if isinstance(goal, FrameGoal):
+            free = State(np.zeros(0), free_velocity=tuple(goal.free_velocity))
+            return np.asarray(~free.free_on(on, self.name)[1])
+        return np.asarray((goal.on(on, self.name)[1] == 0.0) & ~goal.free_on(on, self.name)[1])
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A clause about a motion. certain: whether no motion exists."""
+
+    clause: str
+    certain: bool
+
+
+def states_too_far_apart(coordinates: Coordinates, stops: Sequence[Stop], limits: Limits) -> str:
+    """Which joint cannot travel between two of the states in time, as a clause; "" if all can.
+
+    stops: by ascending time; those at frames are left out.
+    """
+    if limits.parts or not limits.bounded[1:3].any():
+        return ""
+    pace = Pace.of(limits)
+    states = [stop for stop in stops if isinstance(stop.goal, State)]
+    for first, last in combinations(states, 2):
+        clause = _between_states(_Leg(first, last, coordinates, pace, limits))
+        if clause:
+            return clause
+    return ""
+
+
+def frame_too_far(robot: Robot, stops: Sequence[Stop], limits: Limits) -> Finding | None:
+    """The frame that is too far from one of the states, a certain finding if there is one.
+
+    stops: by ascending time. Legs between two frames are not looked at.
+    """
+    if limits.parts or not limits.bounded[1:3].any():
+        return None
+    pace, unsure = Pace.of(limits), None
+    for first, last in combinations(stops, 2):
+        if isinstance(first.goal, State) != isinstance(last.goal, State):
+            found = _FrameLeg(first, last, robot, pace, limits).finding()
+            if found is not None and found.certain:
+                return found
+            unsure = unsure or found
+    return unsure
+
+
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """A part of a motion between two stops."""
+
+    first: Stop
+    last: Stop
+    coordinates: Coordinates
+    pace: Pace
+    limits: Limits
+
+    @property
+    def time(self) -> float:
+        """The time between the stops, in [s]."""
+        return self.last.time - self.first.time
+
+    @property
+    def rests(self) -> Rests:
+        """Number of stops at which each joint rests, (nv,)."""
+        first, last = (stop.rests(self.coordinates) for stop in (self.first, self.last))
+        return first.astype(np.intp) + last
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is the whole motion."""
+        return (self.first.name, self.last.name) == ("start", "goal")
+
+    @property
+    def between(self) -> str:
+        """The two stops in a sentence, unless they are both ends."""
+        return "" if self.whole else f" from the {self.first.name} to the {self.last.name}"
+
+
+def _between_states(leg: _Leg) -> str:
+    """The joint that cannot travel its distance in time."""
+    on = leg.coordinates
+    (q0, held), (q1, also) = leg.first.position(on), leg.last.position(on)
+    distance = np.where(held & also, on.difference(q0, q1), 0.0)
+    needed = leg.pace.least_time(distance, leg.rests)
+    i = int(np.argmax(needed))
+    if needed[i] <= leg.time:
+        return ""
+    units, kinds = on.coordinate_units[i], []
+    for row, kind in ((1, "velocity"), (2, "acceleration")):
+        if leg.limits.bounded[row, i] and (row == 1 or leg.rests[i]):
+            most = leg.limits.upper[row, i] if distance[i] >= 0 else -leg.limits.lower[row, i]
+            kinds.append((kind, f"{kind} limit of {most:.4g} {units[row]}"))
+    what = "duration" if leg.whole else "time"
+    return (
+        f"joint {on.coordinate_names[i]!r} has to move by {abs(distance[i]):.4g} {units.q}"
+        f"{leg.between}, which takes {needed[i]:.4g} s at its "
+        f"{' and '.join(text for _, text in kinds)}, longer than the {what} of {leg.time:.4g} s; "
+        f"increase the {what} or the {' or '.join(kind for kind, _ in kinds)} limit"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameLeg(_Leg):
+    """A part of a motion between a state and a frame at its goal."""
+
+    coordinates: Robot
+
+    @property
+    def known(self) -> Stop:
+        """The stop that is a state."""
+        return self.first if isinstance(self.first.goal, State) else self.last
+
+    @property
+    def _other(self) -> Stop:
+        return self.last if self.known is self.first else self.first
+
+    def finding(self) -> Finding | None:
+        """The frame that cannot be at its goal in time."""
+        robot = self.coordinates
+        goal = self._other.goal
+        assert isinstance(goal, FrameGoal)
+        q, held = self.known.position(robot)
+        if not held[moves_frame(robot.model, goal.frame)].all():
+            return None
+        bounds = self.limits.lower[0], self.limits.upper[0]
+        found = find_branches(robot, goal, q, bounds, BRANCHES, SEEDS).q
+        if len(found) == 0:
+            return None  # out of reach, whatever the time
+        away = robot.difference(q, found) * (1 if self.known is self.first else -1)
+        longest = float(self.pace.least_time(away, self.rests).max(axis=1).min())
+        if longest <= self.time or self._meets(goal, q, self.time):
+            return None
+        needed = self._least_found(goal, q, longest)
+        limits = "velocity and acceleration limits" if self._accelerated else "velocity limits"
+        where = f"{self._other.name}{self.between}"
+        nearest = f"at the {limits} the nearest configuration found takes {needed:.3g} s"
+        advice = "increase the duration or the limits"
+        if self._proven(goal, q):
+            what = f"frame {goal.frame!r} cannot be at the {where} within {self.time:.4g} s"
+            return Finding(f"{what}: {nearest}; {advice}", True)
+        what = f"frame {goal.frame!r} has to be at the {where} within {self.time:.4g} s"
+        return Finding(f"{what}, but {nearest}: probably no motion exists; {advice}", False)
+
+    @property
+    def _accelerated(self) -> bool:
+        """Whether limits on the acceleration count."""
+        return bool((self.limits.bounded[2] & (self.rests > 0)).any())
+
+    def _meets(self, goal: FrameGoal, q: Array, time: float) -> bool:
+        """Whether a configuration at the goal is found that the joints reach in a time."""
+        bounds = self._box(q, time)
+        return len(find_branches(self.coordinates, goal, q, bounds, 1, SEEDS).q) > 0
+
+    def _least_found(self, goal: FrameGoal, q: Array, longest: float) -> float:
+        """The least time, from above, in which a configuration is found to be reached, in [s]."""
+        least = self.time
+        for _ in range(BISECTIONS):
+            middle = (least + longest) / 2
+            meets = self._meets(goal, q, middle)
+            least, longest = (least, middle) if meets else (middle, longest)
+        return longest
+
+    def _proven(self, goal: FrameGoal, q: Array) -> bool:
+        chain = read_kinematic_chain(self.coordinates.model, goal.frame)
+        if chain is None:
+            return False
+        at = chain.angles(q)
+        down, up = self._travel(self.time)
+        lower, upper = at - down[chain.velocities], at + up[chain.velocities]
+        bounded = ~chain.continuous  # an angle and its full turns are one position
+        slack = self.limits.tolerance * self.limits.ranges[0][chain.velocities]
+        low, high = (x[0][chain.velocities] for x in (self.limits.lower, self.limits.upper))
+        lower = np.where(bounded, np.maximum(lower, low - slack), lower)
+        upper = np.where(bounded, np.minimum(upper, high + slack), upper)
+        return proven_out_of_reach(chain, goal, lower, np.maximum(lower, upper))
+
+    def _box(self, q: Array, time: float) -> tuple[Array, Array]:
+        """Bounds of the joints around a configuration, shape (nv,), for inverse kinematics."""
+        down, up = self._travel(time)
+        near = self.coordinates.difference(self.coordinates.neutral(), q)
+        lower, upper = self.limits.lower[0], self.limits.upper[0]
+        return np.maximum(lower, near - down), np.minimum(upper, near + up)
+
+    def _travel(self, time: float) -> tuple[Array, Array]:
+        """How far down and up the other stop's joints are at most from the known one's, (nv,)."""
+        down, up = self.pace.travel(time, self.rests)
+        return (down, up) if self.known is self.first else (up, down)

@@ -1,0 +1,142 @@
+"""Seams: nodes where the segments of a motion meet, and what the goals of segments fix there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.guess import Curve, joined, named_curve
+from hovi.discrete.interval_paths import path_of_order, regularized_nodes
+from hovi.discrete.path_of_any_order import hermite
+from hovi.planning.problem.goals import Via, goal_state, via_conditions
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.node_conditions import NodeCondition
+from hovi.robot.space.coordinates import Coordinates
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Seam(Via):
+    """The end of a segment: a goal on the way, at rest unless its velocity is given or free.
+
+    What it prescribes of joints are no equations with multipliers, as those of a via point, but no
+    unknowns, as at the ends of a motion. For joints with nq = nv, which segments have.
+
+    unreachable: why there is no such motion, or "".
+    """
+
+    unreachable: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """What is fixed at a node, and what an initial guess has there.
+
+    node: its index. time: in [s]. q, v: shape (nv,). fixed: which of their components are no
+    unknowns, shape (2, nv).
+    """
+
+    node: int
+    time: float
+    q: Array
+    v: Array
+    fixed: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class ViaPoints:
+    """What the via points of a problem ask for.
+
+    conditions: equations at nodes. holds: of seams, by ascending time. reason: why one of them
+    cannot be met, or "".
+    """
+
+    conditions: tuple[NodeCondition, ...]
+    holds: tuple[Hold, ...]
+    reason: str
+
+    @classmethod
+    def of(
+        cls,
+        via: Sequence[Via],
+        grid: Grid,
+        coordinates: Coordinates,
+        near: Array,
+        limits: Limits | None,
+    ) -> Self:
+        """Those of a motion on a grid.
+
+        near: the first seed of inverse kinematics, shape (nq,); that of a seam is the configuration
+            at the last one.
+        """
+        conditions: list[NodeCondition] = []
+        holds: list[Hold] = []
+        reason = ""
+        for each in sorted(via, key=lambda each: isinstance(each, Seam) * each.time):
+            name, node = f"via point at {each.time:g} s", grid.node_at(each.time)
+            seed = holds[-1].q if holds else near
+            bounds = None if limits is None else limits.until(each.time)
+            reached = goal_state(each.goal, name, coordinates, seed, bounds)
+            wanted = via_conditions(each, reached, coordinates)
+            if isinstance(each, Seam):
+                wanted = reached.conditions
+                fixed = ~reached.state.free_on(coordinates, "via")
+                holds.append(Hold(node, each.time, *reached.state.on(coordinates, "via"), fixed))
+            conditions += [NodeCondition(node, condition) for condition in wanted]
+            reason = reason or getattr(each, "unreachable", "") or reached.reason
+        return cls(tuple(conditions), tuple(holds), reason)
+
+
+def holding(path: DiscretePath, grid: Grid, holds: Sequence[Hold]) -> DiscretePath:
+    """The path with what is fixed at its nodes, for joints with nq = nv."""
+    if not holds:
+        return path
+    change = np.zeros((grid.intervals + 1, grid.order, path.v.shape[1]))
+    for each in holds:
+        known = each.q - path.q[each.node], each.v - path.v[each.node]
+        change[each.node, :2] = np.where(each.fixed, known, 0.0)
+    if not change.any():
+        return path
+    q, rates = path.q + change[:, 0], path.rates + change[:, 1:]
+    z = path.z + regularized_nodes(change, grid.steps)
+    for each in holds:  # to the last digit
+        q[each.node] = np.where(each.fixed[0], each.q, q[each.node])
+        rates[each.node, 0] = np.where(each.fixed[1], each.v, rates[each.node, 0])
+    return path_of_order(grid.order, q, rates, z, path.inner, grid.steps)
+
+
+def curve_through(
+    name: str, coordinates: Coordinates, ends: Sequence[Any], holds: Sequence[Hold], duration: float
+) -> Curve:
+    """The initial guess with a name between all neighbouring seams and ends.
+
+    A free velocity at a seam is the mean one of the motion between its neighbours, and zero where
+    it would reverse. For orders other than 2 the Hermite polynomials between them.
+    ends: (q, q', ..., q^(k-1)) at the start and at the goal, two rows each.
+    duration: T, in [s].
+    """
+    times = np.array([0.0, *(each.time for each in holds), duration])
+    nodes = np.zeros((len(times), len(ends), coordinates.nv))
+    nodes[[0, -1]] = np.stack(ends, axis=1)
+    for node, each in zip(nodes[1:-1], holds, strict=True):
+        node[:2] = each.q, each.v
+    slopes = np.diff(nodes[:, 0], axis=0) / np.diff(times)[:, None]
+    mean = (nodes[2:, 0] - nodes[:-2, 0]) / (times[2:] - times[:-2])[:, None]
+    mean[slopes[1:] * slopes[:-1] <= 0] = 0.0
+    free = ~np.array([each.fixed[1] for each in holds])
+    nodes[1:-1, 1][free] = mean[free]
+    pieces = []
+    for (one, other), T in zip(pairwise(nodes), np.diff(times), strict=True):
+        boundary = (one[0], one[1], other[0], other[1])
+        smooth = len(one) > 2
+        piece = hermite(np.stack([one, other]), T) if smooth else None
+        pieces.append(piece or named_curve(name, coordinates, boundary, T))
+    return joined(pieces, times[:-1])

@@ -1,0 +1,98 @@
+"""A plan for a group of the robot's joints, as its SRDF names them, with the rest held."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.state import ALL, State
+from hovi.errors import InputError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.inverse_kinematics import first_configuration, position_bounds
+from hovi.robot.loading import with_locked
+from hovi.robot.robot import Robot
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+
+def in_group(
+    scene: Scene, group: str, start: State | FrameGoal, goal: State | FrameGoal
+) -> tuple[Scene, State | FrameGoal, State | FrameGoal]:
+    """The scene and the ends of a motion of a group's joints alone.
+
+    The others are locked where they are at the start; the goal has to leave them there. Where the
+    start is a FrameGoal they are at its guess, or at their neutral configuration.
+    Raises InputError for an unknown group, a goal that moves other joints, or vectors of another
+    length.
+    """
+    robot = scene.robot
+    chosen = robot.semantics.joints_of(group, robot.model)
+    others = tuple(joint for joint in robot.joint_names if joint not in chosen)
+    if len(others) == len(robot.joint_names):
+        raise InputError(f"group {group!r} has no joint that moves: name another one.")
+    if not others:
+        return scene, start, goal
+    q = _whole(robot, start)
+    angles = robot.difference(robot.neutral(), q)
+    held = tuple((joint, float(angles[robot.entries_of(joint)][0])) for joint in others)
+    for joint in others:
+        part = robot.entries_of(joint)
+        moved = goal.on(robot, "goal")[0] if isinstance(goal, State) else q
+        if np.abs(robot.difference(q, moved)[part]).max() > 1e-9:
+            raise InputError(
+                f"joint {joint!r} is not in group {group!r}, and the goal moves it: give it the "
+                "position of the start, or leave the group out."
+            )
+    smaller = _scene(scene, held)
+    return smaller, _end(start, robot, smaller.robot), _end(goal, robot, smaller.robot)
+
+
+@lru_cache(maxsize=16)
+def _scene(scene: Scene, held: tuple[tuple[str, float], ...]) -> Scene:
+    """The scene without some joints, the same one for the same positions."""
+    robot, names = with_locked(scene.robot, dict(held)), {joint for joint, _ in held}
+    passive = tuple(joint for joint in scene.passive if joint not in names)
+    return dataclasses.replace(scene, robot=robot, passive=passive)
+
+
+def _whole(robot: Robot, end: State | FrameGoal) -> Array:
+    """The configuration of an end, shape (nq,)."""
+    if isinstance(end, State):
+        return end.on(robot, "start")[0]
+    return first_configuration(robot, end, None, position_bounds(robot, "none"))
+
+
+def _end(end: State | FrameGoal, robot: Robot, smaller: Robot) -> State | FrameGoal:
+    """An end of the motion with the joints that the smaller robot has."""
+    kept_q, kept_v = (_entries(robot, smaller, key) for key in ("nq", "nv"))
+    if isinstance(end, FrameGoal):
+        guess = None if end.guess is None else np.asarray(end.guess)[kept_q]
+        return dataclasses.replace(end, guess=guess)
+    changed: dict[str, Any] = {
+        key: None if getattr(end, key) is None else np.asarray(getattr(end, key))[kept_v]
+        for key in ("v", "a", "jerk")
+    }
+    free: dict[str, Any] = {
+        key: tuple(
+            joint
+            for joint in getattr(end, key)
+            if joint == ALL or joint.split("[")[0] in smaller.joint_names
+        )
+        for key in ("free", "free_velocity", "free_acceleration", "free_jerk")
+    }
+    return dataclasses.replace(end, q=np.asarray(end.q, dtype=float)[kept_q], **changed, **free)
+
+
+def _entries(robot: Robot, smaller: Robot, size: str) -> list[int]:
+    """The entries of q (size "nq") or v ("nv") of the joints that the smaller robot has."""
+    entries: list[int] = []
+    for name in smaller.joint_names:
+        joint = robot.model.joints[robot.model.getJointId(name)]
+        first = joint.idx_q if size == "nq" else joint.idx_v
+        entries += range(first, first + getattr(joint, size))
+    return entries

@@ -1,0 +1,84 @@
+"""The best duration by one solve for the motion and the duration, where a problem supports that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.continuation import STOPPED
+from hovi.planning.search.free_duration import (
+    DURATION_PRECISION,
+    MAX_STRIDE,
+    BestDuration,
+    FreeDuration,
+    SolveFor,
+    best_duration,
+    ended_search,
+)
+from hovi.planning.solver.free_duration.joint_solve import solve_jointly, solves_jointly
+from hovi.planning.solver.free_duration.timed_path import TimePrice
+from hovi.planning.solver.solver import Solution
+
+JointSolve = Callable[[Solution], Solution | None]
+"""Solves for the duration, too, from a motion; None for a problem that does not support it."""
+
+STATIONARY_SLOPE = 1e-9
+"""Slope J' + w of a minimum whose duration is the best, relative to (J + w T) / T."""
+_BEST = "The best duration is"
+
+
+def joint_minimum(
+    free: FreeDuration,
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    max_iterations: int,
+    time_limit: float | None,
+    near: bool = False,
+) -> Solution | None:
+    """A minimum in the motion and the duration, or the best motion if the solve was stopped.
+
+    None for a problem that does not support it, or if no minimum was found.
+    near: whether the path nearly is a solution. Other arguments as of `solve_jointly`.
+    """
+    if not solves_jointly(problem):
+        return None
+    price = TimePrice(free.weight, free.lower, free.upper)
+    found = solve_jointly(
+        problem, path, price, max_iterations=max_iterations, time_limit=time_limit, near=near
+    )
+    return found if found.success or found.status in STOPPED else None
+
+
+def best_duration_by(
+    free: FreeDuration,
+    solve: SolveFor,
+    first: Solution,
+    stride: float = MAX_STRIDE,
+    jointly: JointSolve | None = None,
+) -> BestDuration:
+    """As best_duration, by a joint solve where that finds a minimum.
+
+    A joint minimum is one in the duration, too, or the duration is a bound beyond which J + w T
+    decreases. Without one, the duration is searched for by solves for given ones.
+    """
+    if jointly is None or not first.success:
+        return best_duration(free, solve, first, stride)
+    ending = _ending(free, first)
+    if ending:
+        return BestDuration(free, first, first.nit, ending)
+    found = jointly(first)
+    if found is None:
+        return best_duration(free, solve, first, stride)
+    best = BestDuration(free, found, first.nit + found.nit, _ending(free, found) or _BEST)
+    return best if found.success else best.unfinished(found.status, ended_search(found.status))
+
+
+def _ending(free: FreeDuration, solution: Solution) -> str:
+    """Words of the message before the duration of a minimum, if that is the best; else ""."""
+    T, slope = solution.trajectory.duration, solution.duration_derivative + free.weight
+    bound = free.lower if slope > 0 else free.upper
+    if abs(T / bound - 1) <= DURATION_PRECISION:
+        return "The duration is kept at its bound,"
+    total = solution.cost + free.weight * T
+    return _BEST if abs(slope) <= STATIONARY_SLOPE * abs(total) / T else ""

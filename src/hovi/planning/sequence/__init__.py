@@ -1,0 +1,1 @@
+"""Sequences: several motions, one after the other, planned as one."""

@@ -1,0 +1,132 @@
+"""Which configurations the frame goals of a sequence are met in: the cheapest way through them all.
+
+Every goal of a frame has several branches of inverse kinematics, and the choice of one goal's
+branch changes what the next one costs. The branches are a graph in layers, whose edges cost what
+the cubic between two configurations at rest does; its shortest path is found by dynamic
+programming. Free velocities, limits and obstacles on the way are not part of this choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.state import State
+from hovi.errors import UnreachableError
+from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.inverse_kinematics import Bounds, configurations, first_configuration
+from hovi.robot.robot import Robot
+from hovi.scene.lagrangian import Lagrangian
+
+Array = npt.NDArray[np.float64]
+End = State | FrameGoal
+
+COMPARED = 8
+"""Number of branches of a goal that are compared, the nearest ones to the goal before it."""
+UNKNOWN_COST = 1e200
+"""Cost of a cubic whose cost is not finite."""
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(8)
+"""Gauss points in [-1, 1] and their weights, by which the cost of a cubic is integrated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A part of a sequence between two goals.
+
+    numbers: of its segments, from 0. begin, end: in [s]. goal: at its end. bounds: of q there.
+    """
+
+    numbers: tuple[int, ...]
+    begin: float
+    end: float
+    goal: End
+    bounds: Bounds
+
+
+@dataclass(frozen=True, eq=False)
+class _Layer:
+    """The branches of a goal: q of shape (K, nq), and the one chosen before each, (K,).
+
+    known: whether they meet the goal, or stand for one that cannot be met.
+    """
+
+    q: Array
+    cost: Array
+    before: npt.NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    known: bool = True
+
+
+def chosen_branches(
+    robot: Robot,
+    lagrangian: Lagrangian,
+    start: Leg,
+    legs: Sequence[Leg],
+    clearance: Clearance,
+) -> tuple[State, list[End]]:
+    """The start as a state, and the goals with the branch in which each is met as their guess.
+
+    lagrangian: of the whole sequence, for joints with nq = nv. start: whose goal the start is.
+    Goals that cannot be met stay as they are.
+    Raises UnreachableError for a start that cannot be met.
+    """
+    for each in (start, *legs):
+        if isinstance(each.goal, FrameGoal):
+            each.goal.check(robot)
+    first = _branches(robot, start, None, clearance)
+    layers = [_Layer(first, np.zeros(len(first)))]
+    for leg in legs:
+        layers.append(_next_layer(robot, lagrangian, leg, layers[-1], clearance))
+    chosen = int(np.argmin(layers[-1].cost))
+    goals: list[End] = []
+    for leg, layer in zip(reversed(legs), reversed(layers[1:]), strict=True):
+        goal = leg.goal
+        if isinstance(goal, FrameGoal) and layer.known:
+            goal = replace(goal, guess=layer.q[chosen])
+        goals.insert(0, goal)
+        chosen = int(layer.before[chosen])
+    begin = start.goal
+    if isinstance(begin, FrameGoal):
+        begin = State(layers[0].q[chosen], free_velocity=tuple(begin.free_velocity))
+    return begin, goals
+
+
+def _next_layer(
+    robot: Robot, lagrangian: Lagrangian, leg: Leg, last: _Layer, clearance: Clearance
+) -> _Layer:
+    """The branches of a leg's goal, with the least cost at which each is reached."""
+    try:
+        q, known = _branches(robot, leg, last.q[0], clearance), True
+    except UnreachableError:
+        q, known = last.q[:1], False
+    K, M = len(last.q), len(q)
+    pairs = np.repeat(last.q, M, axis=0), np.tile(q, (K, 1))
+    cost = last.cost[:, None] + _costs(lagrangian, leg, *pairs).reshape(K, M)
+    cost = np.where(np.isfinite(cost), cost, UNKNOWN_COST)
+    before = np.argmin(cost, axis=0)
+    return _Layer(q, cost[before, np.arange(M)], before, known)
+
+
+def _branches(robot: Robot, leg: Leg, near: Array | None, clearance: Clearance) -> Array:
+    """Configurations at the goal of a leg, shape (K, nq): that at the guess alone if it has one."""
+    end = leg.goal
+    if isinstance(end, State):
+        return end.on(robot, "goal")[0][None]
+    first = first_configuration(robot, end, near if end.guess is None else None, leg.bounds)
+    found = configurations(robot, end, first, leg.bounds, clearance)
+    return found[: 1 if end.guess is not None else COMPARED]
+
+
+def _costs(lagrangian: Lagrangian, leg: Leg, q0: Array, q1: Array) -> Array:
+    """The costs of cubics between pairs of configurations at rest, with nq = nv, shape (P,)."""
+    T, s = leg.end - leg.begin, (POINTS + 1) / 2
+    x = [s**2 * (3 - 2 * s), 6 * s * (1 - s) / T, (6 - 12 * s) / T**2, -12 * s**0 / T**3]
+    step = q1 - q0
+    jet = [(row[:, None, None] * step).reshape(-1, step.shape[1]) for row in x]
+    jet[0] += np.tile(q0, (len(s), 1))
+    t = np.repeat(leg.begin + s * T, len(q0))
+    value = lagrangian.value(*jet[: lagrangian.order + 1], t=t)
+    return np.asarray(WEIGHTS @ value.reshape(len(s), -1)) * T / 2

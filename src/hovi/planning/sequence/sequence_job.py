@@ -1,0 +1,143 @@
+"""The job of a sequence: its grid, its limits and its goals, put together as one problem."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from itertools import accumulate
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import State
+from hovi.errors import InputError
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.seams import Seam
+from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
+from hovi.planning.search.job import Acting, Job, Part
+from hovi.planning.search.options import PlanOptions
+from hovi.planning.search.smoothing import smoothed
+from hovi.planning.sequence.branches import End, Leg, chosen_branches
+from hovi.planning.sequence.contradictory_segment import contradictory_segment
+from hovi.planning.sequence.segment import Segment, names_of
+from hovi.scene.scene import Scene
+from hovi.schemes import of_order
+
+Array = npt.NDArray[np.float64]
+
+LEAST_INTERVALS = 8
+"""Least number of intervals of a segment on the first grid of a refinement."""
+
+
+def job_of(
+    scene: Scene,
+    start: End,
+    goals: Sequence[End | None],
+    segments: Sequence[Segment],
+    options: PlanOptions,
+) -> Job:
+    """The sequence as one job, with branches for goals of frames.
+
+    goals: of the segments, two or more. options: resolved for the scene's robot.
+    Raises InputError, SceneError or UnreachableError for what defines no sequence.
+    """
+    ends = tuple(accumulate(each.duration for each in segments))
+    parts = tuple(
+        Part(end / ends[-1], Acting(tuple(each.effects)))
+        for each, end in zip(segments, ends, strict=True)
+    )
+    limits = limits_of(scene, segments, options)
+    grid = sequence_grid(segments, options, scene.order)
+    first = Job(scene, grid, State(()), State(()), options, parts)
+    legs = _legs(goals, ends, limits)
+    begin = Leg((), 0.0, 0.0, start, (limits[0].lower[0], limits[0].upper[0]))
+    known, reached = chosen_branches(
+        scene.robot, first.lagrangian(), begin, legs, options.clearance
+    )
+    if options.smooth:
+        shortest = min(each.duration for each in segments)
+        scene = smoothed(scene, known, reached[-1], shortest)
+        grid = sequence_grid(segments, options, scene.order)
+    legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
+    job = Job(scene, grid, known, reached[-1], options, parts)
+    reason = contradictory_segment(job, legs, limits, names_of(segments))
+    seams = [Seam(leg.end, leg.goal, unreachable=reason) for leg in legs[:-1]]
+    if any(each.limits is not None for each in segments):
+        job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
+    job = job.with_options(via=(*seams, *options.via))
+    return job.on(grid.with_nodes(job.node_times)) if options.via else job
+
+
+def limits_of(
+    scene: Scene, segments: Sequence[Segment], options: PlanOptions
+) -> tuple[Limits, ...]:
+    """The limits of every segment. Raises InputError for the torque rate, which jumps."""
+    order, found = 3 if options.smooth else scene.order, []
+    for name, each in zip(names_of(segments), segments, strict=True):
+        given = options.limits if each.limits is None else each.limits
+        found.append(as_limits(scene.robot, given, order))
+        if found[-1].on_torque_rate:
+            raise InputError(
+                f"{name!r} has limits on the torque rate, but torques jump where the segments of a "
+                "sequence meet: leave them out, or set torque_rate = 1e16 to have none where an "
+                "arm's own limits have them."
+            )
+    return tuple(found)
+
+
+def sequence_grid(segments: Sequence[Segment], options: PlanOptions, order: int) -> Grid:
+    """The requested grid, or the first of a refinement, with nodes where the segments meet.
+
+    Intervals are of nearly equal length, but every segment has one, or LEAST_INTERVALS where the
+    grid is not given.
+    """
+    durations = np.array([each.duration for each in segments])
+    total, least = options.interval_count, 1
+    if options.tolerance is not None:
+        least, total = LEAST_INTERVALS, min(total, MAX_FIRST_INTERVALS)
+    elif total < len(segments):
+        raise InputError(
+            f"{total} intervals are too few for {len(segments)} segments: use one for each or more."
+        )
+    numbers = _distributed(max(total, least * len(segments)), durations, least)
+    if options.tolerance is not None:
+        grids = [
+            first_grid(T, int(N), smooth=False, order=order)
+            for T, N in zip(durations, numbers, strict=True)
+        ]
+    else:
+        scheme = of_order(options.table, order)
+        grids = [Grid.uniform(T, int(N), scheme) for T, N in zip(durations, numbers, strict=True)]
+    return Grid.joined(grids)
+
+
+def _distributed(total: int, weights: Array, least: int) -> npt.NDArray[np.intp]:
+    """Whole numbers that sum to a total, `least` or more, nearly in proportion to weights.
+
+    total: as large as can be distributed.
+    """
+    numbers = np.maximum(np.floor(total * weights / weights.sum()).astype(np.intp), least)
+    while numbers.sum() > total:
+        reducible = numbers > least
+        numbers[np.argmax(np.where(reducible, numbers / weights, -np.inf))] -= 1
+    while numbers.sum() < total:
+        numbers[np.argmax(weights / numbers)] += 1
+    return np.asarray(numbers)
+
+
+def _legs(
+    goals: Sequence[End | None], ends: Sequence[float], limits: Sequence[Limits]
+) -> list[Leg]:
+    """The parts between goals; a goal has to be within the limits of both segments that it ends."""
+    legs: list[Leg] = []
+    first, begin = 0, 0.0
+    for i, (goal, end) in enumerate(zip(goals, ends, strict=True)):
+        if goal is None:
+            continue
+        both = limits[i : i + 2]
+        lower = np.max([each.lower[0] for each in both], axis=0)
+        upper = np.min([each.upper[0] for each in both], axis=0)
+        legs.append(Leg(tuple(range(first, i + 1)), begin, end, goal, (lower, upper)))
+        first, begin = i + 1, end
+    return legs

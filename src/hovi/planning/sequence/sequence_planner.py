@@ -1,0 +1,149 @@
+"""plan_sequence: several motions, one after the other, as one optimisation on one time axis."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, ParamSpec, Protocol, cast
+
+from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.measures.segment_spans import SEGMENT_NAMES
+from hovi.errors import InputError, expect
+from hovi.planning.problem.notation.ends import End as Start
+from hovi.planning.search.group import in_group
+from hovi.planning.search.job import Acting, Progress
+from hovi.planning.search.option_fields import spell_out
+from hovi.planning.search.options import PlanOptions
+from hovi.planning.search.planner import holding, plan, run, silent, warn_of_ends
+from hovi.planning.search.search import Search
+from hovi.planning.sequence.branches import End
+from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, names_of
+from hovi.planning.sequence.sequence_job import job_of
+from hovi.planning.solver.solver import Solution
+from hovi.scene.scene import Scene
+from hovi.system.blas_threads import one_blas_thread
+from hovi.system.deadline import Deadline
+from hovi.system.interruption import interruptible
+
+Keywords = ParamSpec("Keywords")
+
+
+class _PlanSequence(Protocol[Keywords]):
+    """`plan_sequence` as type checkers see it: with the keywords of PlanOptions."""
+
+    def __call__(
+        self,
+        scene: Scene,
+        start: Start,
+        segments: Sequence[Segment],
+        progress: Progress | None = None,
+        options: PlanOptions | None = None,
+        *_: Keywords.args,
+        **changes: Keywords.kwargs,
+    ) -> Solution:
+        """As `plan_sequence`."""
+        ...
+
+
+def _with_option_keywords(
+    options: Callable[Keywords, PlanOptions],
+) -> Callable[[Callable[..., Solution]], _PlanSequence[Keywords]]:
+    """A decorator that makes the options keywords of the function, for help and type checkers."""
+
+    def taking(function: Callable[..., Solution]) -> _PlanSequence[Keywords]:
+        spell_out(function, PlanOptions)
+        return cast(_PlanSequence[Keywords], function)
+
+    return taking
+
+
+@_with_option_keywords(PlanOptions)
+@check_arguments_except("scene", "start", "segments", "options")
+@one_blas_thread
+@interruptible
+def plan_sequence(
+    scene: Scene,
+    start: Start,
+    segments: Sequence[Segment],
+    progress: Progress | None = None,
+    options: PlanOptions | None = None,
+    **changes: Any,
+) -> Solution:
+    """Motions one after the other, such as move, grasp, move, release, of least cost together.
+
+    The sum of the segments' costs is minimised on one time axis. q and v are continuous where
+    segments meet, and torques jump there if what acts changes: `Trajectory.sample` returns those of
+    the later segment. There are no impacts: what is grasped is at rest, or moves along.
+    Where goals are targets of frames, the branches of inverse kinematics are chosen for all of
+    them together, by the cost of the cubics between them.
+
+    scene: the robot with the effects that act all the time.
+    start: as for `plan`.
+    segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), in order of time; the
+        last one needs a goal.
+    progress: called with a line of text and the completed fraction, in [0, 1].
+    options: a PlanOptions; the following keywords override it. The `intervals` are those of all
+        segments together, and the times of `via` count from the start of the first.
+    {options}
+    Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
+    a start that no configuration meets.
+    """
+    began = time.perf_counter()
+    if not isinstance(scene, Scene):
+        raise InputError(
+            f"plan_sequence takes a hovi.Scene, such as hovi.Scene(robot, [...]), got {scene!r}."
+        )
+    chosen = PlanOptions() if options is None else options
+    expect(chosen, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
+    chosen = chosen.with_changes(**changes)
+    segments = checked_segments(segments, chosen)
+    if len(segments) == 1:
+        return _alone(scene, start, segments[0], progress, chosen)
+    scene, begin, goals = _in_group(holding(scene, chosen), start, segments, chosen)
+    chosen, deadline = chosen.on(scene), Deadline(chosen.time_limit_seconds)
+    with deadline.in_force():
+        job = job_of(scene, begin, goals, segments, chosen)
+        job.problem()  # raises for invalid input before the search
+    warn_of_ends(scene.robot, job.start, job.goal, job.options)
+    solution = run(Search(job, deadline, progress or silent), began)
+    return _named(solution, segments)
+
+
+def _alone(
+    scene: Scene,
+    start: Start,
+    segment: Segment,
+    progress: Progress | None,
+    options: PlanOptions,
+) -> Solution:
+    """The motion of a single segment."""
+    acting = Acting(tuple(segment.effects)).on(scene)
+    if segment.limits is not None:
+        options = options.with_changes(limits=segment.limits)
+    assert segment.goal is not None
+    return plan(acting, start, segment.goal, segment.duration, progress, options)
+
+
+def _in_group(
+    scene: Scene, start: Start, segments: Sequence[Segment], options: PlanOptions
+) -> tuple[Scene, End, tuple[End | None, ...]]:
+    """The scene, the start and the goals, of the chosen group of joints if there is one."""
+    begin = as_goal(start, scene.robot)
+    goals = tuple(None if x.goal is None else as_goal(x.goal, scene.robot) for x in segments)
+    if options.group is None:
+        return scene, begin, goals
+    small, first = scene, begin
+    found: list[End | None] = []
+    for goal in goals:
+        if goal is not None:
+            small, first, goal = in_group(scene, options.group, begin, goal)
+        found.append(goal)
+    return small, first, tuple(found)
+
+
+def _named(solution: Solution, segments: Sequence[Segment]) -> Solution:
+    """The solution with the names of the segments in its motion."""
+    motion = solution.trajectory
+    metadata = {**motion.metadata, SEGMENT_NAMES: list(names_of(segments))}
+    return dataclasses.replace(solution, trajectory=dataclasses.replace(motion, metadata=metadata))

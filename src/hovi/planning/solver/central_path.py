@@ -1,0 +1,60 @@
+"""Points of the central path of a solve within limits, from which nearby problems are solved."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.optimize.barrier import Barrier
+from hovi.planning.solver.limits.limit_rows import LimitRows
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class CentralPath:
+    """Minima of the action with a logarithmic barrier, for falling barrier parameters.
+
+    A motion at its limits is a bad start for another motion, as every step ends at a bound; one
+    with a barrier as large as the difference of the two has room to move.
+
+    points: barrier parameters, relative to the mean density of the cost, descending, and paths.
+    rows: bounded control points; None to build them anew.
+    barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
+    margins: by which its bounds are tightened at the points: see BoundedAction; None for none.
+    """
+
+    points: tuple[tuple[float, DiscretePath], ...]
+    rows: LimitRows | None
+    barrier: Barrier | None = None
+    margins: Array | None = None
+
+    @property
+    def last(self) -> DiscretePath:
+        """The solution."""
+        return self.points[-1][1]
+
+    def at(self, level: float) -> tuple[float, DiscretePath]:
+        """The last point whose parameter is at least a level; the first if there is none."""
+        large = [point for point in self.points if point[0] >= level]
+        return large[-1] if large else self.points[0]
+
+    def ending_at(self, path: DiscretePath) -> CentralPath:
+        """The same with another last path, on the same grid."""
+        level, _ = self.points[-1]
+        return dataclasses.replace(self, points=(*self.points[:-1], (level, path)))
+
+    def on(self, grid: Grid, paths: tuple[DiscretePath, ...]) -> CentralPath:
+        """The same with other paths, on a grid of the same intervals, and with its rows fixed."""
+        rows = None if self.rows is None else self.rows.fixed_on(grid)
+        levels = (level for level, _ in self.points)
+        return CentralPath(tuple(zip(levels, paths, strict=True)), rows)
+
+    def freed(self) -> CentralPath:
+        """The same with rows that may be refined."""
+        rows = None if self.rows is None else self.rows.freed()
+        return CentralPath(self.points, rows)

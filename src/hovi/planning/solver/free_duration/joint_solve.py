@@ -1,0 +1,133 @@
+"""solve_jointly: a motion and its duration, by one solve."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
+from hovi.planning.solver.free_duration.timed_action import TimedAction
+from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
+from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
+from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.solver import LAST_BARRIER, STATIONARY_DECREASE, Solution, solution_of
+from hovi.planning.solver.status import Status, chart_sentence, status_of
+from hovi.system.blas_threads import one_blas_thread
+from hovi.system.deadline import OutOfTimeError
+from hovi.system.interruption import interruptible
+
+
+def solves_jointly(problem: TrajectoryProblem) -> bool:
+    """Whether the duration can be an unknown of a problem's motion.
+
+    Not with equations or obstacles, on which more depends than the discrete Lagrangian and the
+    limits at the points; not with limits on the torque rate, which are imposed after a first solve;
+    nor on grids of so many intervals that they need the merge tree.
+    """
+    simple = not (problem.constrained or problem.periodic or problem.via)
+    timed = problem.ld.lagrangian.timed or problem.ld.segments is not None
+    limits = problem.limits
+    rates = limits is not None and limits.on_torque_rate
+    small = problem.grid.intervals <= MAX_BAND_INTERVALS
+    return simple and not timed and small and not rates and problem.distances is None
+
+
+@one_blas_thread
+@interruptible
+def solve_jointly(
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    price: TimePrice,
+    *,
+    max_iterations: int = 500,
+    time_limit: float | None = None,
+    escape_saddles: bool = True,
+    near: bool = False,
+) -> Solution:
+    """A motion x and a duration T that minimise S(x, T) + w T, with T between bounds.
+
+    n_neg counts the duration among the unknowns, unless it is at a bound. The cost is S alone, and
+    the solution's problem is that of its duration. The best motion so far at a limit.
+
+    problem: one that `solves_jointly`, for any duration. path: the guess, for this duration.
+    price: of time, and the bounds of T. Other arguments as of `solve_on_grid`.
+    """
+    began = time.perf_counter()
+    first, guess = _within(problem, path, price)
+    options = Options(
+        decrease=STATIONARY_DECREASE,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        escape_saddles=escape_saddles,
+        exact=True,
+        near=near,
+        barrier=LAST_BARRIER,
+    )
+    if problem.limited and problem.limits is not None:
+        result = _limited(first, problem.limits, guess, price, options)
+    else:
+        result = _unlimited(first, guess, price, options)
+    return solution_of(result, 0.0, time.perf_counter() - began)
+
+
+def _within(
+    problem: TrajectoryProblem, path: DiscretePath, price: TimePrice
+) -> tuple[TrajectoryProblem, DiscretePath]:
+    """The problem and the guess for the nearest duration within the bounds."""
+    before = problem.grid.duration
+    T = float(np.clip(before, price.lower, price.upper))
+    if before == T:
+        return problem, problem.moved(path)
+    first = problem.on(problem.grid.stretched(T))
+    return first, first.moved(stretched_path(path, T / before))
+
+
+def _unlimited(
+    problem: TrajectoryProblem, guess: DiscretePath, price: TimePrice, options: Options
+) -> MethodResult:
+    """By the trust region."""
+    objective = TimedAction(problem, price)
+    outcome = minimize(objective, TimedPath(guess, problem.grid.duration), options)
+    n_neg = 0 if outcome.convex else _negative_eigenvalues(objective, outcome)
+    T, path = outcome.x.duration, outcome.x.path
+    final = problem.on(problem.grid.stretched(T))
+    cost = outcome.value - price.weight * T
+    at_end = Outcome(path, cost, outcome.stop, outcome.iterations)
+    status, message = status_of(final, at_end, n_neg)
+    message += chart_sentence(final, path)
+    nit, history = outcome.iterations, outcome.history
+    return MethodResult(final, final.moved(path), cost, status, message, nit, n_neg, history)
+
+
+def _limited(
+    problem: TrajectoryProblem,
+    limits: Limits,
+    guess: DiscretePath,
+    price: TimePrice,
+    options: Options,
+) -> MethodResult:
+    """By the interior point, unless limits and ends contradict each other for all durations."""
+    longest = problem.on(problem.grid.stretched(price.upper))
+    reason = contradiction(longest, limits)
+    if reason:
+        message = f"no motion within the limits was found: {reason}."
+        value = problem.ld.action(guess)
+        return MethodResult(problem, guess, value, Status.INFEASIBLE, message)
+    return minimum_within_limits(problem, limits, guess, price, options)
+
+
+def _negative_eigenvalues(objective: TimedAction, outcome: Outcome[TimedPath]) -> int:
+    """n_neg of the exact bordered Hessian; -1 if the value is not finite, or if time runs out."""
+    if outcome.stop is Stop.DIVERGED or not np.isfinite(outcome.value):
+        return -1
+    try:
+        model = objective.model(outcome.x, None, None)
+        return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
+    except OutOfTimeError:
+        return -1

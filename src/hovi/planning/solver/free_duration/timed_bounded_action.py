@@ -1,0 +1,163 @@
+"""The action plus the price of time under limits, with the duration as one more unknown."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.bounded_objective import BoundedObjective, Outputs, Refinement
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.free_duration.duration_border import Forces
+from hovi.planning.solver.free_duration.row_border import RowForces, RowMap
+from hovi.planning.solver.free_duration.timed_model import TimedModel, moved_in_time
+from hovi.planning.solver.free_duration.timed_path import (
+    TimedPath,
+    TimePrice,
+    stretched_problem,
+)
+from hovi.planning.solver.limits.limit_rows import LimitRows
+
+Array = npt.NDArray[np.float64]
+
+
+DURATION_METRIC = 100.0
+"""Entry of log T in the metric: with the first radius of 10 it may change by 1, since only longer
+motions may be within the limits at all."""
+
+
+class TimedBoundedAction(BoundedObjective[TimedPath]):
+    """S(x, T) + w T in the columns x of the path and log T, with bounded outputs at the points.
+
+    The points have the weights h w of the first duration T0: those of the barrier do not depend on
+    the unknowns, and the forces of limits count T0 / T times in the integral over T.
+
+    problem: with limits, without obstacles and equations, on a grid that the band supports, for the
+    duration T0. limits, margins, rows: as for BoundedAction. price: of time.
+    """
+
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        limits: Limits,
+        margins: Array | None,
+        price: TimePrice,
+        rows: LimitRows,
+    ) -> None:
+        self.problem = problem
+        self.limits = limits
+        self.margins = margins
+        self.price = price
+        self.rows = rows
+        self._at: dict[float, _AtDuration] = {}
+        self._first = self.at(problem.grid.duration)
+        self.bounds = self._first.bounds
+        self._slopes: list[Array] = []
+        self._stretch = np.zeros(0)
+
+    def at(self, duration: float) -> _AtDuration:
+        """The bounded action for a duration, in [s]; the last two are kept."""
+        if duration not in self._at:
+            if len(self._at) > 1:
+                del self._at[next(iter(self._at))]
+            problem = stretched_problem(self.problem, duration)
+            rows = self.rows.on(problem.grid)
+            self._at[duration] = _AtDuration(problem, self.limits, self.margins, rows)
+        return self._at[duration]
+
+    def action(self, duration: float) -> ActionObjective:
+        """The action for a duration, in [s]."""
+        return self.at(duration).action
+
+    def share(self, duration: float) -> float:
+        """T0 / T, by which the forces of limits count in the integral over T."""
+        return self.problem.grid.duration / duration
+
+    def outputs(self, x: TimedPath) -> Outputs:
+        """S + w T, and the bounded outputs relative to their ranges."""
+        found = self.at(x.duration).outputs(x.path)
+        return Outputs(found.value + self.price.weight * x.duration, found.y)
+
+    def model(self, x: TimedPath, sigma: Array, rho: Array, multipliers: Array) -> TimedModel:
+        """The bordered model with the terms of the bounds: see BoundedObjective.model."""
+        at, share = self.at(x.duration), self.share(x.duration)
+        at.predict(self._slopes)
+        inner = at.model(x.path, share * sigma, share * rho, share * multipliers)
+        gradient, force = (at.forces(x.path, share * each) for each in (rho, multipliers))
+        forces = [Forces(*each) for each in zip(gradient, force, strict=True)]
+        first = len(rho) - self.rows.size
+        weights = self.bounds.weights[first:]
+        rows = RowForces(
+            at.row_map(x.path),
+            weights * sigma[first:],
+            weights * rho[first:],
+            weights * multipliers[first:],
+        )
+        model = TimedModel(at.action, x, inner, self.price, DURATION_METRIC, forces, rows)
+        alone = np.zeros_like(model.gradient)
+        alone[-1] = 1.0
+        self._stretch = self.push(alone, model)
+        return model
+
+    def push(self, step: Array, model: QuadraticModel) -> Array:
+        """First-order change of the bounded outputs, shape (R,)."""
+        assert isinstance(model, TimedModel)
+        rows = []
+        for dx, (_y, J) in zip(model.point_steps(step), model.expansion.outputs, strict=True):
+            rows.append(np.concatenate([dx, np.matmul(J, dx[:, :, None])[:, :, 0]], axis=1))
+        dy = self._first.relative(np.concatenate(rows))
+        return np.append(dy, model.row_steps(step))
+
+    def pull(self, forces: Array, model: QuadraticModel) -> Array:
+        """Gradient of sum of weights (forces y) in the columns and log T."""
+        assert isinstance(model, TimedModel)
+        T = model.x.duration
+        columns = self.at(T).pull(self.share(T) * forces, model.inner)
+        return np.append(columns, np.vdot(self.bounds.weights * forces, self._stretch))
+
+    def accept(self, step: Array, model: QuadraticModel) -> None:
+        """Use the outputs that the step predicts as weights of the next model's curvature."""
+        assert isinstance(model, TimedModel)
+        self._slopes = model.predicted_slopes(step)
+
+    def refine(self, x: TimedPath, level: float) -> Refinement | None:
+        """Bound more control points of the motion: see LimitRows."""
+        found = self.at(x.duration).refine(x.path, level)
+        if found is not None:
+            self.rows = self.at(x.duration).extended.on(self.problem.grid)
+            self._at.clear()
+            self._first = self.at(self.problem.grid.duration)
+            self.bounds = self._first.bounds
+        return found
+
+    def retract(self, x: TimedPath, step: Array, model: QuadraticModel) -> TimedPath:
+        """The motion in the new duration, then moved by the step in the columns."""
+        return moved_in_time(self.action, self.price, x, step, model)
+
+
+class _AtDuration(BoundedAction):
+    """The bounded action for one duration, whose predicted outputs come from another."""
+
+    def __init__(
+        self, problem: TrajectoryProblem, limits: Limits, margins: Array | None, rows: LimitRows
+    ) -> None:
+        super().__init__(problem, limits, margins, "band", rows=rows)
+        self.extended = rows
+        self.action.keep_points = True
+
+    def row_map(self, path: DiscretePath) -> RowMap:
+        """The rows with their values and derivatives at a path."""
+        rows = self.extended
+        return RowMap(rows, rows.columns("nodal"), rows.values(path))
+
+    def predict(self, slopes: list[Array]) -> None:
+        """Take `output_slope` of predicted outputs, per batch; those of the path if empty."""
+        self._predicted = slopes or None
+
+    def relative(self, changes: Array) -> Array:
+        """Changes of (q, ..., outputs) at the points as those of the bounded outputs, (R,)."""
+        return np.asarray((changes[:, self.columns] * self._inverse_ranges).ravel())

@@ -1,0 +1,177 @@
+"""A motion within limits and its duration: the search of the interior point with both unknown.
+
+It makes limits hold between the points as for given durations: between two tightenings of bounds,
+or halvings of intervals, a solve moves the motion and the duration.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.bordered_model import BorderedModel
+from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
+from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.trust_region import Options, Stop
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
+from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
+from hovi.planning.solver.methods.bounded_search import STOPPED, Bounded, BoundedSearch
+from hovi.planning.solver.methods.feasibility import solved_from
+from hovi.planning.solver.methods.limits_between_points import tightened, usable
+from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.status import Status, unfinished
+from hovi.system.deadline import OutOfTimeError, raise_if_late
+from hovi.system.interruption import record_interrupt
+
+LAST_DECREASE = 1e-11
+"""Relative decrease at which a motion and its duration are accurate: its square root is the
+relative error of the slope in the duration."""
+ROUGH_DECREASE = 1e-3
+"""Relative decrease at which the motion of the first duration is good enough to be stretched."""
+ROUGH_BARRIER = 1e-2
+"""Its last barrier parameter, with which the next solve begins."""
+
+
+def minimum_within_limits(
+    problem: TrajectoryProblem,
+    limits: Limits,
+    guess: DiscretePath,
+    price: TimePrice,
+    options: Options,
+) -> MethodResult:
+    """A motion and a duration of least S + w T within limits, from a guess for the problem's.
+
+    options.near: whether the guess nearly is a solution.
+    """
+    search = TimedSearch(problem, limits, options, None, guess, price=price)
+    try:
+        return _searched(search)
+    except KeyboardInterrupt:  # between two solves, which handle their own
+        record_interrupt()
+        return _ended(search, Stop.INTERRUPTED)
+    except OutOfTimeError:
+        return _ended(search, Stop.TIME_LIMIT)
+
+
+@dataclass(eq=False)
+class TimedSearch(BoundedSearch):
+    """A search in which every solve moves the duration, too: the problem is that of the last one.
+
+    price: of time.
+    """
+
+    price: TimePrice = dataclasses.field(kw_only=True)
+
+    def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
+        """Solve with bounds at the quadrature points, from the problem's duration."""
+        raise_if_late()
+        problem, options = self.problem, self.remaining_options()
+        options = dataclasses.replace(options, decrease=LAST_DECREASE)
+        objective = TimedBoundedAction(problem, self.limits, self.margins, self.price, self.rows)
+        x = TimedPath(path, problem.grid.duration)
+        found = minimize_bounded(objective, x, options, self.report, start)
+        self.iterations += found.iterations
+        self.history += found.history
+        self.rows = objective.rows
+        self._stretch(found.x.duration)
+        self.last = self.problem, found.x.path
+        return self._at_its_duration(found, objective)
+
+    def solve_fixed(self, path: DiscretePath) -> Bounded:
+        """Solve for the problem's duration, roughly."""
+        options = self.remaining_options()
+        rough = dataclasses.replace(options, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
+        return self._minimized(self.objective(None), path, rough, None)
+
+    def _stretch(self, duration: float) -> None:
+        """Move the problem and its guess to another duration, in [s]."""
+        before = self.problem.grid.duration
+        if duration != before:
+            self.problem = self.problem.on(self.problem.grid.stretched(duration))
+            self.rows = self.rows.on(self.problem.grid)
+            self.guess = self.problem.moved(stretched_path(self.guess, duration / before))
+
+    def _at_its_duration(
+        self, found: BoundedOutcome[TimedPath], objective: TimedBoundedAction
+    ) -> Bounded:
+        """The outcome for the problem of its duration, whose points weigh more or less."""
+        share, barrier = objective.share(found.x.duration), found.barrier
+        price = self.price.weight * found.x.duration
+        return BoundedOutcome(
+            found.x.path,
+            Outputs(found.outputs.value - price, found.outputs.y),
+            dataclasses.replace(
+                barrier,
+                bounds=objective.at(found.x.duration).bounds,
+                zl=share * barrier.zl,
+                zu=share * barrier.zu,
+                mu=share * barrier.mu,
+            ),
+            found.stop,
+            found.iterations,
+            found.history,
+            found.model,
+        )
+
+    def negative_eigenvalues(self, outcome: Bounded) -> int:
+        """n_neg of the condensed system, the duration among its unknowns."""
+        model = outcome.model
+        if outcome.stop is not Stop.STATIONARY or not isinstance(model, BorderedModel):
+            return -1
+        return 0 if model.factor(0.0) is not None else model.negative_eigenvalues()
+
+
+def _searched(search: TimedSearch) -> MethodResult:
+    """A minimum at the points, then one within limits everywhere."""
+    outcome = _at_the_points(search)
+    if outcome.stop in STOPPED or not usable(outcome):
+        return _ended(search, outcome.stop)
+    outcome, reason, _ = tightened(search, outcome)
+    if not reason and outcome.stop is not Stop.STATIONARY:
+        return _ended(search, outcome.stop)
+    problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
+    value, steps = problem.ld.action(x), search.iterations
+    held = f"limits hold everywhere, on {problem.grid.intervals} intervals"
+    status, what = Status.MINIMUM, f"a minimum of cost {value:.10g} after {steps} steps; {held}"
+    if reason:
+        status, what = Status.INFEASIBLE, f"no motion within the limits was found: {reason}"
+    elif n_neg != 0:
+        curved = f"{n_neg} directions of negative curvature"
+        status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
+    instants, forces = search.forces(outcome)
+    history, message = search.history, f"{what}."
+    return MethodResult(problem, x, value, status, message, steps, n_neg, history, forces, instants)
+
+
+def _at_the_points(search: TimedSearch) -> Bounded:
+    """A minimum with bounds at the points, near a motion of the guess's own duration if possible.
+
+    A distant guess first becomes a motion of its duration, so that a motion of another shape is not
+    stretched or shrunk to a bound; a duration that is too short for one moves from the beginning.
+    """
+    path = search.guess
+    if not search.options.near:
+        fixed = search.solve_fixed(path)
+        if fixed.stop in STOPPED:
+            return fixed
+        if not fixed.feasible:
+            return search.solve(path)
+        path = fixed.x
+    near = solved_from(search, path)
+    return near if usable(near) or near.stop in STOPPED else search.solve(search.guess)
+
+
+def _ended(search: TimedSearch, stop: Stop) -> MethodResult:
+    """The motion of the last solve, which is no minimum."""
+    problem, path = search.last
+    value, steps = problem.ld.action(path), search.iterations
+    if stop is Stop.STATIONARY:
+        status, reason = Status.INFEASIBLE, "no motion within the limits was found"
+    else:
+        status, reason = unfinished(stop)
+    message = f"{reason} after {steps} steps; the motion is the best so far, of cost {value:.10g}."
+    return MethodResult(problem, path, value, status, message, steps, history=search.history)

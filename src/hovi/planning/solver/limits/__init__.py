@@ -1,0 +1,1 @@
+"""Limits at all times: control points of the motion between bounds."""

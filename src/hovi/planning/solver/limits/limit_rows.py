@@ -1,0 +1,285 @@
+"""Limits on q, v, a, ... at all times, as rows that are linear in the unknowns.
+
+In an interval every joint coordinate that is no part of an orientation is a polynomial, linear in
+the interval's columns, and lies between its control points on each part of the interval. These are
+bounded: so a motion is within its limits everywhere. What it loses is the distance of the curve
+from its control points where they are at a bound; there the parts are halved while the barrier
+falls. This is an inner approximation of a semi-infinite program that is refined adaptively, where
+exchange methods [HettichKortanek1993] approximate from outside.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi._native import intervals as native
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.interval_batch import Coordinates
+from hovi.discrete.interval_paths import scaled_data
+from hovi.optimize.bounded_objective import Refinement
+from hovi.planning.problem.limits import Limits
+from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
+from hovi.planning.solver.limits.limited_parts import LimitedParts
+from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.schemes.control_points import control_degree, control_rows
+from hovi.schemes.scheme import regular_from_nodal
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+WEIGHT = 0.1
+"""Weight of a row in a barrier, as a share of the interval."""
+LEAST_GAP = 1e-7
+"""Distance of the curve from a control point, as a share of the range, below which its part is not
+halved."""
+LEAST_LOSS = 1e-7
+"""Rise of the cost by the distance of one control point, as a share of the cost, below
+which its part is not halved."""
+MAX_LOSS = 1e-5
+"""Rise of the cost by all of them, as a share of the cost, below which none is."""
+MAX_HALVINGS = 4
+"""Number of times that a part is halved at once."""
+
+
+class LimitRows:
+    """Rows on a grid: y = x / range of the control points of limited coordinates, between bounds.
+
+    grid: on which they are. limits: imposed. space: of the configurations; None for a vector space.
+    fixed_ends: whether the start and the goal are given, and with them the control points there.
+    halvings: of all intervals for the control points of positions, and for those of derivatives.
+    """
+
+    def __init__(
+        self,
+        grid: Grid,
+        limits: Limits,
+        space: ConfigurationSpace | None,
+        fixed_ends: tuple[bool, bool] = (True, True),
+        halvings: tuple[int, int] = (0, 0),
+    ) -> None:
+        self.grid = grid
+        self.space = space
+        self.fixed_ends = fixed_ends
+        self.limits = limits
+        self.fixed = False
+        self.of = LimitedCoordinates.of(limits, grid, space)
+        depth = np.where(self.of.order == 0, *halvings)
+        self.parts = LimitedParts.halved(grid.intervals, depth)
+        self._set(self._rows_of(self.parts))
+
+    def copied(self) -> LimitRows:
+        """The same rows, to be refined on their own."""
+        return copy.copy(self)
+
+    def on(self, grid: Grid) -> LimitRows:
+        """The rows of the same parts on another grid of as many intervals.
+
+        In the same order, if the curves have as many modes.
+        """
+        rows = copy.copy(self)
+        rows.grid = grid
+        same = grid.inner_modes == self.grid.inner_modes
+        rows._set(self._rows if same else rows._rows_of(rows.parts))
+        return rows
+
+    def remaining(self, grid: Grid, first: int) -> tuple[LimitRows, Index]:
+        """The rows of the parts from an interval on, and those at their places, -1 for none.
+
+        grid: begins with that interval, whose length may be another one.
+        """
+        rows, left = self.copied(), self.parts.at(self.parts.k >= first)
+        rows.grid, rows.parts = grid, dataclasses.replace(left, k=left.k - first)
+        rows._set(rows._rows_of(rows.parts))
+        now, before = rows._places_from(first), self._places
+        if grid.inner_modes != self.grid.inner_modes or rows.size == 0:
+            return rows, np.full(rows.size, -1)
+        return rows, _found(now, before)
+
+    def fixed_on(self, grid: Grid) -> LimitRows:
+        """The same on another grid of as many intervals, which are not refined."""
+        rows = self.on(grid)
+        rows.fixed = True
+        return rows
+
+    def freed(self) -> LimitRows:
+        """The same, which may be refined."""
+        rows = self.copied()
+        rows.fixed = False
+        return rows
+
+    @property
+    def size(self) -> int:
+        """E, the number of rows."""
+        return len(self._rows.part)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the rows, (E,) each."""
+        c = self.coordinate
+        k = np.minimum(self.intervals, len(self.of.lower) - 1)
+        lower, upper = (each[k, c] / self.of.ranges[c] for each in (self.of.lower, self.of.upper))
+        return lower, upper
+
+    @property
+    def weights(self) -> Array:
+        """Weights in a barrier, shape (E,), in [s]."""
+        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
+
+    @property
+    def table(self) -> Array:
+        """y range h^j, without q0, over (h q0', ..., Z, c) of the interval, (E, 2 k - 1 + r)."""
+        return self._rows.table
+
+    def values(self, path: DiscretePath) -> Array:
+        """y of every row, shape (E,)."""
+        q = path.q if self.space is None else self.space.coordinates(path.q)
+        data = np.concatenate([q[:-1, None], self._data(path)], axis=1)
+        return push_rows(self, self._regular, data)
+
+    def columns(self, coordinates: Coordinates) -> Array:
+        """Derivatives of y in the columns of the interval, shape (E, m)."""
+        if coordinates == "regular":
+            return self._regular
+        nodal = self._regular @ regular_from_nodal(self.grid.inner_modes, self.grid.order)
+        return np.ascontiguousarray(nodal)
+
+    def refine(self, path: DiscretePath, level: float) -> Refinement | None:
+        """Halve parts whose control points, away from the curve, raise the cost; None if none do.
+
+        level: barrier parameter at the path, relative to the mean density of the cost.
+        """
+        numbers, before = np.arange(self.size), self._places
+        for _ in range(0 if self.fixed or self.size == 0 else MAX_HALVINGS):
+            coarse = self._coarse(path, level)
+            if len(coarse) == 0:
+                break
+            numbers = self._halve(coarse, numbers)
+        kept = numbers[numbers >= 0]
+        if len(kept) == len(before):
+            return None
+        return Refinement(kept, self._origins(before, len(kept)))
+
+    def _coarse(self, path: DiscretePath, level: float) -> Index:
+        """The parts that are worth halving."""
+        y, (lower, upper) = self.values(path), self.bounds
+        outside = push_rows(self, self._beyond, self._data(path))
+        slack = np.maximum(np.where(outside > 0, upper - y, y - lower), 1e-12)
+        gap, force = np.abs(outside), level / slack
+        loss = self.weights / self.grid.duration * force * gap
+        some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
+        return np.unique(self._rows.part[some & (loss.sum() > MAX_LOSS)])
+
+    def _halve(self, coarse: Index, numbers: Index) -> Index:
+        """Halve parts; returns the given numbers of the rows that remain, and -1 for the new."""
+        kept = np.flatnonzero(~np.isin(self._rows.part, coarse))
+        remaining = np.setdiff1d(np.arange(len(self.parts)), coarse)
+        places = np.zeros(len(self.parts), dtype=np.intp)
+        places[remaining] = np.arange(len(remaining))
+        old, new = self._rows.at(kept), self.parts.at(coarse).halves()
+        rows = self._rows_of(new)
+        both = old._replace(part=places[old.part]), rows._replace(part=rows.part + len(remaining))
+        self.parts = self.parts.at(remaining).followed_by(new)
+        self._set(_Rows(*(np.concatenate(pair) for pair in zip(*both, strict=True))))
+        return np.append(numbers[kept], np.full(self.size - len(kept), -1))
+
+    def _set(self, rows: _Rows) -> None:
+        """Take rows: their intervals, coordinates, orders and joints, and what they multiply."""
+        self._rows = rows
+        self.intervals, self.coordinate = self.parts.k[rows.part], self.parts.coordinate[rows.part]
+        self.orders, self.joints = self.of.order[self.coordinate], self.of.joint[self.coordinate]
+        ranges = self.of.ranges[self.coordinate]
+        scale = 1.0 / (ranges * self.grid.steps[self.intervals] ** self.orders)[:, None]
+        base = np.where(self.orders == 0, 1.0 / ranges, 0.0)[:, None]
+        self._regular = np.concatenate([base, rows.table * scale], axis=1)
+        self._beyond = (rows.table - rows.beside) * scale
+
+    def _rows_of(self, parts: LimitedParts) -> _Rows:
+        """The rows of parts."""
+        columns = 2 * self.grid.order - 1 + self.grid.inner_modes
+        none, empty = np.zeros(0, dtype=np.intp), np.zeros((0, columns))
+        found = [_Rows(none, none, empty, empty)]
+        orders = self.of.order[parts.coordinate]
+        for order in np.unique(orders):
+            own = np.flatnonzero(orders == order)
+            left, width, which = parts.at(own).unique
+            tables = control_rows(left, width, self.grid.order, self.grid.inner_modes, int(order))
+            part, i = np.nonzero(self._needed(parts.at(own), int(order)))
+            table, beside = (each[which[part], i] for each in tables)
+            found.append(_Rows(own[part], i, table, beside))
+        return _Rows(*(np.concatenate(each) for each in zip(*found, strict=True)))
+
+    def _needed(self, parts: LimitedParts, order: int) -> npt.NDArray[np.bool_]:
+        """Which control points get rows, shape (L, d + 1): others are given.
+
+        One at which two parts meet belongs to the part before, and where an interval has other
+        limits than the one before to both.
+        """
+        degree = control_degree(self.grid.order, self.grid.inner_modes, order)
+        smooth = self.grid.order - order  # values and derivatives that are given at an end
+        at_start = (parts.k == 0) & (parts.left == 0)
+        at_node = np.where(self.of.differ(parts.k, parts.coordinate), 0, min(smooth, 1))
+        before = np.where(at_start, 0, np.where(parts.left > 0, min(degree, 1), at_node))
+        first = np.where(at_start & self.fixed_ends[0], smooth, before)
+        at_goal = (parts.k == self.grid.intervals - 1) & (parts.left + parts.width == 1)
+        last = degree - np.where(at_goal & self.fixed_ends[1], smooth, 0)
+        i = np.arange(degree + 1)
+        return np.asarray((i >= first[:, None]) & (i <= last[:, None]))
+
+    def _data(self, path: DiscretePath) -> Array:
+        """(h q0', ..., Z, c) of all intervals, (N, 2 k - 1 + r, n)."""
+        numbers = np.arange(self.grid.intervals)
+        return scaled_data(path, numbers, self.grid.steps[:, None], self.grid.inner_modes)
+
+    @property
+    def _places(self) -> Array:
+        """A number for interval, coordinate and position of the curve beside every row, (E,)."""
+        return self._places_from(0)
+
+    def _places_from(self, first: int) -> Array:
+        """The same if the first interval has a number."""
+        part, i = self._rows.part, self._rows.number
+        degree = control_degree(self.grid.order, self.grid.inner_modes, 0) - self.orders
+        s = self.parts.left[part] * degree + self.parts.width[part] * i  # in [0, degree]
+        series = (self.intervals + first) * len(self.of.order) + self.coordinate
+        return np.asarray(series * (degree.max(initial=0) + 1.0) + s)
+
+    def _origins(self, before: Array, first: int) -> Index:
+        """The former row at the place of each row from the given one on; -1 for none."""
+        return _found(self._places[first:], before)
+
+
+def _found(now: Array, before: Array) -> Index:
+    """The number of each of some values among others; -1 for none."""
+    order = np.argsort(before)
+    at = order[np.minimum(np.searchsorted(before[order], now), len(order) - 1)]
+    return np.where(before[at] == now, at, -1)
+
+
+class _Rows(NamedTuple):
+    """Rows of control points.
+
+    part: number of their parts, (E,). number: of the control point in the part, (E,).
+    table, beside: of the control points, and of the curve beside them, (E, 2 k - 1 + r).
+    """
+
+    part: Index
+    number: Index
+    table: Array
+    beside: Array
+
+    def at(self, chosen: Index) -> _Rows:
+        """Some of them."""
+        table, beside = self.table[chosen], self.beside[chosen]
+        return _Rows(self.part[chosen], self.number[chosen], table, beside)
+
+
+def push_rows(rows: LimitRows, columns: Array, step: Array) -> Array:
+    """The change of y in a step of the intervals' columns, (E,)."""
+    out = np.empty(len(columns))
+    native.push_rows(rows.intervals, rows.joints, columns, np.ascontiguousarray(step), out)
+    return out

@@ -1,0 +1,66 @@
+"""Multipliers of control points, as forces at instants of the motion."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.instants import Instants
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.scene.lagrangian import PointTerms
+from hovi.schemes.control_points import control_degree, control_nodes
+from hovi.schemes.interval_curve import jet_rows
+
+Array = npt.NDArray[np.float64]
+
+
+def forces_of(
+    problem: TrajectoryProblem, rows: LimitRows, multipliers: Array
+) -> tuple[Instants | None, list[PointTerms]]:
+    """The multipliers of control points as forces on (q, v, ...) at instants of every interval.
+
+    multipliers: of the rows, shape (E,). The terms follow those at the quadrature points, one per
+    batch of instants: one without segments.
+    """
+    if rows.size == 0 or problem.ld.segments is not None:
+        return None, []
+    grid, nv = problem.grid, problem.coordinates.nv
+    nodes = control_nodes(control_degree(grid.order, grid.inner_modes, 0))
+    slope = np.zeros((grid.intervals, len(nodes), grid.order + 1, nv))
+    forces = rows.weights * multipliers / rows.of.ranges[rows.coordinate]
+    for order in np.unique(rows.orders):
+        own = np.flatnonzero(rows.orders == order)
+        shares = forces[own, None] * _values_in(rows.table[own], nodes, grid, int(order))
+        at = (rows.intervals[own, None], np.arange(len(nodes)), order, rows.joints[own, None])
+        np.add.at(slope, at, shares)
+    weights = np.repeat(grid.steps / len(nodes), len(nodes))
+    k = np.repeat(np.arange(grid.intervals), len(nodes))
+    instants = Instants(k, np.tile(nodes, grid.intervals), weights)
+    slope = slope.reshape(len(k), -1) / weights[:, None]
+    outputs = np.zeros((len(k), 0))
+    return instants, [PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))]
+
+
+def _values_in(table: Array, nodes: Array, grid: Grid, order: int) -> Array:
+    """Rows of h^j q^(j), or q, over (h q0', ..., Z, c) as sums of its values at nodes, (E, M)."""
+    values = jet_rows(nodes, grid.order, grid.inner_modes)[:, order]
+    if order == 0:  # rows of q have a share of 1 in q0
+        values, table = (
+            np.pad(each, ((0, 0), (1, 0)), constant_values=1.0) for each in (values, table)
+        )
+    return np.asarray(table @ np.linalg.pinv(values))
+
+
+def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> TrajectoryProblem:
+    """The same problem, with further instants in its discrete Lagrangian; none for None."""
+    if instants is problem.ld.instants:
+        return problem
+    whole = copy.copy(problem)  # nothing else depends on them
+    ld = DiscreteLagrangian(problem.ld.lagrangian, problem.grid, instants)
+    object.__setattr__(whole, "ld", ld)
+    return whole

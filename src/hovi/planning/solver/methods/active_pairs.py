@@ -1,0 +1,150 @@
+"""Distances are bounded only for the pairs of shapes that would come too close.
+
+Most pairs stay far from each other, and then cost nothing but a check of the motion.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.trust_region import Options, Stop
+from hovi.planning.clearance.clearance import Clearance, PartOfClearance
+from hovi.planning.clearance.clearance_violation import near_pairs
+from hovi.planning.problem.contradictions import contradiction
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.planning.solver.methods.trust_region import TrustRegion
+from hovi.planning.solver.status import Status, unfinished
+from hovi.system.deadline import Deadline, OutOfTimeError
+from hovi.system.interruption import record_interrupt
+
+Solve = Callable[[TrajectoryProblem, DiscretePath, Options], MethodResult]
+Index = npt.NDArray[np.intp]
+
+FIRST_BEYOND = 0.002
+"""Distance beyond the margin, in [m], up to which pairs along a guess are bounded at once:
+those that touch the margin along the motion of a similar problem."""
+ADDED_BEYOND = 0.02
+"""The same along a motion on which some pair violates it."""
+WITHOUT_LIMITS: tuple[Method, ...] = (TrustRegion(), AugmentedLagrangian())
+"""Methods for a problem without limits of which no pair is near another."""
+
+
+def with_active_pairs(
+    solve: Solve,
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    options: Options,
+    report: Report | None = None,
+) -> MethodResult:
+    """The result of solves with growing sets of pairs, until all pairs keep the margin.
+
+    solve: of a problem from a guess with options. The first set are the pairs that violate or touch
+    the margin along the guess; each solve begins at the last one's motion and on its grid.
+    """
+    limits = problem.limits or no_limits(problem.coordinates)
+    if problem.distances is None or contradiction(problem, limits):
+        return solve(problem, path, options)
+    return _Rounds(solve, problem, options, report).run(path)
+
+
+class _Rounds:
+    """The solves so far. nit, history: of all of them."""
+
+    def __init__(
+        self, solve: Solve, problem: TrajectoryProblem, options: Options, report: Report | None
+    ) -> None:
+        self._solve, self._problem, self._report = solve, problem, report
+        self._options, self._deadline = options, Deadline(options.time_limit)
+
+    def run(self, path: DiscretePath) -> MethodResult:
+        """Solve and add pairs until none is too close."""
+        try:
+            chosen = self._too_close(self._problem, path, FIRST_BEYOND)
+        except KeyboardInterrupt:
+            record_interrupt()  # which the solve sees
+            return self._solve(self._problem, path, self._options_left())
+        except OutOfTimeError:
+            return self._solve(self._problem, path, self._options_left())
+        result = self._solved(self._problem, path, chosen)
+        while result.status in (Status.MINIMUM, Status.SADDLE):
+            try:
+                more = self._violating(result, chosen)
+            except KeyboardInterrupt:
+                record_interrupt()
+                return _unfinished(result, Stop.INTERRUPTED)
+            except OutOfTimeError:
+                return _unfinished(result, Stop.TIME_LIMIT)
+            if len(more) == 0:
+                break
+            chosen = np.union1d(chosen, more)
+            result = self._again(result, chosen)
+        return result
+
+    def _violating(self, result: MethodResult, chosen: Index) -> Index:
+        """If other pairs violate the margin: those, and the pairs that are near."""
+        if np.isin(self._too_close(result.problem, result.path), chosen).all():
+            return np.zeros(0, dtype=np.intp)
+        return self._too_close(result.problem, result.path, ADDED_BEYOND)
+
+    def _options_left(self) -> Options:
+        """The options with the remaining time as time limit."""
+        return dataclasses.replace(self._options, time_limit=self._deadline.seconds_left)
+
+    def _too_close(
+        self, problem: TrajectoryProblem, path: DiscretePath, beyond: float = 0.0
+    ) -> Index:
+        """Numbers of the pairs that come nearer than a distance beyond the margin."""
+        assert problem.distances is not None
+        assert problem.clearance is not None
+        with self._deadline.in_force():
+            least = float(problem.clearance.margin) + beyond
+            return near_pairs(problem.trajectory(path), problem.distances, least)
+
+    def _again(self, result: MethodResult, chosen: Index) -> MethodResult:
+        """A solve with other pairs from the motion of a result."""
+        again = self._solved(result.problem, result.path, chosen)
+        return dataclasses.replace(
+            again, nit=result.nit + again.nit, history=[*result.history, *again.history]
+        )
+
+    def _solved(
+        self, problem: TrajectoryProblem, path: DiscretePath, chosen: Index
+    ) -> MethodResult:
+        """A solve with some pairs; its problem has all of them again."""
+        whole = problem.clearance
+        assert whole is not None
+        part = _with_clearance(problem, PartOfClearance.of(whole, chosen.tolist()))
+        options = self._options_left()
+        if part.limited:
+            result = self._solve(part, path, options)
+        else:
+            method = next(method for method in WITHOUT_LIMITS if method.supports(part))
+            result = method.minimize(part, path, options, self._report)
+        return dataclasses.replace(result, problem=_with_clearance(result.problem, whole))
+
+
+def _with_clearance(problem: TrajectoryProblem, clearance: Clearance) -> TrajectoryProblem:
+    """The same problem with other pairs, sharing what was built for this one."""
+    other = copy.copy(problem)  # only its finer one depends on them, too
+    object.__setattr__(other, "clearance", clearance)
+    other.__dict__.pop("finer", None)
+    return other
+
+
+def _unfinished(result: MethodResult, stop: Stop) -> MethodResult:
+    """A result whose distances were not checked to the end."""
+    status, reason = unfinished(stop)
+    message = (
+        f"{reason} after {result.nit} steps, before the distances along the motion were checked; "
+        f"the motion has the cost {result.cost:.10g}."
+    )
+    return dataclasses.replace(result, status=status, message=message)

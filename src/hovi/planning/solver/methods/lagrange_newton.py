@@ -1,0 +1,201 @@
+"""Motions with equality constraints: Newton's method with the multipliers as unknowns."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.lagrange_newton import ConstrainedOutcome, minimize_under_equations
+from hovi.optimize.trust_region import Iteration, Options, Outcome, Stop, minimize
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    FEASIBLE_RESIDUAL,
+    FIRST_DECREASE,
+    WARM_TORQUE_SHARE,
+    ConstrainedResult,
+    first_multipliers,
+    spurious_sentence,
+    unmet_sentence,
+    within,
+)
+from hovi.planning.solver.constrained_action import ConstrainedAction
+from hovi.planning.solver.methods.augmented_lagrangian import (
+    AugmentedLagrangian,
+    constrained_status,
+    with_offset,
+)
+from hovi.planning.solver.methods.method import Method, MethodResult, Report
+from hovi.system.deadline import Deadline, OutOfTimeError
+
+Array = npt.NDArray[np.float64]
+
+PENALTY_FACTORS = 1.0, 1e2, 1e4
+"""Factors of the last penalty with which negative eigenvalues are counted; the least counts."""
+
+NEAR_ACCURACY = 1e-2
+"""Accuracy of the linearised equations in the step that shows whether a minimum is near."""
+
+
+class LagrangeNewton(Method):
+    """Newton's method on the KKT equations; rounds of an augmented Lagrangian where it fails.
+
+    With equations at nodes alone, such as frame goals, one such round leads from the guess to its
+    neighbourhood: the cost decides there, and a trust region suits it.
+    """
+
+    def supports(self, problem: TrajectoryProblem) -> bool:
+        """Problems with equality constraints, and without limits."""
+        return problem.constrained and not problem.limited
+
+    def minimize(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None = None,
+    ) -> MethodResult:
+        """See Method.minimize."""
+        rounds = AugmentedLagrangian()
+        if problem.unreachable:
+            return rounds.minimize(problem, path, options, report)
+        search = _Search(problem, options, report)
+        found = search.run(path)
+        if found is not None:
+            return found
+        result = rounds.minimize(problem, path, search.left, search.report)
+        history = [*search.history, *result.history]
+        said, meant = (f"after {count} steps" for count in (result.nit, len(history)))
+        message = result.message.replace(said, meant)
+        return dataclasses.replace(result, nit=len(history), history=history, message=message)
+
+
+@dataclass(eq=False)
+class _Search:
+    """A search from a guess, and the history of its steps."""
+
+    problem: TrajectoryProblem
+    options: Options
+    on_step: Report | None
+    history: list[Iteration] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.deadline = Deadline(self.options.time_limit)
+
+    @property
+    def left(self) -> Options:
+        """The options with the time that is left."""
+        return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
+
+    @property
+    def report(self) -> Report | None:
+        """The report, with step numbers that continue."""
+        return with_offset(self.on_step, len(self.history))
+
+    def run(self, path: DiscretePath) -> MethodResult | None:
+        """The result; None where the method fails."""
+        problem = self.problem
+        multipliers = None
+        saddles: list[float] = []
+        objective = ConstrainedAction(problem, path)
+        if self.options.near or len(problem.passive) > 0:
+            multipliers = self._known(path, objective)
+        if multipliers is None and len(problem.passive) == 0:
+            first, multipliers = self._first_round(path, objective)
+            path, saddles = first.x, first.saddles_left
+            if first.stop is not Stop.STATIONARY:
+                return None if first.stop is Stop.DIVERGED else self._result(objective, first, -1)
+        found = minimize_under_equations(
+            objective, path, objective.penalty, self.left, multipliers, self.report
+        )
+        self.history += found.history
+        found.saddles_left = saddles + found.saddles_left
+        if found.stop is Stop.DIVERGED and not found.stuck:
+            return None
+        return self._result(objective, found, _negative_eigenvalues(objective, found))
+
+    def _known(self, path: DiscretePath, objective: ConstrainedAction) -> Array | None:
+        """Least-squares multipliers at a path near a minimum; None if it is not near one.
+
+        They are those of the minimum up to the path's distance from it.
+        """
+        if objective.action.residuals(path).torque_share > WARM_TORQUE_SHARE:
+            return None
+        value, c = objective.evaluate(path)
+        multipliers = objective.model(path, np.zeros_like(c)).least_squares_multipliers()
+        if len(self.problem.passive) > 0:
+            return multipliers
+        model = objective.model(path, multipliers)
+        factor = model.factor(objective.penalty, 0.0)
+        if factor is None:
+            return None
+        step, _ = model.solve(factor, objective.penalty, c, NEAR_ACCURACY)
+        decrease = 0.5 * abs(float(step @ model.hessian_product(step)))
+        return multipliers if decrease <= FIRST_DECREASE * abs(value) else None
+
+    def _first_round(
+        self, path: DiscretePath, objective: ConstrainedAction
+    ) -> tuple[Outcome[DiscretePath], Array]:
+        """A motion near a minimum, where equations at nodes hold nearly, and its multipliers."""
+        known = dataclasses.replace(
+            first_multipliers(self.problem, path), node_penalty=objective.node_penalty
+        )
+        penalized = ActionObjective(self.problem, multipliers=known)
+        options = dataclasses.replace(self.left, decrease=FIRST_DECREASE)
+        outcome = minimize(penalized, path, options, self.report)
+        self.history += outcome.history
+        updated = known.updated(penalized.residuals(outcome.x), self.problem.passive)
+        return outcome, objective.of_nodes(updated)
+
+    def _result(
+        self, objective: ConstrainedAction, found: Outcome[DiscretePath], n_neg: int
+    ) -> MethodResult:
+        """The result of an outcome, whether it is a minimum or not."""
+        problem, x = self.problem, found.x
+        if isinstance(found, ConstrainedOutcome):
+            known = objective.multipliers(found.multipliers)
+        else:
+            known = objective.multipliers(np.zeros(len(objective.evaluate(x)[1])))
+        residuals = objective.action.residuals(x)
+        found.iterations = len(self.history)
+        if not isinstance(found, ConstrainedOutcome):
+            found.value = problem.ld.action(x)
+        met = within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL)
+        ended = found.stop is Stop.STATIONARY or (found.stop is Stop.ITERATION_LIMIT and met)
+        reason = spurious_sentence(problem, x) if ended else ""
+        if isinstance(found, ConstrainedOutcome) and found.stuck:
+            reason = unmet_sentence(problem, x, residuals)
+        result = ConstrainedResult(found, known, residuals, reason)
+        status, message = constrained_status(problem, result, n_neg)
+        return MethodResult(
+            problem,
+            x,
+            found.value,
+            status,
+            message,
+            len(self.history),
+            n_neg,
+            self.history,
+            known.forces,
+            jets=objective.action.jets(x),
+        )
+
+
+def _negative_eigenvalues(
+    objective: ConstrainedAction, found: ConstrainedOutcome[DiscretePath]
+) -> int:
+    """n_neg on the tangent space of the equations; -1 if time runs out."""
+    if found.convex:
+        return 0
+    try:
+        model = objective.model(found.x, found.multipliers)
+        if model.factor(found.penalty, 0.0) is not None:
+            return 0
+        counts = [model.negative_eigenvalues(found.penalty * f) for f in PENALTY_FACTORS]
+        return min(counts)
+    except OutOfTimeError:
+        return -1

@@ -1,0 +1,75 @@
+"""[[segments]]: the segments of a sequence, checked against the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hovi.errors import InputError
+from hovi.planning.problem.units import seconds
+from hovi.planning.search.options import PlanOptions
+from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, names_of
+from hovi.planning.task_file.effect_tables import effect_table, read_effects
+from hovi.planning.task_file.goal_tables import end_table, read_end
+from hovi.planning.task_file.limit_tables import limits_value, read_limits
+from hovi.planning.task_file.messages import TomlText
+from hovi.planning.task_file.schema import SegmentTable, ShapedTable, TaskTable
+from hovi.robot.robot import Robot
+
+
+def check_keys(table: ShapedTable, toml: TomlText) -> None:
+    """Raise SceneError unless a file has segments, or a duration and a goal, and not both."""
+    for key in ("duration", "goal"):
+        given = getattr(table, key) is not None
+        if not given and not table.segments:
+            expected = TaskTable.model_fields[key].description
+            raise toml.error((), f"`{key}` is missing; it must be {expected}")
+        if given and table.segments:
+            raise toml.error(
+                (key,), f"a file with [[segments]] takes no `{key}`: every segment has its own"
+            )
+
+
+def read_segments(tables: Sequence[SegmentTable], robot: Robot, toml: TomlText) -> list[Segment]:
+    """The segments of a file, in its order."""
+    segments = [_read_segment(table, i, robot, toml) for i, table in enumerate(tables)]
+    try:
+        checked_segments(segments, PlanOptions())
+    except InputError as wrong:
+        raise toml.error(("segments",), str(wrong)) from None
+    return segments
+
+
+def _read_segment(table: SegmentTable, number: int, robot: Robot, toml: TomlText) -> Segment:
+    keys = ("segments", number)
+    goal, limits = table.goal, table.limits
+    try:
+        duration = seconds(table.duration, "the duration of a segment")
+    except InputError as wrong:
+        raise toml.error((*keys, "duration"), str(wrong)) from None
+    return Segment(
+        None if goal is None else read_end(goal, (*keys, "goal"), robot, toml),
+        duration,
+        effects=read_effects(table.effects, robot, toml, keys),
+        limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
+        name=table.name,
+    )
+
+
+def segments_value(segments: Sequence[Segment], robot: Robot) -> list[dict[str, Any]]:
+    """The inverse of `read_segments`."""
+    named = zip(names_of(segments), segments, strict=True)
+    return [_segment_table(each, name, robot) for name, each in named]
+
+
+def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
+    """The table of a segment. name: of it in messages."""
+    table: dict[str, Any] = {"name": segment.name} if segment.name else {}
+    table["duration"] = segment.duration
+    if segment.limits is not None:
+        table["limits"] = limits_value(segment.limits, robot)
+    if segment.goal is not None:
+        table["goal"] = end_table(as_goal(segment.goal, robot), robot, name)
+    if segment.effects:
+        table["effects"] = {each.key: effect_table(each) for each in segment.effects}
+    return table

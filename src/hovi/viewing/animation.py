@@ -1,0 +1,84 @@
+"""The keyframes of a motion: where each drawn object is at each time."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import numpy.typing as npt
+import pinocchio as pin
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.viewing.highlights import Highlights, node_name
+from hovi.viewing.recorded_limits import MovingObjects
+
+with warnings.catch_warnings():
+    # meshcat imports a deprecated module of ZeroMQ that hovi does not use.
+    warnings.simplefilter("ignore", DeprecationWarning)
+    import meshcat
+    import meshcat.animation
+    from pinocchio.visualize import MeshcatVisualizer
+
+Array = npt.NDArray[np.float64]
+
+_FRAME_RATE = 60.0
+_MAX_FRAMES = 20_000
+
+
+def placements_at(
+    visualizer: MeshcatVisualizer, trajectory: Trajectory, times: Array
+) -> list[list[pin.SE3]]:
+    """Placement of every drawn object at each time (M,)."""
+    model, visual = visualizer.model, visualizer.visual_model
+    data, visual_data = model.createData(), visual.createData()
+    moving, placements = MovingObjects.of(trajectory), []
+    for t, configuration in zip(times, trajectory.configurations(times), strict=True):
+        moving.place(visualizer, float(t))
+        pin.updateGeometryPlacements(model, data, visual, visual_data, configuration)
+        placements.append([placement.copy() for placement in visual_data.oMg])
+    return placements
+
+
+def frame_times(trajectory: Trajectory) -> Array:
+    """Times of the animation's frames, both ends included, in [s]."""
+    frames = int(min(_MAX_FRAMES, math.ceil(trajectory.duration * _FRAME_RATE))) + 1
+    return np.linspace(0.0, trajectory.duration, max(frames, 2))
+
+
+def animation_of(
+    trajectory: Trajectory,
+    visualizer: MeshcatVisualizer,
+    loop: bool,
+    highlights: Highlights | None,
+) -> dict[str, object]:
+    """The message that makes a page play the motion: keyframe tracks by drawn object, in [s]."""
+    times = frame_times(trajectory)
+    visible = {} if highlights is None else highlights.changes(visualizer)
+    placements = placements_at(visualizer, trajectory, times)
+    animation = meshcat.animation.Animation()
+    for number, item in enumerate(visualizer.visual_model.geometryObjects):
+        poses = [frame[number] for frame in placements]
+        rotations = [pin.Quaternion(pose.rotation).coeffs() for pose in poses]
+        tracks = {
+            "position": _track("position", "vector3", times, [p.translation for p in poses]),
+            "quaternion": _track("quaternion", "quaternion", times, rotations),
+        }
+        name = node_name(visualizer, item)
+        if name in visible:
+            keys, flags = visible[name]
+            tracks["visible"] = _track("visible", "bool", keys, list(flags))
+        node = visualizer.viewer[name]
+        animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
+    repetitions = math.inf if loop else 1
+    command = meshcat.commands.SetAnimation(animation, play=True, repetitions=repetitions)
+    message: dict[str, object] = command.lower()
+    return message
+
+
+def _track(
+    name: str, kind: str, times: Array, values: list[Array]
+) -> meshcat.animation.AnimationTrack:
+    return meshcat.animation.AnimationTrack(
+        name, kind, times.tolist(), [value.tolist() for value in values]
+    )

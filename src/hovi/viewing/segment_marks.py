@@ -1,0 +1,34 @@
+"""Lines in a plot over time where the segments of a motion meet, and their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from hovi.discrete.measures.segment_spans import segment_spans
+from hovi.discrete.trajectory import Trajectory
+
+_GRAY = "0.45"
+_LONGEST_NAME = 40
+
+
+def draw_segments(axes: Sequence[Axes], trajectory: Trajectory) -> None:
+    """Mark where segments meet in all axes, and name them above the first."""
+    spans = segment_spans(trajectory)
+    for each in spans[1:]:
+        for ax in axes:
+            ax.axvline(each.begin, color=_GRAY, linewidth=0.9, linestyle=":")
+    for each in spans:
+        axes[0].annotate(
+            each.name[:_LONGEST_NAME],
+            ((each.begin + each.end) / 2, 1.0),
+            (0.0, 2.0),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8,
+            color=_GRAY,
+            parse_math=False,
+        )

@@ -1,0 +1,286 @@
+"""Instants between quadrature points: their jets, and actions with forces at them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.instants import Instants
+from hovi.discrete.state import State
+from hovi.errors import InputError
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.solver import guess_path
+from hovi.robot.loading import load_robot
+from hovi.scene.lagrangian import PointTerms
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name, galerkin
+from samples.manifold_robots import BASES, chain, configurations, with_arm
+
+Array = npt.NDArray[np.float64]
+
+WHERE = Instants(
+    np.array([0, 0, 2, 2, 3]), np.array([0.0, 0.37, 0.5, 1.0, 0.81]), np.array([0.2, 1, 0.5, 2, 1])
+)
+STEPS = np.array([0.3, 0.2, 0.1, 0.4])
+GRIDS = {
+    "one scheme": Grid(STEPS, (galerkin(2),) * 4),
+    "mixed schemes": Grid(
+        STEPS, (galerkin(3), by_name("hermite-simpson"), galerkin(1), galerkin(3))
+    ),
+}
+ROBOTS = "vector space", "continuous", "spherical", "free-flyer"
+each_robot = pytest.mark.parametrize("name", ROBOTS)
+each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+
+
+def scene_of(name: str) -> Scene:
+    if name == "vector space":
+        return Scene(hovi.load_robot(hovi.example("two_link.urdf")), [hovi.effects.Gravity()])
+    model = with_arm(name) if name == "continuous" else chain([BASES[name]()])
+    return Scene(load_robot(model), [])
+
+
+def problem_of(name: str, grid: Grid, instants: Instants | None = WHERE) -> TrajectoryProblem:
+    """A reach with fixed ends; the motion moves in all coordinates."""
+    scene = scene_of(name)
+    robot, n = scene.robot, scene.robot.nv
+    q0, q1 = configurations(robot, 2, seed=1, size=0.4)
+    v0, v1 = 0.3 * np.random.default_rng(2).normal(size=(2, n))
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), grid, instants)
+    return TrajectoryProblem(ld, State(q0, v0), State(q1, v1))
+
+
+def wavy(problem: TrajectoryProblem) -> tuple[DiscretePath, ActionObjective]:
+    """The cubic guess with nodes and inner modes displaced at random."""
+    objective = ActionObjective(problem)
+    x = guess_path(problem, "cubic")
+    model = objective.model(x, None, None)
+    return objective.retract(x, 0.1 * model.random_vector(5), model), objective
+
+
+def random_forces(problem: TrajectoryProblem, seed: int = 0) -> list[PointTerms]:
+    """Forces on (q, v, a) at the instants alone, where torques are not evaluated."""
+    ld, nv = problem.ld, problem.ld.lagrangian.nv
+    random, first = np.random.default_rng(seed), len(ld.interval_batches)
+    terms = []
+    for i, batch in enumerate(ld.batches):
+        P, size = len(batch.t), 3 * nv
+        share = 0.0 if i < first else 1.0
+        slope, force = share * random.normal(size=(P, size)), np.zeros((P, nv))
+        terms.append(PointTerms(slope, np.zeros((P, size)), force, np.zeros((P, nv))))
+    return terms
+
+
+def work(problem: TrajectoryProblem, path: DiscretePath, reference: DiscretePath) -> float:
+    """sum weights (slope . (q - q_reference, v, a) + force . tau), by Trajectory."""
+    *_, terms = random_forces(problem)
+    sample = problem.trajectory(path).sample_intervals(WHERE.intervals, WHERE.positions)
+    origin = problem.trajectory(reference).sample_intervals(WHERE.intervals, WHERE.positions).q
+    space = problem.ld.lagrangian.space
+    dq = sample.q - origin if space is None else space.difference(origin, sample.q)
+    jet = np.concatenate([dq, sample.v, sample.a], axis=1)
+    each = np.vecdot(terms.jet_gradient, jet) + np.vecdot(terms.output_gradient, sample.tau)
+    return float(WHERE.weights @ each)
+
+
+@each_grid
+@each_robot
+def test_jets_at_instants_are_those_of_the_trajectory(name: str, grid: Grid) -> None:
+    problem = problem_of(name, grid)
+    path, _ = wavy(problem)
+    *_, found = problem.ld.jets(path)
+    expected = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-11)
+    np.testing.assert_allclose(
+        problem.ld.point_times[-1],
+        grid.t[WHERE.intervals] + WHERE.positions * STEPS[WHERE.intervals],
+    )
+    np.testing.assert_array_equal(problem.ld.point_intervals[-1], WHERE.intervals)
+    np.testing.assert_allclose(problem.ld.point_weights[-1], WHERE.weights)
+
+
+@pytest.mark.parametrize("order", [1, 3, 4])
+def test_jets_at_instants_are_those_of_the_trajectory_for_other_orders(order: int) -> None:
+    grid = Grid(STEPS, (galerkin(2, order),) * 4)
+    ld = DiscreteLagrangian(hovi.spline(2, order), grid, WHERE)
+    problem = TrajectoryProblem(ld, State([0.0, 0.1]), State([1.0, -0.5]))
+    path = guess_path(problem, "cubic")
+    random = np.random.default_rng(order)
+    path = dataclasses.replace(path, inner=random.normal(size=path.inner.shape))
+    *_, found = ld.jets(path)
+    expected = problem.trajectory(path).jet_intervals(WHERE.intervals, WHERE.positions, order)
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-11)
+
+
+@each_grid
+@each_robot
+def test_instants_have_no_part_in_the_cost(name: str, grid: Grid) -> None:
+    problem, plain = problem_of(name, grid), problem_of(name, grid, None)
+    path, _ = wavy(plain)
+    assert problem.ld.action(path) == plain.ld.action(path)
+    np.testing.assert_array_equal(problem.ld.values(path), plain.ld.values(path))
+    one, other = problem.ld.expand(path), plain.ld.expand(path)
+    for part in ("values", "gradient", "hessian"):
+        expected = getattr(other, part)
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(getattr(one, part), expected, rtol=0, atol=1e-14 * scale)
+    np.testing.assert_allclose(problem.ld.derivatives(path), plain.ld.derivatives(path), atol=1e-11)
+
+
+@each_grid
+@each_robot
+def test_gradients_with_forces_at_instants_match_differences(name: str, grid: Grid) -> None:
+    """Of the action and the forces' work, in the solver's own unknowns."""
+    problem = problem_of(name, grid)
+    path, objective = wavy(problem)
+    model = objective.model_with(path, None, random_forces(problem))
+    for seed in range(3):
+        step = model.random_vector(seed)
+
+        def value(share: float, step: Array = step) -> float:
+            moved = objective.retract(path, share * step, model)
+            return problem.ld.action(moved) + work(problem, moved, path)
+
+        h = 1e-3
+        slope = (8 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12 * h)
+        assert float(np.vdot(model.gradient, step)) == pytest.approx(slope, rel=1e-6)
+
+
+@each_robot
+def test_weights_at_instants_are_squares_in_the_hessian(name: str) -> None:
+    """With the same curvature of torques, the Hessian gains sum w sigma (dy)^2."""
+    problem = problem_of(name, GRIDS["mixed schemes"])
+    path, objective = wavy(problem)
+    curvature = [objective.output_slope(y, i) for i, y in enumerate(objective.outputs(path))]
+    assert not curvature[-1].any()
+    none = random_forces(problem)
+    none = [PointTerms(*(np.zeros_like(x) for x in dataclasses.astuple(t)[:4])) for t in none]
+    random = np.random.default_rng(3)
+    last = none[-1]
+    sigma = random.uniform(size=last.jet_gradient.shape)
+    on_tau = np.zeros(last.output_gradient.shape)  # torques have no rows
+    weighted = [*none[:-1], PointTerms(last.jet_gradient, sigma, last.output_gradient, on_tau)]
+    plain = objective.model_with(path, curvature, none)
+    step = plain.random_vector(4)
+    with_squares = objective.model_with(path, curvature, weighted)
+    local = plain.gather(step)
+
+    def square(hessian: Array) -> float:
+        return float(np.einsum("kia,kijab,kjb->", local, hessian, local, optimize=True))
+
+    gained = square(with_squares.intervals.hessian) - square(plain.intervals.hessian)
+    h, k, s = 1e-4, WHERE.intervals, WHERE.positions
+
+    def sampled(share: float) -> Array:
+        moved = objective.retract(path, share * step, plain)
+        q, v, a, tau = problem.trajectory(moved).sample_intervals(k, s)
+        origin = problem.trajectory(path).sample_intervals(k, s).q
+        space = problem.ld.lagrangian.space
+        dq = q - origin if space is None else space.difference(origin, q)
+        return np.concatenate([dq, v, a, tau], axis=1)
+
+    dy = (8 * (sampled(h) - sampled(-h)) - (sampled(2 * h) - sampled(-2 * h))) / (12 * h)
+    expected = WHERE.weights @ np.vecdot(np.concatenate([sigma, on_tau], axis=1), dy**2)
+    assert gained == pytest.approx(float(expected), rel=1e-7)
+
+
+@each_robot
+def test_momenta_with_forces_at_instants_are_derivatives(name: str) -> None:
+    """D1 .. D4, and the gradient in the inner modes, are that of the model in any step."""
+    problem = problem_of(name, GRIDS["one scheme"])
+    path, objective = wavy(problem)
+    forces, ld = random_forces(problem), problem.ld
+    model = objective.model_with(path, None, forces)
+    d = ld.derivatives(path, forces)
+    np.testing.assert_allclose(
+        ld.momenta(path, forces), np.concatenate([-d[:, :2], d[-1:, 2:]]), rtol=1e-14
+    )
+    for seed in range(3):
+        step = model.random_vector(seed)
+        local = model.gather(step)
+        ends = local[:, :4] / STEPS[:, None, None] ** np.array([0, 1, 0, 1])[:, None]
+        inner = float(np.vdot(model.intervals.gradient[:, 4:], local[:, 4:]))
+        nodal = float(np.vdot(d, nodal_of(ends, objective)))
+        found = float(np.vdot(model.gradient, step))
+        assert nodal + inner == pytest.approx(found, rel=1e-9)
+
+
+def nodal_of(ends: Array, objective: ActionObjective) -> Array:
+    """Steps of (q0, v0, q1, v1) from those of an interval's columns, both (N, 4, n)."""
+    if objective.coordinates == "nodal":
+        return ends
+    h = STEPS[:, None]
+    q0, v0 = ends[:, 0], ends[:, 1]
+    Z0, Z1 = ends[:, 2], ends[:, 3] * h
+    return np.stack([q0, v0, q0 + h * v0 + Z0, v0 + Z1 / h], axis=1)
+
+
+def test_duration_derivatives_count_the_work_at_instants() -> None:
+    """S(T) with nodal q and v and inner modes scaled, with forces constant: by differences."""
+    problem = problem_of("vector space", GRIDS["one scheme"])
+    path, _ = wavy(problem)
+    *_, last = random_forces(problem)
+    forces = random_forces(problem)
+    found = problem.ld.duration_derivative(path, forces)
+    plain = problem.ld.duration_derivative(path)
+    T = problem.grid.duration
+
+    def work_at(scale: float) -> float:
+        """The forces' work for the same curve in relative time, at fixed nodal q and v."""
+        steps = scale * STEPS
+        h = steps[:, None]
+        z0 = (path.q[1:] - path.q[:-1] - h * path.v[:-1]) / h**2
+        z = np.stack([z0, np.diff(path.v, axis=0) / h], axis=1)
+        inner = path.inner / scale**2
+        moved = DiscretePath(path.q, path.v, z, inner)
+        grid = Grid(steps, problem.grid.schemes)
+        ld = DiscreteLagrangian(problem.ld.lagrangian, grid, WHERE)
+        q, v, a = ld.jets(moved)[-1]
+        tau = problem.scene.inverse_dynamics(q, v, a)
+        x = np.concatenate([q, v, a], axis=1)
+        each = np.vecdot(last.jet_gradient, x) + np.vecdot(last.output_gradient, tau)
+        return float(WHERE.weights @ each)
+
+    e = 1e-4
+    slope = (8 * (work_at(1 + e) - work_at(1 - e)) - (work_at(1 + 2 * e) - work_at(1 - 2 * e))) / 12
+    assert found - plain == pytest.approx(slope / e / T, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("k", "s", "w", "sentence"),
+    [
+        ([0, 1], [0.5], [1.0, 1.0], "positions"),
+        ([0, 1], [0.5, 0.5], [1.0], "weights"),
+        ([0, 1], [0.5, 1.5], [1.0, 1.0], "positions from 0 to 1"),
+        ([0, 1], [0.5, np.nan], [1.0, 1.0], "positions from 0 to 1"),
+        ([1, 0], [0.5, 0.5], [1.0, 1.0], "ascending intervals; sort them"),
+    ],
+)
+def test_instants_that_do_not_fit_each_other_are_refused(
+    k: list[int], s: list[float], w: list[float], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        Instants(np.array(k), np.array(s), np.array(w))
+
+
+@pytest.mark.parametrize("k", [-1, 4])
+def test_instants_in_intervals_that_the_grid_does_not_have_are_refused(k: int) -> None:
+    where = Instants(np.array([k]), np.array([0.5]), np.array([1.0]))
+    ld = problem_of("vector space", GRIDS["one scheme"], where).ld
+    with pytest.raises(InputError, match="intervals 0 to 3"):
+        ld.batches  # noqa: B018
+
+
+def test_no_instants_are_no_batch() -> None:
+    none = Instants(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
+    ld = problem_of("vector space", GRIDS["one scheme"], none).ld
+    assert len(ld.batches) == len(ld.interval_batches)

@@ -1,0 +1,83 @@
+"""Which branch a plan takes: the one whose motion costs least, of those that may be taken."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import hovi
+from hovi.errors import UnreachableError
+from hovi.planning.search.branch_choice import chosen_ends
+from hovi.planning.search.options import PlanOptions
+from hovi.robot.robot import Robot
+from hovi.system.deadline import Deadline
+
+FAST = {"intervals": 12, "scheme": "galerkin-2"}
+
+
+@pytest.fixture(scope="module")
+def scene(ur5: Robot) -> hovi.Scene:
+    return hovi.Scene(ur5, [hovi.effects.Gravity()])
+
+
+def test_the_branch_with_the_cheapest_motion_is_chosen(ur5: Robot, scene: hovi.Scene) -> None:
+    """Not the nearest one: of the motions to all eight, planned one by one."""
+    random = np.random.default_rng(3)
+    for _ in range(3):
+        start, q = random.uniform(-2.5, 2.5, (2, 6))
+    goal = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
+    branches = hovi.inverse_kinematics(ur5, goal, near=start)
+    costs = []
+    for branch in branches:
+        alone = dataclasses.replace(goal, guess=branch)
+        motion = hovi.plan(scene, start, alone, 1.5, continuation=False, **FAST)
+        costs.append(motion.cost if motion.success else np.inf)
+    chosen = hovi.plan(scene, start, goal, 1.5, continuation=False, **FAST)
+    assert np.argmin(costs) != 0
+    assert chosen.cost == pytest.approx(min(costs), rel=1e-9)
+
+
+def test_a_motion_begins_and_ends_at_frames(ur5: Robot, scene: hovi.Scene) -> None:
+    poses = ur5.frame_pose("tool0", np.array([[0.3, -1.2, 1.3, -0.7, 0.8, 0], [1, -1, 1, 0, 1, 0]]))
+    start, goal = (hovi.FrameGoal("tool0", pose) for pose in poses)
+    motion = hovi.plan(scene, start, goal, 2.0)
+    assert motion.success, motion.message
+    ends = motion.trajectory.sample([0.0, 2.0])
+    np.testing.assert_allclose(ur5.frame_pose("tool0", ends.q), poses, atol=1e-9)
+    np.testing.assert_allclose(ends.v, 0.0, atol=1e-9)
+
+
+def test_a_start_near_a_given_goal_is_its_own_branch(ur5: Robot, scene: hovi.Scene) -> None:
+    """The motion from another one would be longer."""
+    q = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0.0])
+    start = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
+    options = PlanOptions().on(scene)
+    first, _ = chosen_ends(scene, start, hovi.State(q + 0.2), 1.0, options, Deadline())
+    np.testing.assert_allclose(first.q, q, atol=1e-8)
+    turn = np.array([0, 0, 0, 0, 0, 2 * np.pi])
+    turned = dataclasses.replace(start, guess=q - turn)
+    first, _ = chosen_ends(scene, turned, hovi.State(q + 0.2), 1.0, options, Deadline())
+    np.testing.assert_allclose(first.q, q - turn, atol=1e-8)
+
+
+def test_branches_in_an_obstacle_are_not_chosen(ur5: Robot, scene: hovi.Scene) -> None:
+    start, q = np.array([0.3, -1.2, 1.3, -0.7, 0.8, 0]), np.array([0.9, -1.3, 1.4, -0.6, 0.7, 0.1])
+    goal = hovi.FrameGoal("tool0", ur5.frame_pose("tool0", q))
+    ball = hovi.Sphere(ur5.frame_position("forearm_link", q[None])[0], 0.02)
+    for obstacles, is_taken in (((), True), ((ball,), False)):
+        options = PlanOptions(obstacles=obstacles).on(scene)
+        _, end = chosen_ends(scene, hovi.State(start), goal, 3.0, options, Deadline())
+        assert isinstance(end, hovi.FrameGoal)
+        assert (np.abs(np.asarray(end.guess) - q).max() < 1e-6) == is_taken
+
+
+def test_ends_that_cannot_be_met_are_told(scene: hovi.Scene) -> None:
+    """Without a start there is no motion; a goal gives a status, as before."""
+    away = hovi.FrameGoal("tool0", position=[3.0, 0, 0])
+    with pytest.raises(UnreachableError, match="misses it by"):
+        hovi.plan(scene, away, np.zeros(6), 1.0, **FAST)
+    motion = hovi.plan(scene, np.zeros(6), away, 1.0, **FAST)
+    assert motion.status is hovi.Status.INFEASIBLE
+    assert "no configuration that reaches the goal was found" in motion.message

@@ -1,0 +1,472 @@
+"""Control points as rows, against sampled trajectories."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.interpolate import BPoly, PPoly
+
+import hovi
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.state import State
+from hovi.optimize.interior_point import minimize_bounded
+from hovi.optimize.trust_region import Options
+from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.sequence.sequence_planner import plan_sequence
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.limits.limit_rows import LEAST_GAP, MAX_LOSS, WEIGHT, LimitRows, push_rows
+from hovi.planning.solver.limits.row_forces import at_instants, forces_of
+from hovi.planning.solver.solver import guess_path, solve_on_grid
+from hovi.robot.loading import load_robot
+from hovi.scene.scene import Scene
+from hovi.schemes import by_name, galerkin
+from samples.manifold_robots import BASES, chain, configurations, with_arm
+
+Array = npt.NDArray[np.float64]
+
+STEPS = np.array([0.3, 0.2, 0.1, 0.4])
+GRIDS = {
+    "one scheme": Grid(STEPS, (galerkin(3),) * 4),
+    "mixed schemes": Grid(
+        STEPS, (galerkin(3), by_name("hermite-simpson"), galerkin(1), galerkin(4))
+    ),
+}
+each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+LIMITS: dict[str, Any] = {"base": "none", "q": 4.0, "v": 3.0, "a": 30.0}
+
+
+def problem_of(
+    base: str, grid: Grid, limits: dict[str, Any] | Limits = LIMITS
+) -> TrajectoryProblem:
+    """A reach of two links, or of a base with joints, in all coordinates."""
+    joints = {"two_link": [], "continuous": ["continuous", "continuous"]}.get(base)
+    if base == "two_link":
+        robot = load_robot(hovi.example("two_link.urdf"))
+    else:
+        robot = load_robot(chain([BASES[b]() for b in joints]) if joints else with_arm(base))
+    q0, q1 = configurations(robot, 2, seed=1, size=0.4)
+    v0, v1 = 0.3 * np.random.default_rng(2).normal(size=(2, robot.nv))
+    ld = DiscreteLagrangian(Scene(robot, []).effort_lagrangian(), grid)
+    return TrajectoryProblem(ld, State(q0, v0), State(q1, v1), limits=as_limits(robot, limits))
+
+
+def wavy(problem: TrajectoryProblem, size: float = 0.03, seed: int = 5) -> DiscretePath:
+    """The cubic guess with nodes and inner modes displaced at random."""
+    objective = ActionObjective(problem)
+    x = guess_path(problem, "cubic")
+    model = objective.model(x, None, None)
+    return objective.retract(x, size * model.random_vector(seed), model)
+
+
+def rows_of(
+    problem: TrajectoryProblem, fixed_ends: tuple[bool, bool] = (False, False)
+) -> LimitRows:
+    assert problem.limits is not None
+    return LimitRows(problem.grid, problem.limits, problem.coordinates.curved_space, fixed_ends)
+
+
+def with_rows(problem: TrajectoryProblem) -> LimitRows:
+    """Rows of which some parts are halved once, and some of these again."""
+    rows = rows_of(problem)
+    for every in (3, 5):
+        rows._halve(np.arange(0, len(rows.parts), every), np.arange(rows.size))
+    return rows
+
+
+def coordinates_of(problem: TrajectoryProblem, path: DiscretePath, k: Array, s: Array) -> Array:
+    """(q in tangent coordinates, v, a, ...) in intervals k at positions s, (rows, M, nv)."""
+    order = max(2, problem.ld.k)
+    q, *rates = problem.trajectory(path).jet_intervals(k, s, order)
+    space = problem.coordinates.curved_space
+    return np.stack([q if space is None else space.coordinates(q), *rates])
+
+
+def sampled_values(problem: TrajectoryProblem, rows: LimitRows, path: DiscretePath) -> Array:
+    """What every row stands for: a Bernstein coefficient of the curve, fitted on its part."""
+    found = []
+    for e in range(rows.size):
+        k, order, joint = rows.intervals[e], rows.orders[e], rows.joints[e]
+        part, i = rows._rows.part[e], rows._rows.number[e]
+        degree = 2 * problem.ld.k - 1 + problem.grid.inner_modes - order
+        u = (1 - np.cos(np.linspace(0.0, np.pi, degree + 1))) / 2
+        s = rows.parts.left[part] + rows.parts.width[part] * u
+        x = coordinates_of(problem, path, np.full(len(s), k), s)[order, :, joint]
+        powers = np.polynomial.polynomial.polyfit(u, x, degree)[::-1]
+        polynomial = PPoly(powers[:, None], [0.0, 1.0])
+        found.append(BPoly.from_power_basis(polynomial).c[i, 0])
+    return np.array(found) / rows.of.ranges[rows.coordinate]
+
+
+def excess_by_sampling(
+    problem: TrajectoryProblem, path: DiscretePath, samples: int = 4001
+) -> Array:
+    """Largest share of its range by which each kind and joint exceeds its limit, per interval."""
+    limits, s = problem.limits, np.linspace(0.0, 1.0, samples)
+    assert limits is not None
+    lower, upper = limits.on(problem.grid.t)
+    found = []
+    for k in range(problem.grid.intervals):
+        x = coordinates_of(problem, path, np.full(samples, k), s)
+        kinds = [0, 1, 2, *([4] if len(x) > 3 else [])]
+        low, high = (each[min(k, len(each) - 1)][kinds] for each in (lower, upper))
+        beyond = np.maximum(x - high[:, None], low[:, None] - x).max(axis=1)
+        with np.errstate(invalid="ignore"):
+            found.append(np.where(np.isfinite(beyond), beyond / limits.ranges[kinds], -np.inf))
+    return np.stack(found)
+
+
+# Values
+
+
+@each_grid
+@pytest.mark.parametrize("base", ["two_link", "continuous", "spherical", "free-flyer", "planar"])
+def test_values_of_rows_are_control_points_of_the_trajectory(base: str, grid: Grid) -> None:
+    problem = problem_of(base, grid)
+    rows, path = with_rows(problem), wavy(problem)
+    assert set(rows.of.order) == ({1, 2} if base == "continuous" else {0, 1, 2})
+    found = rows.values(path)
+    np.testing.assert_allclose(found, sampled_values(problem, rows, path), rtol=1e-8, atol=1e-9)
+
+
+@each_grid
+@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
+def test_columns_of_rows_are_their_derivatives(base: str, grid: Grid) -> None:
+    """Rows are linear in the columns: one difference is exact."""
+    problem = problem_of(base, grid)
+    rows, path = with_rows(problem), wavy(problem)
+    objective = ActionObjective(problem)
+    model = objective.model(path, None, None)
+    step = 1e-3 * model.random_vector(1)
+    moved = objective.retract(path, step, model)
+    found = push_rows(rows, rows.columns(objective.coordinates), model.gather(step))
+    expected = sampled_values(problem, rows, moved) - sampled_values(problem, rows, path)
+    np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-10)
+
+
+@pytest.mark.parametrize("base", ["two_link", "continuous"])
+def test_bounds_and_weights_follow_the_limits(base: str) -> None:
+    problem = problem_of(base, GRIDS["one scheme"])
+    rows = with_rows(problem)
+    lower, upper = rows.bounds
+    kind = np.array([4.0, 3.0, 30.0])[rows.of.order[rows.coordinate]]
+    np.testing.assert_allclose(lower, -kind / (2 * kind))
+    np.testing.assert_allclose(upper, kind / (2 * kind))
+    assert (rows.weights > 0).all()
+    np.testing.assert_allclose(rows.weights / STEPS[rows.intervals], WEIGHT)
+
+
+@pytest.mark.parametrize("base", ["spherical", "free-flyer", "planar"])
+def test_orientations_have_no_rows_and_other_joints_have(base: str) -> None:
+    """Coordinates of an orientation are no polynomials; those of the arm's joints are."""
+    problem = problem_of(base, GRIDS["one scheme"])
+    rows, nv = rows_of(problem), problem.ld.lagrangian.nv
+    first = nv - 3
+    assert set(rows.of.joint) == set(range(first, nv))
+    assert set(rows.joints) <= set(range(first, nv))
+
+
+def test_torques_have_no_rows() -> None:
+    problem = problem_of("two_link", GRIDS["one scheme"], {"base": "none", "tau": 1.0})
+    rows = rows_of(problem)
+    assert rows.size == len(rows.of.order) == 0
+    assert rows.refine(wavy(problem, 1.0), 0.0) is None
+
+
+@pytest.mark.parametrize("fixed_ends", [(True, False), (False, True)])
+def test_given_ends_have_no_rows(fixed_ends: tuple[bool, bool]) -> None:
+    """q and v are data there: two control points of q and one of v, whose rows would vanish."""
+    problem = problem_of("two_link", GRIDS["one scheme"])
+    rows = rows_of(problem, fixed_ends)
+    columns = rows.columns("nodal")
+    free = columns.copy()
+    if fixed_ends[0]:
+        free[rows.intervals == 0, :2] = 0.0
+    if fixed_ends[1]:
+        free[rows.intervals == rows.grid.intervals - 1, 2:4] = 0.0
+    assert (np.abs(free).max(axis=1) > 1e-12).all()
+    both, none = rows_of(problem, (True, True)).size, rows_of(problem, (False, False)).size
+    assert none - rows.size == rows.size - both == 2 * (2 + 1)
+
+
+# The hull
+
+
+@each_grid
+@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
+@pytest.mark.parametrize("seed", range(3))
+def test_motions_whose_rows_are_within_bounds_are_within_their_limits(
+    base: str, grid: Grid, seed: int
+) -> None:
+    """With limits at the largest control point, and a curve that ends just below."""
+    wide = problem_of(base, grid)
+    path, rows = wavy(wide, 0.05, seed), with_rows(wide)
+    y = np.abs(rows.values(path))
+    sizes = {}
+    for order, kind in enumerate("qva"):
+        if (rows.orders == order).any():
+            sizes[kind] = float((y * rows.of.ranges[rows.coordinate])[rows.orders == order].max())
+    limits = {"base": "none", **sizes}
+    problem = problem_of(base, grid, limits)
+    excess = excess_by_sampling(problem, path)[:, rows.of.order, rows.of.joint]
+    assert -0.4 < excess.max() <= 1e-12
+
+
+def test_every_control_point_has_a_row_or_is_given() -> None:
+    """Rows and given values bound all of them: those that are left out are equal to others."""
+    problem = problem_of("two_link", GRIDS["one scheme"])
+    rows, path = rows_of(problem), wavy(problem)
+    y = rows.values(path)
+    for order in range(3):
+        for joint in range(2):
+            own = (rows.orders == order) & (rows.joints == joint)
+            d = 2 * 2 - 1 + problem.grid.inner_modes - order
+            shared = 1 if order < 2 else 0
+            assert own.sum() == 4 * (d + 1) - 3 * shared
+            values = y[own] * rows.of.ranges[rows.coordinate[own]]
+            x = coordinates_of(problem, path, np.arange(4), np.zeros(4))[order, :, joint]
+            assert np.abs(values[:, None] - x).min(axis=0).max() < 1e-9
+
+
+# Refinement
+
+
+def limited(excess: float, kind: str = "q") -> tuple[TrajectoryProblem, DiscretePath]:
+    """A motion whose second joint stays below its upper limit by a share of the range."""
+    free = problem_of("two_link", GRIDS["one scheme"], {"base": "none", kind: 1e3})
+    path, order = wavy(free, 0.01), ["q", "v", "a"].index(kind)
+    k = np.repeat(np.arange(4), 20_001)
+    x = coordinates_of(free, path, k, np.tile(np.linspace(0, 1, 20_001), 4))[order, :, 1]
+    low = x.min() - 1.0
+    high = (x.max() + excess * low) / (1 + excess)  # x.max() - high is excess (high - low)
+    limits = {"base": "none", kind: {free.scene.robot.joint_names[1]: [low, high]}}
+    return problem_of("two_link", GRIDS["one scheme"], limits), path
+
+
+@pytest.mark.parametrize("kind", ["q", "v", "a"])
+def test_refined_rows_come_as_near_to_the_curve_as_the_barrier_asks_for(kind: str) -> None:
+    problem, path = limited(-1e-5, kind)
+    rows = rows_of(problem)
+    outside = float((rows.values(path) - rows.bounds[1]).max())
+    before = np.inf
+    for level in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8):
+        rows.refine(path, level)
+        y, (lower, upper) = rows.values(path), rows.bounds
+        gap = float((y - upper).max()) + 1e-5
+        assert (y > lower).all()
+        assert -1e-12 <= gap <= min(before + 1e-12, max(2 * level, LEAST_GAP, outside))
+        before = gap
+    assert gap <= 1e-5
+    assert rows.refine(path, 1e-8) is None
+
+
+def test_motions_far_from_their_limits_are_left(two_link: hovi.Robot) -> None:
+    problem = problem_of("two_link", GRIDS["one scheme"], LIMITS | {"v": 50.0, "a": 1e5})
+    rows, path = rows_of(problem), wavy(problem, 0.01)
+    assert rows.refine(path, 1e-9) is None
+
+
+def test_fixed_rows_are_not_refined() -> None:
+    problem, path = limited(-1e-5)
+    rows = rows_of(problem)
+    assert rows.fixed_on(problem.grid).refine(path, 1e-3) is None
+    assert rows.copied().refine(path, 1e-3) is not None
+    assert rows.size == rows_of(problem).size
+
+
+@each_grid
+def test_refinement_keeps_rows_and_tells_at_whose_place_new_ones_are(grid: Grid) -> None:
+    problem = problem_of("two_link", grid, {"base": "none", "q": 0.8, "v": 3.0, "a": 30.0})
+    path = wavy(problem, 0.03)
+    rows = rows_of(problem)
+    before, places = rows.values(path), positions(rows)
+    found = rows.refine(path, 1e-3)
+    assert found is not None
+    first = len(found.kept)
+    assert 0 < first < len(before) < rows.size
+    np.testing.assert_allclose(rows.values(path)[:first], before[found.kept], rtol=1e-12)
+    np.testing.assert_allclose(positions(rows)[:first], places[found.kept])
+    assert len(found.origin) == rows.size - first
+    known = found.origin >= 0
+    np.testing.assert_allclose(positions(rows)[first:][known], places[found.origin[known]])
+    assert not np.isin(found.origin[known], found.kept).any()
+    assert known.sum() == len(before) - first
+
+
+def positions(rows: LimitRows) -> Array:
+    """Interval, order, joint and relative time of every row."""
+    degree = 2 * rows.grid.order - 1 + rows.grid.inner_modes - rows.orders
+    part, i = rows._rows.part, rows._rows.number
+    s = rows.parts.left[part] + rows.parts.width[part] * i / degree
+    return np.stack([rows.intervals, rows.orders, rows.joints, s], axis=1)
+
+
+def test_on_another_grid_the_rows_have_the_same_parts() -> None:
+    problem, path = limited(-1e-5)
+    rows = rows_of(problem)
+    rows.refine(path, 1e-4)
+    fine = Grid(STEPS, (galerkin(5),) * 4)
+    other = rows.on(fine)
+    assert other.grid is fine
+    assert len(other.parts) == len(rows.parts)
+    assert other.size > rows.size
+    back = other.on(problem.grid)
+    np.testing.assert_allclose(np.sort(back.values(path)), np.sort(rows.values(path)), rtol=1e-12)
+
+
+def test_rows_keep_their_order_when_time_is_stretched() -> None:
+    problem, path = limited(-1e-5)
+    rows = rows_of(problem)
+    rows.refine(path, 1e-4)
+    longer = rows.on(problem.grid.stretched(2.0 * problem.grid.duration))
+    np.testing.assert_array_equal(positions(longer), positions(rows))
+    slower = 2.0 ** -rows.orders.astype(float)
+    np.testing.assert_allclose(longer._regular, rows._regular * slower[:, None], rtol=1e-12)
+
+
+def test_rows_of_segments_have_the_bounds_of_their_interval(two_link: hovi.Robot) -> None:
+    parts = [as_limits(two_link, {"base": "none", "v": v}) for v in (2.0, 1.0)]
+    limits = Limits.of_segments(parts, [0.5])
+    problem = problem_of("two_link", GRIDS["one scheme"])
+    rows = LimitRows(problem.grid, limits, None)
+    lower, upper = rows.bounds
+    expected = np.where(rows.intervals < 2, 2.0, 1.0)  # the second segment begins at 0.5 s
+    ranges = rows.of.ranges[rows.coordinate]
+    np.testing.assert_allclose(upper * ranges, expected)
+    np.testing.assert_allclose(lower * ranges, -expected)
+
+
+def test_where_limits_change_both_intervals_bound_the_node(two_link: hovi.Robot) -> None:
+    """Elsewhere the control point at a node has one row, of the interval before."""
+    parts = [as_limits(two_link, {"base": "none", "v": v}) for v in (2.0, 1.0)]
+    problem = problem_of("two_link", GRIDS["one scheme"])
+    same = rows_of(problem_of("two_link", GRIDS["one scheme"], {"base": "none", "v": 2.0}))
+    rows = LimitRows(problem.grid, Limits.of_segments(parts, [0.5]), None, (False, False))
+    assert rows.size == same.size + 2
+    at_node = positions(rows)[:, 3] == 0.0
+    assert sorted(rows.intervals[at_node]) == [0, 0, 2, 2]
+    faster = plan_sequence(
+        Scene(two_link, [hovi.effects.Gravity()]),
+        [0.0, 0.0],
+        [
+            hovi.Segment(None, 0.5, limits=parts[0]),
+            hovi.Segment([0.9, 0.9], 0.5, limits=parts[1]),
+        ],
+    )
+    assert faster.success, faster.message
+    t = np.linspace(0.5 + 1e-9, 1.0, 2000)
+    assert np.abs(faster.trajectory.sample(t).v).max() <= 1.0 + 2e-6
+
+
+def test_motions_of_order_3_have_rows_of_the_jerk(two_link: hovi.Robot) -> None:
+    grid = Grid(STEPS, (galerkin(3, 3),) * 4)
+    limits = as_limits(two_link, {"base": "none", "v": 1.0, "a": 3.0, "jerk": 20.0}, 3)
+    ld = DiscreteLagrangian(hovi.spline(2, 3), grid)
+    problem = TrajectoryProblem(ld, State([0.0, 0.1]), State([1.0, -0.5]), limits=limits)
+    path = guess_path(problem, "cubic")
+    random = np.random.default_rng(1)
+    path = dataclasses.replace(path, inner=3.0 * random.normal(size=path.inner.shape))
+    rows = LimitRows(grid, limits, None)
+    assert set(rows.of.order) == {1, 2, 3}
+    found, value = sampled_values(problem, rows, path), rows.values(path)
+    np.testing.assert_allclose(value, found, rtol=1e-9, atol=1e-10)
+    y, (lower, upper) = value, rows.bounds
+    assert np.maximum(y - upper, lower - y).max() >= excess_by_sampling(problem, path).max() > 0
+
+
+# In the objective
+
+
+@each_grid
+@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
+def test_rows_are_outputs_after_those_at_the_points(base: str, grid: Grid) -> None:
+    """The model is that of the action with linear and square terms of all outputs."""
+    problem = problem_of(base, grid)
+    assert problem.limits is not None
+    rows = with_rows(problem)
+    limited = BoundedAction(problem, problem.limits, rows=rows)
+    x = wavy(problem)
+    y0 = limited.outputs(x).y
+    assert len(y0) == len(limited.bounds.lower) == len(limited.bounds.weights)
+    np.testing.assert_allclose(y0[-rows.size :], rows.values(x))
+    random = np.random.default_rng(0)
+    rho, sigma = random.standard_normal(y0.shape), random.uniform(0.0, 9.0, y0.shape)
+    rho[: -rows.size] = sigma[: -rows.size] = 0.0
+    zero = np.zeros_like(rho)
+    plain = limited.model(x, zero, zero, zero)
+    bare = plain.intervals.gradient.copy(), plain.intervals.hessian.copy()
+    model = limited.model(x, sigma, rho, zero)
+    step = model.random_vector(1)
+    local, dy = model.gather(step), limited.push(step, model)
+    w = limited.bounds.weights
+    gained = float(np.vdot(model.intervals.gradient - bare[0], local))
+    assert gained == pytest.approx(float((w * rho) @ dy), rel=1e-9)
+    square = np.einsum("kia,kijab,kjb->", local, model.intervals.hessian - bare[1], local)
+    assert float(square) == pytest.approx(float((w * sigma) @ dy**2), rel=1e-8)
+    pulled = float(np.vdot(limited.pull(rho, model), step))
+    assert pulled == pytest.approx(float((w * rho) @ dy), rel=1e-9)
+    h = 1e-4
+    up, down = (limited.outputs(limited.retract(x, c * h * step, model)).y for c in (1, -1))
+    scale = np.abs(dy).max()
+    np.testing.assert_allclose(dy, (up - down) / (2 * h), rtol=1e-5, atol=1e-6 * scale)
+
+
+@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
+def test_pulling_is_the_transpose_of_pushing(base: str) -> None:
+    """f . (w dy) = pull(f) . step for all outputs, on all spaces."""
+    limits = LIMITS | {"tau": 50.0}
+    problem = problem_of(base, GRIDS["mixed schemes"], limits)
+    assert problem.limits is not None
+    limited = BoundedAction(problem, problem.limits, rows=with_rows(problem))
+    x = wavy(problem)
+    y = limited.outputs(x).y
+    zero = np.zeros_like(y)
+    model = limited.model(x, zero, zero, zero)
+    for seed in range(3):
+        step, force = model.random_vector(seed), np.random.default_rng(seed).normal(size=y.shape)
+        work = float((limited.bounds.weights * force) @ limited.push(step, model))
+        assert float(limited.pull(force, model) @ step) == pytest.approx(work, rel=1e-9)
+
+
+@pytest.mark.parametrize("base", ["two_link", "continuous", "free-flyer"])
+def test_forces_of_rows_do_the_same_work_at_instants(base: str) -> None:
+    """sum w z dy of all rows is that of the forces on (q, v, a) at the instants."""
+    problem = problem_of(base, GRIDS["one scheme"])
+    rows, path = with_rows(problem), wavy(problem)
+    multipliers = np.random.default_rng(3).normal(size=rows.size)
+    instants, (terms,) = forces_of(problem, rows, multipliers)
+    assert instants is not None
+    objective = ActionObjective(problem)
+    model = objective.model(path, None, None)
+    moved = objective.retract(path, 1e-3 * model.random_vector(1), model)
+    work = float((rows.weights * multipliers) @ (rows.values(moved) - rows.values(path)))
+    k, s = instants.intervals, instants.positions
+    change = coordinates_of(problem, moved, k, s) - coordinates_of(problem, path, k, s)
+    forces = terms.jet_gradient.reshape(len(k), 3, -1)
+    work_of_forces = np.einsum("i,ijn,jin->", instants.weights, forces, change)
+    assert float(work_of_forces) == pytest.approx(work, rel=1e-7)
+    assert at_instants(problem, instants).ld.instants is instants
+    assert at_instants(problem, None) is problem
+
+
+def test_solutions_lose_no_more_than_what_they_promise(two_link: hovi.Robot) -> None:
+    """Against a solve with control points so near that the distance does not matter."""
+    grid = Grid.uniform(1.0, 8, galerkin(2))
+    ld = DiscreteLagrangian(Scene(two_link, []).effort_lagrangian(), grid)
+    limits = as_limits(two_link, {"base": "none", "v": [2.2, 2.8]})
+    problem = TrajectoryProblem(ld, State([0.0, 0.0]), State([1.5, -1.8]), limits=limits)
+    found = solve_on_grid(problem)
+    assert found.success
+    fine = LimitRows(grid, limits, None, (True, True), (8, 8))
+    objective = BoundedAction(problem, limits, rows=fine)
+    start = guess_path(problem, found.trajectory)
+    exact = minimize_bounded(objective, start, Options(decrease=1e-10))
+    assert exact.feasible
+    assert 0 < found.cost / exact.outputs.value - 1 < 2 * MAX_LOSS
+    assert excess_by_sampling(problem, found.trajectory.path).max() <= 1e-8

@@ -1,0 +1,265 @@
+"""Motions under equations by Newton's method: KKT, convergence, saddles, infeasibility."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import hovi
+from hovi.optimize.lagrange_newton import ConstrainedIteration
+from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
+from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
+from hovi.planning.solver.solver import solve_on_grid
+from hovi.planning.solver.status import Status
+
+SWING_UPS = ("acrobot_swing_up", "pendubot_swing_up", "cart_pole_swing_up")
+SCHEMES = ("galerkin-2", "galerkin-2x8")
+IPOPT_STEPS = {"acrobot_swing_up": 58, "pendubot_swing_up": 15, "cart_pole_swing_up": 25}
+"""Steps of Ipopt on the same discrete problems, with `galerkin-2` on 40 intervals."""
+BUCKLING = (4 * np.pi**2, 80.763, 16 * np.pi**2)
+"""Loads at which a straight rod of unit length and stiffness, clamped at both ends, loses
+stability; the second and a repeated third one with its midpoint held as well."""
+
+
+@cache
+def swing_up(scene: str, scheme: str, intervals: int = 40) -> hovi.Solution:
+    """A swing-up without limits, from the cubic guess."""
+    task = hovi.load_task(hovi.example(scene))
+    grid = hovi.Grid.uniform(task.duration, intervals, hovi.schemes.by_name(scheme))
+    ld = hovi.DiscreteLagrangian(task.scene.effort_lagrangian(), grid)
+    return solve_on_grid(hovi.TrajectoryProblem(ld, task.start, task.goal))
+
+
+@cache
+def arm() -> hovi.Scene:
+    return hovi.load_task(hovi.example("ur5_reach")).scene
+
+
+def place(q: np.ndarray) -> np.ndarray:
+    """Where the tool of the arm is."""
+    model = arm().model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId("tool0")].translation.copy()
+
+
+def reach(
+    goal: hovi.State | hovi.FrameGoal, via: tuple[hovi.Via, ...] = ()
+) -> hovi.TrajectoryProblem:
+    grid = hovi.Grid.uniform(1.5, 16, hovi.schemes.galerkin(2, points=8))
+    ld = hovi.DiscreteLagrangian(arm().effort_lagrangian(), grid)
+    return hovi.TrajectoryProblem(ld, hovi.State(np.zeros(6)), goal, via=via)
+
+
+HALFWAY, END = np.array([0.5, -1.0, 0.8, 0.2, 0.3, 0.0]), np.array([0.9, -0.6, 0.4, 0.2, 0.3, 0.0])
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scene", SWING_UPS)
+def test_a_swing_up_takes_no_more_steps_than_one_and_a_half_times_ipopt(
+    scene: str, scheme: str
+) -> None:
+    found = swing_up(scene, scheme)
+    assert found.status is Status.MINIMUM
+    assert found.nit == len(found.history) <= 1.5 * IPOPT_STEPS[scene]
+
+
+@pytest.mark.parametrize("scene", SWING_UPS)
+def test_the_number_of_steps_does_not_grow_with_the_grid(scene: str) -> None:
+    coarse, fine = (swing_up(scene, "galerkin-2", N) for N in (40, 160))
+    assert fine.cost == pytest.approx(coarse.cost, rel=1e-3)
+    assert fine.nit <= coarse.nit + 8
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scene", SWING_UPS)
+def test_the_multipliers_make_the_action_stationary(scene: str, scheme: str) -> None:
+    """The derivative of action + lambda . tau along random changes, by central differences."""
+    found = swing_up(scene, scheme)
+    problem, path = found.problem, found.trajectory.path
+    assert problem is not None
+    assert found.forces is not None
+    model, data = problem.scene.model, problem.scene.model.createData()
+    (passive,) = problem.passive
+    (force,) = (each.output_gradient for each in found.forces)
+    (weights,) = problem.ld.point_weights
+
+    def lagrangian(moved: hovi.DiscretePath) -> tuple[float, float]:
+        (jet,) = problem.ld.jets(moved)
+        tau = np.array([pin.rnea(model, data, *x) for x in zip(*jet, strict=True)])
+        effort = 0.5 * float(weights @ np.sum(np.delete(tau, passive, 1) ** 2, axis=1))
+        return effort, float(weights @ (force[:, passive] * tau[:, passive]))
+
+    t, T = problem.grid.t, problem.grid.duration
+    base = problem.moved(path)
+    assert lagrangian(base)[0] == pytest.approx(found.cost, rel=1e-12)
+    for seed in range(3):
+        shape = np.random.default_rng(seed).standard_normal((3, 2))
+
+        def bent(size: float, shape: np.ndarray = shape) -> hovi.DiscretePath:
+            s, k = t / T, np.arange(1, 4)[:, None]
+            bell = (s * (1 - s)) ** 2
+            slope = 2 * s * (1 - s) * (1 - 2 * s) / T
+            wave, rate = np.sin(np.pi * k * s), np.pi * k / T * np.cos(np.pi * k * s)
+            dq = np.einsum("kn,kt->tn", shape, bell * wave)
+            dv = np.einsum("kn,kt->tn", shape, slope * wave + bell * rate)
+            q, v, h = path.q + size * dq, path.v + size * dv, problem.grid.steps[:, None]
+            dz0 = (dq[1:] - dq[:-1] - h * dv[:-1]) / h**2
+            dz1 = (dv[1:] - dv[:-1]) / h
+            z = path.z + size * np.stack([dz0, dz1], axis=1)
+            return hovi.DiscretePath(q, v, z, path.inner)
+
+        above, below = (lagrangian(bent(size)) for size in (1e-4, -1e-4))
+        rates = (np.array(above) - np.array(below)) / 2e-4
+        assert abs(rates.sum()) < 1e-5 * max(np.abs(rates).max(), found.cost)
+        assert np.abs(rates).max() > 1e-3
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scene", SWING_UPS)
+def test_the_last_steps_converge_quadratically(scene: str, scheme: str) -> None:
+    """Whole steps, whose decreases fall like squares down to rounding errors."""
+    last = [step for step in swing_up(scene, scheme).history if step.decrease < 1e-3]
+    assert len(last) >= 3
+    for before, after in pairwise(last):
+        assert isinstance(after, ConstrainedIteration)
+        assert after.ratio == 1.0
+        assert after.shift == 0.0
+        assert np.log(after.decrease) < 1.3 * np.log(before.decrease) or after.decrease < 1e-11
+    assert last[-1].decrease < 1e-9
+
+
+@pytest.mark.parametrize("scene", SWING_UPS)
+def test_a_solution_on_a_coarser_grid_is_followed_in_a_few_steps(scene: str) -> None:
+    coarse = swing_up(scene, "galerkin-2")
+    fine = swing_up(scene, "galerkin-2", 160).problem
+    assert fine is not None
+    found = solve_on_grid(fine, coarse.trajectory)
+    assert found.success
+    assert found.cost == pytest.approx(coarse.cost, rel=1e-3)
+    assert found.nit <= 6
+
+
+@pytest.mark.parametrize("kind", ["pose", "position", "via"])
+def test_frame_goals_and_via_points_have_the_minimum_of_the_rounds(kind: str) -> None:
+    if kind == "via":
+        via = (hovi.Via(0.75, hovi.FrameGoal("tool0", position=place(HALFWAY))),)
+        problem = reach(hovi.State(END), via)
+    else:
+        model = arm().model
+        data = model.createData()
+        pin.framesForwardKinematics(model, data, END)
+        pose = data.oMf[model.getFrameId("tool0")]
+        goal = {"pose": pose} if kind == "pose" else {"position": pose.translation}
+        problem = reach(hovi.FrameGoal("tool0", **goal))
+    near = solve_on_grid(problem, method=AugmentedLagrangian())
+    found = solve_on_grid(problem, near.trajectory, method=LagrangeNewton())
+    assert found.success
+    assert found.nit <= 3
+    assert found.cost == pytest.approx(near.cost, rel=1e-10)
+    node = 8 if kind == "via" else 16
+    target = HALFWAY if kind == "via" else END
+    np.testing.assert_allclose(place(found.trajectory.q[node]), place(target), rtol=0, atol=1e-10)
+
+
+def rod(load: float, held: bool) -> hovi.TrajectoryProblem:
+    """A rod under a load along it, straight: 1/2 q''^2 - load/2 q'^2 + q'^4; t is its length."""
+    q, v, a = (ca.SX.sym(name, 1) for name in "qva")
+    energy = ca.dot(a, a) / 2 - load * ca.dot(v, v) / 2 + ca.dot(v, v) ** 2
+    grid = hovi.Grid.uniform(1.0, 20, hovi.schemes.galerkin(2))
+    ld = hovi.DiscreteLagrangian(hovi.CasadiLagrangian([q, v, a], energy), grid)
+    via = (hovi.Via(0.5, hovi.State([0.0])),) if held else ()
+    return hovi.TrajectoryProblem(ld, hovi.State([0.0]), hovi.State([0.0]), via=via)
+
+
+@pytest.mark.parametrize("load", [30.0, 50.0, 100.0, 200.0])
+def test_the_index_of_a_held_rod_is_the_number_of_ways_it_can_buckle(load: float) -> None:
+    """Holding its midpoint takes the first way, which bends it there, and leaves the others."""
+    ways = sum(load > critical for critical in BUCKLING)
+    free = solve_on_grid(rod(load, held=False), escape_saddles=False)
+    held = solve_on_grid(rod(load, held=True), escape_saddles=False)
+    assert free.n_neg == ways
+    assert held.n_neg == max(ways - 1, 0)
+    assert held.status is (Status.SADDLE if ways > 1 else Status.MINIMUM)
+    np.testing.assert_allclose(held.trajectory.q, 0.0, atol=1e-12)
+
+
+def test_a_held_rod_buckles_where_saddles_are_left() -> None:
+    found = solve_on_grid(rod(100.0, held=True))
+    assert found.status is Status.MINIMUM
+    assert found.cost < -1.0
+    assert "A saddle of cost 0 was left" in found.message
+    q = found.trajectory.q[:, 0]
+    assert abs(q[10]) < 1e-10
+    np.testing.assert_allclose(q, -q[::-1], atol=1e-6)  # as an S
+    assert np.abs(q).max() > 0.05
+
+
+def test_via_points_that_contradict_each_other_are_infeasible() -> None:
+    """And in a fraction of the steps that the rounds take to give up."""
+    at = place(HALFWAY)
+    via = [
+        hovi.Via(0.75, hovi.FrameGoal("tool0", position=at + np.array([x, 0, 0])))
+        for x in (0, 0.05)
+    ]
+    found = solve_on_grid(reach(hovi.State(END), tuple(via)), max_iterations=400)
+    assert found.status is Status.INFEASIBLE
+    assert "the goal at t = 0.75 s cannot be met: frame 'tool0' misses it by" in found.message
+    middle = place(found.trajectory.q[8])
+    np.testing.assert_allclose(middle, at + np.array([0.025, 0, 0]), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("limit", [{"max_iterations": 3}, {"time_limit": 0.0}])
+def test_a_search_that_is_cut_short_says_what_remains(limit: dict[str, float]) -> None:
+    problem = swing_up("pendubot_swing_up", "galerkin-2").problem
+    assert problem is not None
+    found = solve_on_grid(problem, **limit)
+    assert found.status in (Status.ITERATION_LIMIT, Status.TIME_LIMIT)
+    assert found.nit <= 3
+
+
+def test_steps_are_reported_as_they_are_counted() -> None:
+    problem = swing_up("pendubot_swing_up", "galerkin-2").problem
+    assert problem is not None
+    steps: list[int] = []
+    found = solve_on_grid(problem, report=lambda step, cost: steps.append(step))
+    assert steps == list(range(1, found.nit + 1))
+
+
+def tool(q: np.ndarray) -> pin.SE3:
+    """The pose of the tool of the arm."""
+    model = arm().model
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return data.oMf[model.getFrameId("tool0")].copy()
+
+
+@cache
+def posed() -> hovi.Solution:
+    """A reach to a pose of the tool."""
+    return solve_on_grid(reach(hovi.FrameGoal("tool0", tool(END))))
+
+
+def test_replanning_follows_a_frame_goal_in_a_few_steps() -> None:
+    """From the old motion and the multipliers that it has, and not from inverse kinematics."""
+    pose = tool(END)
+    pose.translation += [0.004, -0.003, 0.002]
+    again = posed().replan(goal=hovi.FrameGoal("tool0", pose))
+    assert again.success
+    assert again.nit <= 5
+    np.testing.assert_allclose(tool(again.trajectory.q[-1]), pose, rtol=0, atol=1e-9)
+    assert np.abs(again.trajectory.q[-1] - posed().trajectory.q[-1]).max() < 0.1
+
+
+def test_replanning_to_a_goal_turned_by_half_a_turn_does_not_stay_where_it_is() -> None:
+    """The equations hold at the old end, half a turn away from the goal."""
+    pose = tool(END)
+    pose.rotation = pose.rotation @ np.diag([-1.0, -1.0, 1.0])
+    again = posed().replan(goal=hovi.FrameGoal("tool0", pose))
+    assert again.success, again.message
+    np.testing.assert_allclose(tool(again.trajectory.q[-1]), pose, rtol=0, atol=1e-9)
