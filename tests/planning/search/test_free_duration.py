@@ -272,11 +272,15 @@ def test_around_an_obstacle_the_best_duration_is_cheaper_than_its_neighbours(
     assert bare.cost + 30.0 * T < found.cost * (1 - 0.01)
 
 
-@pytest.mark.parametrize("limit", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("share", [0.03, 0.15, 0.4])
 def test_a_time_limit_is_told_wherever_it_ends_the_search(
-    two_link: hovi.Robot, limit: float
+    two_link: hovi.Robot, share: float
 ) -> None:
-    found = raised(two_link, (0.3, 3.0), time_weight=1e5, time_limit=limit, intervals=40)
+    options = {"time_weight": 1e5, "intervals": 40}
+    whole = raised(two_link, (0.3, 3.0), **options)
+    assert whole.success
+    limit = share * whole.solve_seconds
+    found = raised(two_link, (0.3, 3.0), time_limit=limit, **options)
     assert (found.success, found.status) == (False, hovi.Status.TIME_LIMIT)
     assert "time limit" in found.message
     assert "a minimum of cost" not in found.message

@@ -197,7 +197,7 @@ def ended_early(best: Solution, status: Status, why: str) -> Solution:
     """The best motion so far, without success. why: a clause."""
     message = (
         f"{why}; the motion is the best so far, on {best.trajectory.grid.intervals} intervals of "
-        f"{best.trajectory.duration:.6g} s, of cost {best.cost:.10g}."
+        f"{best.trajectory.duration:.10g} s, of cost {best.cost:.10g}."
     )
     return dataclasses.replace(best, success=False, status=status, message=message)
 

@@ -119,13 +119,20 @@ class Search:
             self.progress("comparing with a finer grid", 0.95)
         for i, solution in enumerate(found[:MAX_REFINED]):
             problem = solution.problem or on_grid_of(self.fine.problem(), solution)
-            checked.append(resolved(dataclasses.replace(solution, problem=problem)))
+            after = resolved(dataclasses.replace(solution, problem=problem))
+            checked.append(self._with_duration(after) if solution.success else after)
             if checked[-1].success:
                 return [_noting_cheaper(checked), *found[i + 1 :]]
             if self.deadline.passed or interrupted():
                 break
         best = checked[0]
         return [best if self.fine.tolerance is None else unresolved_if_whirling(best)]
+
+    def _with_duration(self, refused: Solution) -> Solution:
+        """The solution, which says its duration if that is free, also where a check refused it."""
+        if self.free is None or refused.success:
+            return refused
+        return _with_note(refused, f"The duration is {refused.trajectory.duration:.10g} s.")
 
     def _coarse(self) -> Job:
         """The job on the grid of the exploration."""
