@@ -432,3 +432,14 @@ def test_some_outputs_of_a_barrier_keep_all_that_is_theirs() -> None:
     assert (some.mu, some.scale) == (barrier.mu, barrier.scale)
     assert some.bounds.measure == barrier.bounds.measure
     assert (barrier.of(np.array([-1])).multipliers == 0.0).all()
+
+
+@pytest.mark.parametrize("mu", [1e-4, 1e-8, 1e-12])
+def test_a_step_leaves_a_gap_of_which_rounding_errors_are_a_small_share(mu: float) -> None:
+    """However small mu: a gap of 1e-7 that shrank by mu would vanish beside its slack."""
+    bounds = Bounds(np.array([0.0]), np.array([1.0]), np.ones(1))
+    y = np.array([1e-7])
+    barrier = Barrier(bounds, y, np.array([mu / 1e-7]), np.array([mu]), mu, 1.0)
+    along = barrier.aim(y, np.array([-1.0]), barrier.central_targets())
+    moved = barrier.moved(y + along.primal * along.dy, along, 1.0, 0.0)
+    assert moved.s[0] >= 0.9e-4 * y[0]

@@ -27,6 +27,9 @@ MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
 """Largest share of the distance to a bound in one step while mu is large."""
+LARGEST_FRACTION = 1.0 - 1e-4
+"""The same when mu is small: a slack nearer to its bound than mu over its multiplier takes a gap
+below rounding errors."""
 SLACK_MATCHED = 1e-9
 """Largest |y - s| at which the slack has reached its output and limits the length of a step."""
 
@@ -223,7 +226,7 @@ class Barrier:
         """
         s, zl, zu = (np.empty_like(y) for _ in range(3))
         keep = self.boundary_fraction
-        dual = min(1.0, keep * along.dual)
+        dual = 1.0 if along.dual >= 1.0 else keep * along.dual
         d = (along.ds, along.dzl, along.dzu)
         numbers = (share, dual, keep, self.mu, penalty, MAX_DUAL_RATIO)
         native.move(*self.arrays, y, *d, *numbers, s, zl, zu)
@@ -240,7 +243,7 @@ class Barrier:
     @property
     def boundary_fraction(self) -> float:
         """Largest share of a gap that one step takes."""
-        return max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale)
+        return min(max(FRACTION_TO_BOUNDARY, 1.0 - self.mu / self.scale), LARGEST_FRACTION)
 
     def _clipped(self) -> Barrier:
         """Multipliers limited to a range around the central path, zero where there is no bound."""

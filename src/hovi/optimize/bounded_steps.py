@@ -158,7 +158,8 @@ class BoundedSteps(Generic[X]):
             smooth = share * slope + 0.5 * share**2 * square
             return before - barrier.merit(y, self.penalty, along, share) - smooth
 
-        longest = min(1.0, barrier.boundary_fraction * along.primal)
+        inside = along.primal >= 1.0  # a slack at the end of a whole step is kept off its bound
+        longest = 1.0 if inside else barrier.boundary_fraction * along.primal
         share, predicted = longest, decrease(longest)
         for shorter in SHORTER_SHARES:
             if abs(predicted) <= 10 * self.noise or (pulled is not None and predicted > 0):

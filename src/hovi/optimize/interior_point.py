@@ -45,7 +45,9 @@ X = TypeVar("X")
 INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
 WHOLE_STEP = 0.9
-"""Share of a step above which it may be the last."""
+"""Share of a step from which it is a whole one, after which little remains."""
+SHORT_STEP_SHARE = 1e-4
+"""Decrease that may remain where the last step was no whole one, relative to that of whole ones."""
 FIRST_REFINEMENT = 1e-2
 """Mean product z gap, relative to the mean density, below which outputs are first refined."""
 NEXT_REFINEMENT = 0.1
@@ -140,15 +142,16 @@ class _Iteration(BoundedSteps[X]):
             raise_if_late()
             step = self.step(model)
             accepted = self._try(step, model)
-            if accepted and self._finished(step) and not self._refined(at_end=True):
+            finished = self._finished(step, accepted)
+            refined = (accepted or finished) and self._refined(at_end=finished)
+            if finished and not refined:
                 self.outcome.stop = Stop.STATIONARY
                 self.outcome.model = self.model()
                 return
             if self._is_hopeless():
                 self.outcome.stop = Stop.DIVERGED
                 return
-            if accepted:
-                self._refined(at_end=False)
+            if accepted or refined:
                 model = self.model()
 
     def _try(self, step: BoundedStep, model: QuadraticModel) -> bool:
@@ -204,13 +207,15 @@ class _Iteration(BoundedSteps[X]):
         stalled = self.stalled >= MAX_STALLED_STEPS
         return stalled or slow or self.penalty > MAX_FORCE * self.density
 
-    def _finished(self, step: BoundedStep) -> bool:
-        """Whether the last step was a whole one of the last mu, and predicted next to nothing."""
-        whole = step.trial.newton and step.share >= WHOLE_STEP and self.outcome.feasible
-        small = step.decrease <= self.options.decrease * self.scale()
+    def _finished(self, step: BoundedStep, accepted: bool) -> bool:
+        """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
         last = step.mu <= 1.01 * self.final_mu and self.product <= 10.0 * self.final_mu
-        enough = step.remaining <= self.options.enough * self.scale() and self.outcome.feasible
-        return last and ((whole and small) or (step.trial.newton and enough))
+        enough = max(self.options.decrease, self.options.enough) * self.scale()
+        whole = accepted and step.share >= WHOLE_STEP
+        small = step.remaining <= SHORT_STEP_SHARE * enough
+        if whole:
+            small = max(step.remaining, step.decrease) <= enough
+        return last and small and step.trial.newton and self.outcome.feasible
 
     def _reduce_mu(self, step: BoundedStep) -> None:
         """Reduce mu after a plain step once its problem is solved."""

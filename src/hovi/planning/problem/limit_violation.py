@@ -60,10 +60,12 @@ class Excess:
         return float(max(self.lower.max(), self.upper.max()))
 
 
-def excess_along(trajectory: Trajectory, limits: Limits, refined: bool = True) -> Excess:
+def excess_along(
+    trajectory: Trajectory, limits: Limits, refined: npt.NDArray[np.bool_] | bool = True
+) -> Excess:
     """The extremes of the limited quantities along the interpolant, compared with the limits.
 
-    refined: whether they are looked for between the samples.
+    refined: whether they are looked for between the samples, for all or for each, (kinds, nv).
 
     Every interval is sampled, and again more densely around all extremes that are near a bound, and
     wherever the curvature of the samples allows an excess between them: a motion along a bound has
@@ -74,8 +76,10 @@ def excess_along(trajectory: Trajectory, limits: Limits, refined: bool = True) -
     k, s = np.repeat(np.arange(N), SAMPLES), np.tile(POSITIONS, N)
     outputs = _outputs(trajectory, k, s, limits).reshape(N, SAMPLES, *shape)
     below, above = limits.on(trajectory.t)
-    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs, refined)
-    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs, refined)
+    kinds, joints = np.nonzero(limits.bounded & refined)
+    chosen = kinds, joints
+    lower, at_lower = _Side(trajectory, limits, -1.0, below).extremes(outputs, chosen)
+    upper, at_upper = _Side(trajectory, limits, 1.0, above).extremes(outputs, chosen)
     return Excess(lower, upper, at_lower, at_upper)
 
 
@@ -91,23 +95,26 @@ class _Side:
     sign: float
     bound: Array
 
-    def extremes(self, outputs: Array, refined: bool) -> tuple[Array, Array]:
+    def extremes(self, outputs: Array, chosen: tuple[Index, Index]) -> tuple[Array, Array]:
         """The largest excess in each interval, and its relative position, (N, kinds, nv) each.
 
-        outputs: of all samples, shape (N, SAMPLES, kinds, nv).
+        outputs: of all samples, shape (N, SAMPLES, kinds, nv). chosen: kinds and joints that are
+            refined.
         """
         raise_if_late()
         excess = self.sign * (outputs - self.bound[:, None]) / self.limits.ranges
         index = np.argmax(excess, axis=1)
         largest = np.take_along_axis(excess, index[:, None], axis=1)[:, 0]
         s = POSITIONS[index]
-        if not refined:
-            return largest, s
-        k, sample, kind, joint = np.nonzero(
-            _near_extremes(excess, largest) | _may_exceed(excess, self.limits.tolerance)
+        kinds, joints = chosen
+        some = excess[:, :, kinds, joints]
+        k, sample, column = np.nonzero(
+            _near_extremes(some, largest[:, kinds, joints])
+            | _may_exceed(some, self.limits.tolerance)
         )
         if len(k) == 0:
             return largest, s
+        kind, joint = kinds[column], joints[column]
         found, at = self.refined(k, sample, kind, joint)
         for row in np.argsort(found):  # the largest of each interval and output comes last
             entry = k[row], kind[row], joint[row]
@@ -172,10 +179,9 @@ def _stacked(motion: Sample, space: ConfigurationSpace | None) -> Array:
 def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
     """Samples that are local extremes, and are the largest of their output or next to its bound.
 
-    excess: of the samples, shape (N, SAMPLES, kinds, nv). largest: of each interval, shape
-        (N, kinds, nv).
+    excess: of the samples, shape (N, SAMPLES, K). largest: of each interval, shape (N, K).
     """
-    padded = np.pad(excess, ((0, 0), (1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
+    padded = np.pad(excess, ((0, 0), (1, 1), (0, 0)), constant_values=-np.inf)
     with np.errstate(invalid="ignore"):
         peak = (excess >= padded[:, :-2]) & (excess >= padded[:, 2:])
     highest = (excess == largest[:, None]) & (excess > -REFINEMENT_SHARE)
@@ -185,7 +191,7 @@ def _near_extremes(excess: Array, largest: Array) -> npt.NDArray[np.bool_]:
 def _may_exceed(excess: Array, tolerance: float) -> npt.NDArray[np.bool_]:
     """Samples next to which a parabola through three of them may exceed a bound.
 
-    excess: of the samples, shape (N, SAMPLES, kinds, nv). tolerance: of an excess.
+    excess: of the samples, shape (N, SAMPLES, K). tolerance: of an excess.
     """
     with np.errstate(invalid="ignore"):
         bend = np.abs(np.diff(excess, 2, axis=1))

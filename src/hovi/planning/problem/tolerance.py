@@ -23,6 +23,14 @@ CURVE_TOLERANCE = 1e-3
 """Relative error of the integral along the curve that no tolerance of another kind, and no smaller
 one of the cost, asks to improve."""
 
+LAST_BARRIER = 1e-8
+"""Last barrier parameter within limits where nothing else is asked for, relative to the mean
+density of the cost, which exceeds its minimum by some ten times as much."""
+BARRIER_SHARE, LARGEST_BARRIER = 1e-3, 1e-6
+"""The same for a tolerance of the cost, as a share of it, and at most."""
+REMAINING_SHARE = 0.1
+"""Predicted relative decrease of the last step within limits, as a share of the last barrier."""
+
 
 class Quantity(StrEnum):
     """The quantity whose error is bounded."""
@@ -70,6 +78,13 @@ class Tolerance:
             return cls(float(tolerance))._checked(robot)
         except OverflowError:
             raise InputError(_expected(tolerance)) from None
+
+    @property
+    def barrier(self) -> float:
+        """The last barrier parameter of solves within limits, relative to the mean density."""
+        if self.quantity is not Quantity.COST:
+            return LAST_BARRIER
+        return min(max(LAST_BARRIER, BARRIER_SHARE * self.size), LARGEST_BARRIER)
 
     @classmethod
     def _parsed(cls, text: str) -> Self:

@@ -90,7 +90,13 @@ def solve_to_tolerance(
     The solution's `accuracy` reports the estimated error, and why the tolerance was not reached.
     """
     deadline = Deadline(time_limit)
-    first = solve_on_grid(problem, guess, max_iterations=max_iterations, time_limit=time_limit)
+    first = solve_on_grid(
+        problem,
+        guess,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        barrier=tolerance.barrier,
+    )
     return refine_to_tolerance(
         first,
         tolerance,
@@ -233,7 +239,8 @@ class _Search:
         steps, left = self.max_iterations, self.deadline.seconds_left
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
-        return solve_on_grid(problem, guess, max_iterations=steps, time_limit=left)
+        barrier = self.tolerance.barrier
+        return solve_on_grid(problem, guess, max_iterations=steps, time_limit=left, barrier=barrier)
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
         """The chosen solution with its accuracy."""

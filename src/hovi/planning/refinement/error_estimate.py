@@ -42,7 +42,8 @@ RICHER_LEVEL = 1e-3
 FINISHED_LEVEL = 1e-4
 """Barrier parameter at which such a motion is solved to its end."""
 RICHER_BARRIER = 1e-7
-"""Its last barrier parameter, whose share of the cost is less than errors that can be told."""
+"""Its least last barrier parameter, whose share of the cost is less than errors that can be told.
+"""
 MAX_FINER_STEPS = 80
 """Maximum number of steps to a finer solution: one that takes more is not near."""
 
@@ -143,17 +144,25 @@ def richer_within_limits(
     paths = tuple(prolonged(point, fine.grid) for _, point in central.points)
     method = InteriorPoint(central.on(fine.grid, paths), RICHER_LEVEL)
     start = prolonged(path, fine.grid)
-    found = _solved(fine, start, problem, path, time_limit, method)
-    return None if found is None else dataclasses.replace(found, finish=partial(_finished, found))
+    barrier = max(RICHER_BARRIER, central.level)
+    found = _solved(fine, start, problem, path, time_limit, method, barrier)
+    if found is None:
+        return None
+    return dataclasses.replace(found, finish=partial(_finished, found, central.level))
 
 
-def _finished(found: FinerSolution) -> Solution | None:
-    """A motion that is no minimum yet, or whose limits were not checked, solved to the end."""
+def _finished(found: FinerSolution, barrier: float) -> Solution | None:
+    """A motion that is no minimum yet, or whose limits were not checked, solved to the end.
+
+    barrier: last barrier parameter.
+    """
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
     method = InteriorPoint(known.central.freed(), FINISHED_LEVEL)
-    solution = solve_on_grid(known.problem, known.trajectory.path, near=True, method=method)
+    solution = solve_on_grid(
+        known.problem, known.trajectory.path, near=True, method=method, barrier=barrier
+    )
     return solution if solution.success else None
 
 
@@ -194,13 +203,14 @@ def _solved(
     path: DiscretePath,
     time_limit: float | None,
     method: Method | None = None,
+    barrier: float = RICHER_BARRIER,
 ) -> FinerSolution | None:
     """The finer solution by a full solve, which may split intervals for limits.
 
     Its gains are half the integral of the squared difference of the torques.
     """
     solution = solve_on_grid(
-        fine, start, time_limit=time_limit, near=True, method=method, barrier=RICHER_BARRIER
+        fine, start, time_limit=time_limit, near=True, method=method, barrier=barrier
     )
     if not solution.success or solution.problem is None:
         return None

@@ -155,8 +155,10 @@ class FinalStages:
         """A solve from the guess on the first grid with more quadrature points."""
         job = with_more_points(self.fine)
         left, most = self.deadline.seconds_left, job.options.max_iterations
-        guess = job.options.guess
-        return solve_on_grid(job.problem(), guess, max_iterations=most, time_limit=left)
+        guess, barrier = job.options.guess, job.barrier
+        return solve_on_grid(
+            job.problem(), guess, max_iterations=most, time_limit=left, barrier=barrier
+        )
 
     def _report_round(self, which: str, done: Round) -> None:
         text = f"{which}{done.intervals} intervals, estimated error {done.error:.1e}"
@@ -178,7 +180,9 @@ class FinalStages:
         """A minimum in the motion and the duration from a motion; None where not supported."""
         left, most = self.deadline.seconds_left, self.fine.options.max_iterations
         problem, path = first.problem, first.trajectory.path
-        return None if problem is None else joint_minimum(free, problem, path, most, left, True)
+        if problem is None:
+            return None
+        return joint_minimum(free, problem, path, most, left, True, self.fine.barrier)
 
     def _stretched(self, grid: Grid) -> SolveFor:
         """A solver on a grid that is scaled to each duration."""

@@ -18,7 +18,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Tolerance
+from hovi.planning.problem.tolerance import LAST_BARRIER, Tolerance
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.solver.solver import guess_path
 from hovi.scene.lagrangian import Lagrangian
@@ -109,6 +109,11 @@ class Job:
         """The largest allowed error; None for a given grid."""
         given = self.options.tolerance
         return None if given is None else Tolerance.of(given, self.scene.robot)
+
+    @property
+    def barrier(self) -> float:
+        """The last barrier parameter of its solves within limits: see solve_on_grid."""
+        return LAST_BARRIER if self.tolerance is None else self.tolerance.barrier
 
     def with_options(self, **changes: Any) -> Self:
         """The job with some of its options changed."""

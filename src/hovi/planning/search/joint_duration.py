@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.search.continuation import STOPPED
 from hovi.planning.search.free_duration import (
     DURATION_PRECISION,
@@ -35,6 +36,7 @@ def joint_minimum(
     max_iterations: int,
     time_limit: float | None,
     near: bool = False,
+    barrier: float = LAST_BARRIER,
 ) -> Solution | None:
     """A minimum in the motion and the duration, or the best motion if the solve was stopped.
 
@@ -45,7 +47,13 @@ def joint_minimum(
         return None
     price = TimePrice(free.weight, free.lower, free.upper)
     found = solve_jointly(
-        problem, path, price, max_iterations=max_iterations, time_limit=time_limit, near=near
+        problem,
+        path,
+        price,
+        max_iterations=max_iterations,
+        time_limit=time_limit,
+        near=near,
+        barrier=barrier,
     )
     return found if found.success or found.status in STOPPED else None
 

@@ -121,9 +121,15 @@ def _solve(
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
     problem, most = job.problem(), job.options.max_iterations
-    solution = None if free is None else joint_minimum(free, problem, guess, most, time_limit)
+    solution = (
+        None
+        if free is None
+        else joint_minimum(free, problem, guess, most, time_limit, barrier=job.barrier)
+    )
     if solution is None:
-        solution = solve_on_grid(problem, guess, max_iterations=most, time_limit=time_limit)
+        solution = solve_on_grid(
+            problem, guess, max_iterations=most, time_limit=time_limit, barrier=job.barrier
+        )
     price = 0.0 if free is None else free.weight * solution.trajectory.duration
     return dataclasses.replace(solution, problem=None, cost=solution.cost + price)
 

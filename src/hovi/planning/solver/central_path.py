@@ -34,6 +34,11 @@ class CentralPath:
     margins: Array | None = None
 
     @property
+    def level(self) -> float:
+        """The barrier parameter of the solution."""
+        return self.points[-1][0]
+
+    @property
     def last(self) -> DiscretePath:
         """The solution."""
         return self.points[-1][1]
@@ -45,8 +50,7 @@ class CentralPath:
 
     def ending_at(self, path: DiscretePath) -> CentralPath:
         """The same with another last path, on the same grid."""
-        level, _ = self.points[-1]
-        return dataclasses.replace(self, points=(*self.points[:-1], (level, path)))
+        return dataclasses.replace(self, points=(*self.points[:-1], (self.level, path)))
 
     def on(self, grid: Grid, paths: tuple[DiscretePath, ...]) -> CentralPath:
         """The same with other paths, on a grid of the same intervals, and with its rows fixed."""

@@ -25,7 +25,7 @@ from hovi.errors import InputError
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.problem.tolerance import Accuracy
+from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for
@@ -45,10 +45,8 @@ from hovi.system.interruption import interruptible, record_interrupt
 
 MAX_CORRECTIONS = 6
 """Maximum number of quasi-Newton steps on the initial guess of `replan`."""
-LAST_BARRIER = 1e-8
-"""Last barrier parameter where nothing else is asked for, relative to the cost's mean density."""
 SOLVE_SHARE = 0.6
-"""Share of a time limit of `replan` and `advance` that is for the solve; the rest is for checks."""
+"""Share of a time limit of `replan` and `advance` for the solve, before the checks."""
 STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
@@ -317,6 +315,7 @@ def solve_on_grid(
         escape_saddles=escape_saddles,
         near=isinstance(guess, Trajectory) if near is None else near,
         barrier=barrier,
+        enough=REMAINING_SHARE * barrier,
     )
     started = time.perf_counter()
     try:

@@ -51,3 +51,18 @@ def test_a_solve_from_a_motion_on_a_finer_grid_stays_near_it() -> None:
     assert finer.cost == pytest.approx(found.cost, rel=1e-3)
     t = found.trajectory.t
     assert np.abs(finer.trajectory.sample(t).q - found.trajectory.q).max() < 0.1
+
+
+def test_a_solve_of_several_rounds_keeps_the_beginning_of_its_central_path(
+    arm_scene: Scene,
+) -> None:
+    """The next solve may need the room of a large barrier, which the last round did not have."""
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 6, galerkin(1)))
+    limits = as_limits(arm_scene.robot, {"base": "none", "tau": 9.0})
+    found = solve_on_grid(TrajectoryProblem(ld, State(HANG), State(REACH_Q, REACH_V), limits))
+    assert found.central is not None
+    levels = [level for level, _ in found.central.points]
+    assert levels == sorted(levels, reverse=True)
+    assert levels[0] > 0.01
+    shapes = {x.inner.shape for _, x in found.central.points}
+    assert shapes == {found.trajectory.path.inner.shape}

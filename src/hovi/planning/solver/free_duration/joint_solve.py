@@ -11,12 +11,13 @@ from hovi.optimize.trust_region import Options, Outcome, Stop, minimize
 from hovi.planning.problem.contradictions import contradiction
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.tolerance import LAST_BARRIER
 from hovi.planning.solver.action_objective import MAX_BAND_INTERVALS
 from hovi.planning.solver.free_duration.timed_action import TimedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice, stretched_path
 from hovi.planning.solver.free_duration.timed_search import minimum_within_limits
 from hovi.planning.solver.methods.method import MethodResult
-from hovi.planning.solver.solver import LAST_BARRIER, STATIONARY_DECREASE, Solution, solution_of
+from hovi.planning.solver.solver import STATIONARY_DECREASE, Solution, solution_of
 from hovi.planning.solver.status import Status, chart_sentence, status_of
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import OutOfTimeError
@@ -49,6 +50,7 @@ def solve_jointly(
     time_limit: float | None = None,
     escape_saddles: bool = True,
     near: bool = False,
+    barrier: float = LAST_BARRIER,
 ) -> Solution:
     """A motion x and a duration T that minimise S(x, T) + w T, with T between bounds.
 
@@ -67,7 +69,7 @@ def solve_jointly(
         escape_saddles=escape_saddles,
         exact=True,
         near=near,
-        barrier=LAST_BARRIER,
+        barrier=barrier,
     )
     if problem.limited and problem.limits is not None:
         result = _limited(first, problem.limits, guess, price, options)

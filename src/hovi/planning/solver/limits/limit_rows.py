@@ -42,6 +42,8 @@ LEAST_LOSS = 1e-7
 which its part is not halved."""
 MAX_LOSS = 1e-5
 """Rise of the cost by all of them, as a share of the cost, below which none is."""
+LOSS_RATIO = 50.0
+"""The same, relative to the last barrier parameter of the solve, if that is larger."""
 MAX_HALVINGS = 4
 """Number of times that a part is halved at once."""
 
@@ -52,6 +54,7 @@ class LimitRows:
     grid: on which they are. limits: imposed. space: of the configurations; None for a vector space.
     fixed_ends: whether the start and the goal are given, and with them the control points there.
     halvings: of all intervals for the control points of positions, and for those of derivatives.
+    barrier: the last barrier parameter, relative to the mean density of the cost.
     """
 
     def __init__(
@@ -61,12 +64,14 @@ class LimitRows:
         space: ConfigurationSpace | None,
         fixed_ends: tuple[bool, bool] = (True, True),
         halvings: tuple[int, int] = (0, 0),
+        barrier: float = 0.0,
     ) -> None:
         self.grid = grid
         self.space = space
         self.fixed_ends = fixed_ends
         self.limits = limits
         self.fixed = False
+        self.max_loss = max(MAX_LOSS, LOSS_RATIO * barrier)
         self.of = LimitedCoordinates.of(limits, grid, space)
         depth = np.where(self.of.order == 0, *halvings)
         self.parts = LimitedParts.halved(grid.intervals, depth)
@@ -172,7 +177,7 @@ class LimitRows:
         gap, force = np.abs(outside), level / slack
         loss = self.weights / self.grid.duration * force * gap
         some = (gap > max(LEAST_GAP, level)) & (loss > LEAST_LOSS)
-        return np.unique(self._rows.part[some & (loss.sum() > MAX_LOSS)])
+        return np.unique(self._rows.part[some & (loss.sum() > self.max_loss)])
 
     def _halve(self, coarse: Index, numbers: Index) -> Index:
         """Halve parts; returns the given numbers of the rows that remain, and -1 for the new."""

@@ -63,6 +63,7 @@ class BoundedSearch:
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve.
+    points: of the central path, with a larger barrier than that of the last solution.
     along, level: see InteriorPoint. plain: see minimize_bounded.
     """
 
@@ -89,8 +90,10 @@ class BoundedSearch:
                 distances, self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
             )
         self.margins = self.no_margins()
-        self.rows = self.coarse_rows()
+        known = None if self.along is None else self.along.rows
+        self.rows = self.coarse_rows() if known is None else known.copied()
         self.tightened: tuple[Array, Array] | None = None
+        self.points: list[tuple[float, DiscretePath]] = []
 
     @property
     def least_distance(self) -> float:
@@ -115,7 +118,8 @@ class BoundedSearch:
         problem = self.problem
         given = isinstance(problem.start, State), isinstance(problem.goal, State)
         space = problem.coordinates.curved_space
-        return LimitRows(problem.grid, self.limits, space, given, halvings)
+        barrier = self.options.barrier
+        return LimitRows(problem.grid, self.limits, space, given, halvings, barrier)
 
     def objective(
         self, known: Multipliers | None, algebra: LinearAlgebra | None = None
@@ -128,20 +132,26 @@ class BoundedSearch:
     def central_path(self, outcome: Bounded) -> CentralPath:
         """The points at which the barrier of a solve was larger, and its solution."""
         density = mean_density(outcome.outputs, self.objective(self.multipliers))
-        points = [(product / density, x) for product, x in outcome.marks]
-        last = (outcome.barrier.mu / density, outcome.x)
+        points = (*self.points, (outcome.barrier.mu / density, outcome.x))
         barrier = None if self.clearance is not None else outcome.barrier
-        return CentralPath((*self._before(points), *points, last), self.rows, barrier, self.margins)
+        return CentralPath(points, self.rows, barrier, self.margins)
 
-    def _before(self, points: list[tuple[float, DiscretePath]]) -> list[tuple[float, DiscretePath]]:
-        """Points of the path along which the solve began, whose barriers are larger than its own.
+    def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:
+        """Add the points at which the barrier of a solve was larger to those of earlier solves.
 
-        They are on the central path of a similar problem only, but the next solve may need room.
+        These are on the central path of a similar problem only, but the next solve may need room.
         """
-        if self.along is None or self.along.last.q.shape != points[0][1].q.shape:
-            return []
-        larger = [(level, x) for level, x in self.along.points if level > points[0][0]]
-        return [(level, self.problem.moved(x)) for level, x in larger]
+        density = mean_density(outcome.outputs, objective)
+        points = [(product / density, x) for product, x in outcome.marks]
+        first, like = points[0]
+        before = [
+            (level, x)
+            for level, x in self.points or ([] if self.along is None else self.along.points)
+            if level > first and x.inner.shape == like.inner.shape
+        ]
+        if not self.points:
+            before = [(level, self.problem.moved(x)) for level, x in before]
+        self.points = before + points
 
     def remaining_options(self) -> Options:
         """The options with the remaining time as time limit."""
@@ -177,6 +187,8 @@ class BoundedSearch:
         self.iterations += outcome.iterations
         self.history += outcome.history
         self.last = self.problem, outcome.x
+        if outcome.stop is Stop.STATIONARY and outcome.marks:
+            self._followed(outcome, objective)
         return outcome
 
     def forces(self, outcome: Bounded) -> tuple[Instants | None, list[PointTerms]]:
@@ -211,9 +223,12 @@ class BoundedSearch:
         return model.negative_eigenvalues() if isinstance(model, MergeTreeModel) else -1
 
     def excess(self, path: DiscretePath) -> Array:
-        """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs)."""
+        """Excess over lower and upper bounds in every interval, shape (2, N, kinds nv + pairs).
+
+        What rows bound holds by construction, and is looked at at samples alone.
+        """
         trajectory = self.problem.trajectory(path)
-        excess = excess_along(trajectory, self.limits)
+        excess = excess_along(trajectory, self.limits, self.rows.of.others(self.limits))
         sides = np.stack([excess.lower, excess.upper]).reshape(2, len(excess.lower), -1)
         if self.clearance is None:
             return sides

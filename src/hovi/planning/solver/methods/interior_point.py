@@ -69,8 +69,8 @@ class InteriorPoint(Method):
             return MethodResult(
                 problem, path, value, Status.INFEASIBLE, infeasible_sentence(reason)
             )
-        search = BoundedSearch(problem, limits, options, report, path)
-        search.along, search.level = self.along, self.level
+        along, level = self.along, self.level
+        search = BoundedSearch(problem, limits, options, report, path, along=along, level=level)
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own
