@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import difflib
 import re
+import sys
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
 _MAX_COMPARED = 256  # characters of a name; the time of a comparison grows with their square
 _MAX_LISTED = 60  # names in a message
+_BETWEEN = ("contextlib", "functools")  # modules that call hovi for hovi
 _LONG_RUN = re.compile(r"\S{160,}|\s{160,}")
 _FIRST, _LAST = 1_000, 400  # characters of a long message that are kept
 
@@ -73,6 +76,19 @@ class DisplayError(HoviError):
 
 class HoviWarning(UserWarning):
     """Something that is accepted, but is probably not what was meant."""
+
+
+def warn(sentence: str, category: type[Warning] = HoviWarning) -> None:
+    """Warn of something at the line that called hovi, however deep the call is in hovi."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and _is_own(frame.f_globals.get("__name__")):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(sentence, category, stacklevel=level)
+
+
+def _is_own(module: object) -> bool:
+    """Whether a frame's module is hovi's, or the standard library's between two of hovi's."""
+    return isinstance(module, str) and module.split(".")[0] in ("hovi", *_BETWEEN)
 
 
 def expect(value: object, kind: type, hint: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.errors import HoviWarning, InputError, nearest
+from hovi.errors import InputError, nearest, warn
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -290,4 +289,4 @@ def warn_of_degrees(robot: Robot, configurations: Sequence[Array]) -> None:
     angles = ~robot.sliding[coordinates]
     note = angles_in_degrees(names, angles, q, robot.lower[index], robot.upper[index])
     if note:
-        warnings.warn(f"{note}; configurations are in radians.", HoviWarning, stacklevel=4)
+        warn(f"{note}; configurations are in radians.")

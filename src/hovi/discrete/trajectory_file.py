@@ -14,7 +14,6 @@ import io
 import json
 import math
 import os
-import warnings
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -24,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import MAX_INTERVALS
-from hovi.errors import HoviError, HoviWarning, InputError, TrajectoryFileError
+from hovi.errors import HoviError, InputError, TrajectoryFileError, warn
 from hovi.schemes import Scheme, by_name
 from hovi.system.files import reason, require_file, whole_file
 
@@ -122,7 +121,7 @@ def require_unchanged(header: Mapping[str, Any], arrays: Mapping[str, Array]) ->
     """
     if _HASH not in header:
         message = "the file has no SHA-256 of its contents, so a change of them would not show."
-        warnings.warn(message, HoviWarning, stacklevel=3)
+        warn(message)
     elif header[_HASH] != _digest(header, arrays):
         raise InputError("its contents do not match their stored SHA-256")
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from hovi.errors import HoviWarning
+from hovi.errors import warn
 from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.robot.robot import Robot
@@ -34,7 +33,7 @@ def self_collision_pairs(robot: Robot) -> tuple[tuple[int, int], ...]:
     pairs = checked_pairs(robot.model, geometry, robot.semantics.disabled)
     touching = _always_overlapping(robot, geometry, pairs)
     if touching:
-        warnings.warn(_sentence(robot, geometry, touching), HoviWarning, stacklevel=2)
+        warn(_sentence(robot, geometry, touching))
     return tuple(pair for pair in pairs if pair not in touching)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,7 +12,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.errors import HoviWarning, InputError
+from hovi.errors import InputError, warn
 from hovi.planning.obstacles.convex_parts import MAX_PARTS, convex_parts, uncovered
 from hovi.planning.obstacles.hull import hull_of
 from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of
@@ -141,10 +140,8 @@ def _hull_points(mesh: TriangleMesh) -> Array:
     filled, volume = float(hull.computeVolume()), mesh.volume()
     if volume is None or filled > FILLED * volume:
         much = "" if volume is None else f", {filled / max(volume, 1e-300):.3g} times its volume"
-        warnings.warn(
+        warn(
             f"mesh {mesh.name!r} is taken as its convex hull{much}: to keep what is hollow free, "
-            "divide it with convex_parts=True.",
-            HoviWarning,
-            stacklevel=2,
+            "divide it with convex_parts=True."
         )
     return np.array(hull.points(), dtype=np.float64).reshape(-1, 3)

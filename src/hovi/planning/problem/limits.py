@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments, check_arguments_except
 from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of, require_shape
-from hovi.errors import HoviWarning, InputError, nearest
+from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.robot.robot import Robot
@@ -298,7 +297,7 @@ def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
     lower, upper = limits.lower[KINDS.index("q")], limits.upper[KINDS.index("q")]
     suspicion = ranges_in_degrees(coordinates.coordinate_names, ~coordinates.sliding, lower, upper)
     if suspicion:
-        warnings.warn(f"{suspicion}; limits are in radians.", HoviWarning, stacklevel=3)
+        warn(f"{suspicion}; limits are in radians.")
     return limits
 
 

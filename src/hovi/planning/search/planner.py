@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-import warnings
 from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, cast
 
@@ -12,7 +11,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import HoviWarning, InputError, SceneError, expect
+from hovi.errors import InputError, SceneError, expect, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.notation.ends import End, as_end
@@ -39,8 +38,6 @@ from hovi.system.interruption import interruptible
 
 MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
-STACK_LEVEL = 6
-"""Frames between a warning of `plan` and its caller: its decorators."""
 Keywords = ParamSpec("Keywords")
 
 
@@ -130,7 +127,7 @@ def plan(
     longest = problem if free is None else problem.on(problem.grid.stretched(free.upper))
     found = findings(longest, *given)
     for sentence in found.warnings:
-        warnings.warn(sentence, HoviWarning, stacklevel=STACK_LEVEL)
+        warn(sentence)
     if found.reason:
         nothing = infeasible_at_once(longest, chosen.guess, found.reason)
         return _with_assumptions(nothing, job, time.perf_counter() - began)

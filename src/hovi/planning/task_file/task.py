@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.state import State
-from hovi.errors import InputError
+from hovi.errors import InputError, warn
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.problem.units import as_duration
@@ -79,7 +78,7 @@ class Task:
         if name not in option_infos(PlanOptions):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         message = f"task.{name} is now task.options.{name}, and task.with_options changes it."
-        warnings.warn(message, DeprecationWarning, stacklevel=2)
+        warn(message, DeprecationWarning)
         return getattr(self.options, name)
 
     def require_one_motion(self, what: str) -> None:

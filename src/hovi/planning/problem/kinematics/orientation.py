@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,13 @@ import pinocchio as pin
 
 from hovi.checks.directions import unit_vector
 from hovi.checks.shapes import numbers_of
-from hovi.errors import HoviWarning, InputError
+from hovi.errors import InputError, warn
 from hovi.robot.space.angle_ranges import rpy_in_degrees
 
 Array = npt.NDArray[np.float64]
 
 ORIENTATIONS = ("rpy", "quaternion_xyzw", "quaternion_wxyz")
 """The ways to give a rotation by a few numbers."""
-STACK_LEVEL = 6
-"""Frames between a warning and the caller of FrameGoal."""
 NORM_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's length from 1, which is then made 1: four digits will do."""
 
@@ -41,7 +38,7 @@ def rotation_from(name: str, value: Any) -> Array:
     if name == "rpy":
         note = rpy_in_degrees(numbers)
         if note:
-            warnings.warn(f"a frame goal's {note}.", HoviWarning, stacklevel=STACK_LEVEL)
+            warn(f"a frame goal's {note}.")
         return np.array(pin.rpy.rpyToMatrix(numbers))
     length = math.hypot(*numbers)
     if abs(length - 1.0) > NORM_TOLERANCE:
