@@ -549,6 +549,10 @@ def _plans() -> list[Call]:
         ),
         own(solution(), "replan", [0.0, 0.0], [0.3, 0.6], None),
         own(solution(), "replan", goal=[0.3, 0.6], time_limit=1.0, max_iterations=2),
+        own(
+            *(solution(), "replan", {"q": [0.0, 0.0]}, {"shoulder": 0.3, "elbow": 0.6}),
+            **{"time_limit": "1 s", "max_iterations": 2},
+        ),
         own(solution(), "advance", 0.1, [0.05, 0.1], [0.3, 0.6], duration=0.8, time_limit=1.0),
         call(hovi.certify, solution(), "tip", estimate=False),
         call(hovi.estimate_error, solution(), "tip"),

@@ -60,6 +60,11 @@ def seconds(given: Any, what: str) -> float:
     return number * DURATIONS[unit]
 
 
+def as_time_limit(given: float | str | None) -> float | None:
+    """A time limit in [s]; None for no limit. Raises InputError."""
+    return None if given is None else seconds(given, "time_limit")
+
+
 def _as_double(number: float, what: str) -> float:
     try:
         return float(number)

@@ -25,7 +25,8 @@ from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.job import Job, Progress, split_for_charts
 from hovi.planning.search.joint_duration import best_duration_by, joint_minimum
 from hovi.planning.search.multistart import Pool, default_processes, distinct
-from hovi.planning.solver.solver import Solution, guess_path, solve_on_grid
+from hovi.planning.solver.initial_path import guess_path
+from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.deadline import Deadline

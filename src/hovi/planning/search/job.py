@@ -20,7 +20,7 @@ from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, Tolerance
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.solver.solver import guess_path
+from hovi.planning.solver.initial_path import guess_path
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian

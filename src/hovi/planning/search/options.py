@@ -19,7 +19,7 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.notation.ends import as_via
 from hovi.planning.problem.tolerance import Tolerance
-from hovi.planning.problem.units import seconds
+from hovi.planning.problem.units import as_time_limit
 from hovi.planning.search.option_fields import (
     SceneKey,
     explain,
@@ -220,7 +220,7 @@ class PlanOptions:
     @property
     def time_limit_seconds(self) -> float | None:
         """The time limit, in [s]."""
-        return None if self.time_limit is None else seconds(self.time_limit, "time_limit")
+        return as_time_limit(self.time_limit)
 
     @property
     def names_grid(self) -> bool:

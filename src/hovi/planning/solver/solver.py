@@ -11,29 +11,35 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.guess import check_path, stretched
 from hovi.discrete.instants import Instants
 from hovi.discrete.measures.motion_effort import effort_of
-from hovi.discrete.node_continuity import require_continuous
-from hovi.discrete.state import Periodic, State, as_state
+from hovi.discrete.state import Periodic
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
+from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.limits.row_forces import at_instants
 from hovi.planning.solver.methods.choice import method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
-from hovi.planning.solver.receding.ends import as_goal, first_state, inside_limits, is_near
+from hovi.planning.solver.receding.ends import (
+    as_goal,
+    as_start,
+    first_state,
+    inside_limits,
+    is_near,
+)
 from hovi.planning.solver.receding.last_motion import last_motion, meets
 from hovi.planning.solver.receding.shift import Shift
 from hovi.planning.solver.status import Status, infeasible_sentence, unfinished
@@ -117,10 +123,10 @@ class Solution:
     @check_arguments
     def replan(
         self,
-        start: State | npt.ArrayLike | str | None = None,
-        goal: State | FrameGoal | Periodic | npt.ArrayLike | str | None = None,
+        start: End | None = None,
+        goal: End | Periodic | None = None,
         guess: Solution | None = None,
-        time_limit: float | None = None,
+        time_limit: float | str | None = None,
         **options: Any,
     ) -> Solution:
         """The motion between other states, with this motion or another as the initial guess.
@@ -128,20 +134,23 @@ class Solution:
         Precomputed functions are reused, for planning in a loop. The guess is the first-order
         prediction of the motion, which counts as one step, corrected by a few gradient
         evaluations, which do not: see hovi.planning.solver.warm_start.
-        start, goal: a State, a configuration at rest or the name of a pose; the goal may be a
-            FrameGoal or Periodic; unchanged if None.
+        start, goal: as for `plan`, tables included; the goal may be Periodic, too; unchanged if
+            None. A start at a frame is the configuration nearest to the old start.
         guess: an earlier solution on the same grid; this one if None. The duration is kept.
-        time_limit: for the whole call, in [s]. When it is reached the status is TIME_LIMIT, and
-            the motion the best one that meets the ends, the limits and the equations to 1e-6; if
-            there is none, this motion as it is, and the message says what it misses.
+        time_limit: for the whole call, in [s] or as "100 ms". What is left to do when it is reached
+            is the step of the solver that has begun and the end of the call. The status is then
+            TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
+            equations to 1e-6; if there is none, this motion as it is, and the message says what it
+            misses.
         options: as for `solve`.
-        Raises InputError if this solution has no problem.
+        Raises InputError if this solution has no problem, UnreachableError for a start at a frame
+        that no configuration meets.
         """
-        deadline = Deadline(time_limit)
+        deadline = Deadline(as_time_limit(time_limit))
         old = self._solved_problem
         problem = old.between(
-            old.start if start is None else as_state(start, old.coordinates),
-            old.goal if goal is None else as_goal(goal, old.coordinates),
+            old.start if start is None else as_start(start, old),
+            old.goal if goal is None else as_goal(goal, old),
         )
         origin = self if guess is None else guess
         central = self.central if guess is None else None
@@ -153,12 +162,12 @@ class Solution:
     @check_arguments
     def advance(
         self,
-        elapsed: float,
-        start: State | npt.ArrayLike | None = None,
-        goal: State | FrameGoal | npt.ArrayLike | str | None = None,
+        elapsed: float | str,
+        start: End | None = None,
+        goal: End | None = None,
         *,
-        duration: float | None = None,
-        time_limit: float | None = None,
+        duration: float | str | None = None,
+        time_limit: float | str | None = None,
         **options: Any,
     ) -> Solution:
         """The motion from a time on, from the state that was measured then: a receding horizon.
@@ -167,27 +176,30 @@ class Solution:
         one with the next if less than a twentieth of it is left: the rest of the motion keeps its
         nodes, and is as accurate as it was. Limits between the points, the barrier and multipliers
         follow, so that a small disturbance takes a few steps.
-        elapsed: time since the start of this motion, in [s].
-        start: the State at that time, which must be within the limits; the motion's own one if
-            None. The acceleration of a smooth motion is the motion's own one if none is given.
+        elapsed: time since the start of this motion, in [s], or a text such as "20 ms".
+        start: the state at that time, as for `replan`, which must be within the limits; the
+            motion's own one if None. The acceleration of a smooth motion is the motion's own one if
+            none is given.
         goal: as for `replan`.
-        duration: of the new motion, in [s]; what is left of this one if None. With another one, as
-            for a horizon that moves, the rest is stretched and sampled again on as many intervals.
+        duration: of the new motion, in [s] or as a text; what is left of this one if None. With
+            another one, as for a horizon that moves, the rest is stretched and sampled again on as
+            many intervals.
         time_limit: as for `replan`; what comes back is this motion from that time on.
         options: as for `solve`.
         Via points that have passed are left out.
         Raises InputError if this solution has no problem, if it ends before the time, or if it is
         periodic, in segments, among moving obstacles, or of a scene that depends on time.
         """
-        deadline = Deadline(time_limit)
+        deadline = Deadline(as_time_limit(time_limit))
         old = self._solved_problem
-        shift = Shift.of(old, elapsed, duration)
+        length = None if duration is None else seconds(duration, "the duration")
+        shift = Shift.of(old, seconds(elapsed, "the time elapsed"), length)
         path = shift.path(self.trajectory.path)
         state = first_state(path)
         if start is not None:
-            given = as_state(start, old.coordinates)
+            given = as_start(start, old)
             state = given if given.a is not None else dataclasses.replace(given, a=state.a)
-        to = old.goal if goal is None else as_goal(goal, old.coordinates)
+        to = old.goal if goal is None else as_goal(goal, old)
         assert not isinstance(to, Periodic)
         problem = shift.between(inside_limits(state, old), to)
         central = None if self.central is None else shift.central(self.central)
@@ -196,7 +208,7 @@ class Solution:
             check = check.shifted(shift, problem)
         if self.status is Status.STATIONARY:
             options = {"method": Stationary()} | options
-        last = f"this is the last motion from {elapsed:g} s on"
+        last = f"this is the last motion from {shift.elapsed:g} s on"
         return _Again(problem, path, central, check).within(deadline, last, **options)
 
     @property
@@ -377,23 +389,3 @@ def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> Me
     status, reason = unfinished(stop)
     message = f"{reason}; the motion is the guess."
     return MethodResult(problem, path, problem.ld.action(path), status, message)
-
-
-def guess_path(problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath) -> DiscretePath:
-    """A guess as a path on the problem's grid, with the problem's boundary data."""
-    coordinates, grid = problem.coordinates, problem.grid
-    if isinstance(guess, DiscretePath):
-        if problem.ld.k == 2:
-            check_path(guess, grid, coordinates)
-        else:
-            grid.require_path(guess, coordinates.nq, coordinates.nv)
-            require_continuous(guess, grid, coordinates.curved_space)
-        return problem.moved(guess)
-    if isinstance(guess, str):
-        return problem.guess(guess)
-    if guess.v.shape[1] != coordinates.nv:
-        raise InputError(
-            f"the guess has {guess.v.shape[1]} velocities, but {coordinates.owner} has "
-            f"{coordinates.nv}; use a motion of the same one."
-        )
-    return problem.path(stretched(guess, grid.duration, problem.ld.k))

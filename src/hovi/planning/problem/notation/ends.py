@@ -14,6 +14,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS
 from hovi.robot.robot import Robot
+from hovi.robot.space.coordinates import Coordinates
 
 End = State | FrameGoal | npt.ArrayLike | str | Mapping[str, Any]
 """A start or a goal as it may be given."""
@@ -39,22 +40,24 @@ class EndError(InputError):
         return type(self), (str(self), self.key)
 
 
-def as_end(given: End, robot: Robot, name: str) -> State | FrameGoal:
+def as_end(given: End, on: Coordinates, name: str) -> State | FrameGoal:
     """A start or a goal from a state, a frame goal, a configuration, a pose's name or a table.
 
     A table has joint names and positions, or the keys of [start] and [goal] in a scene file.
+    on: the robot, or the coordinates of a problem without one, which have no frames.
     name: "start" or "goal". Raises InputError.
     """
     if isinstance(given, FrameGoal):
         return given
-    if isinstance(given, Mapping) and _is_end_table(given, robot):
+    if isinstance(given, Mapping) and _is_end_table(given, on):
         given = end_of(given, name)
         if isinstance(given, FrameGoal):
-            given.check(robot)
+            if isinstance(on, Robot):
+                given.check(on)
             return given
-    state = as_state(given, robot, name)
+    state = as_state(given, on, name)
     if not isinstance(given, State):
-        state.on(robot, name)
+        state.on(on, name)
     return state
 
 
@@ -112,9 +115,9 @@ def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
     return FrameGoal(given.pop("frame"), **given)
 
 
-def _is_end_table(given: Mapping[str, Any], robot: Robot) -> bool:
+def _is_end_table(given: Mapping[str, Any], on: Coordinates) -> bool:
     """Whether a mapping is a table of an end rather than of joints."""
-    joints = set(robot.joint_names)
+    joints = set(on.joint_names)
     return not any(key in joints for key in given) and any(key in END_KEYS for key in given)
 
 

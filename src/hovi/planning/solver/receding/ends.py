@@ -6,13 +6,18 @@ import dataclasses
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
-from hovi.discrete.state import Periodic, State, as_state
+from hovi.discrete.state import Periodic, State
+from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.inverse_kinematics import (
+    configurations,
+    first_configuration,
+    position_bounds,
+)
+from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.robot.space.coordinates import Coordinates
 
 NEAR_DISTANCE, NEAR_ANGLE = 0.1, 0.5
 """Distance in [m] and angle in [rad] from a frame goal up to which `replan` keeps the old end."""
@@ -29,11 +34,26 @@ def is_near(goal: FrameGoal, problem: TrajectoryProblem, path: DiscretePath) -> 
     return distance <= NEAR_DISTANCE and angle <= NEAR_ANGLE
 
 
-def as_goal(
-    goal: State | FrameGoal | Periodic | npt.ArrayLike | str, coordinates: Coordinates
-) -> State | FrameGoal | Periodic:
-    """A goal, from one, a configuration at rest or the name of a pose."""
-    return goal if isinstance(goal, FrameGoal | Periodic) else as_state(goal, coordinates)
+def as_start(given: End, problem: TrajectoryProblem) -> State:
+    """A start, from whatever `plan` takes. A frame is met in the configuration nearest to the old.
+
+    Raises InputError, and UnreachableError for a frame that no configuration brings there.
+    """
+    start = as_end(given, problem.coordinates, "start")
+    if isinstance(start, State):
+        return start
+    robot, limits = problem.robot, problem.limits
+    start.check(robot)
+    bounds = position_bounds(robot, "none" if limits is None else limits.at_ends[0])
+    near = problem.boundary[0] if start.guess is None else None
+    first = first_configuration(robot, start, near, bounds)
+    q = configurations(robot, start, first, bounds, problem.clearance or Clearance())[0]
+    return State(q, free_velocity=tuple(start.free_velocity))
+
+
+def as_goal(given: End | Periodic, problem: TrajectoryProblem) -> State | FrameGoal | Periodic:
+    """A goal, from whatever `plan` takes, or Periodic. Raises InputError."""
+    return given if isinstance(given, Periodic) else as_end(given, problem.coordinates, "goal")
 
 
 def first_state(path: DiscretePath) -> State:
