@@ -38,6 +38,7 @@ from samples.slider import SLIDER
 from samples.world_files import CUPBOARD, PLANNING_SCENE
 
 Q, N, H = 2, 4, 0.1
+BALL = {"kind": "sphere", "position": [0.0, 0.0, 0.0], "radius": 0.1}
 
 
 class Nothing:
@@ -454,6 +455,7 @@ def _problems() -> list[Call]:
             **{"free_velocity": ("elbow",), "guess": [0.0, 0.0]},
         ),
         build(hovi.FrameGoal, frame="tip", axis=([1, 0, 0], [0, 0, 1])),
+        build(hovi.FrameGoal, frame="tip", axis={"frame": [1, 0, 0], "world": [0, 0, 1]}),
         build(hovi.FrameGoal, frame="tip", pose=np.eye(4)),
         build(hovi.FrameGoal, frame="tip", rpy=[0.1, 0.2, 0.3]),
         build(hovi.FrameGoal, frame="tip", quaternion_xyzw=[0.0, 0.0, 0.0, 1.0]),
@@ -463,6 +465,11 @@ def _problems() -> list[Call]:
             *(panda(), _hand_goal()),
             **{"near": np.zeros(9), "limits": "urdf", "obstacles": (sphere,), "margin": 0.01},
             **{"self_collision": False, "most": 2, "seeds": 50},
+        ),
+        call(
+            *(hovi.inverse_kinematics, robot(), {"frame": "tip", "position": [0.3, 0, -2]}),
+            **{"near": {"shoulder": 0.1, "elbow": 0.2}, "seeds": 20},
+            obstacles=[{"kind": "sphere", "position": [5.0, 0.0, 0.0], "radius": 0.1}],
         ),
         own(frame_goal, "check", robot()),
         own(frame_goal, "condition", robot()),
@@ -648,6 +655,12 @@ def _sequences() -> list[Call]:
             *(scene(), hovi.State([0.0, 0.0]), segments),
             **{"options": None, "name": "pick"},
         ),
+        call(
+            *(hovi.plan_sequence, scene(), {"q": [0.0, 0.0]}),
+            [{"goal": {"q": [0.3, 0.7]}, "duration": "500 ms"}, {"goal": [0, 0], "duration": 1.0}],
+            **quick,
+        ),
+        call(hovi.holding, robot(), {"frame": "forearm", "mass": 1.0, "shape": BALL}),
         call(hovi.plan_task, task, progress=None, intervals=2),
         call(hovi.save_task, task, folder() / "sequence.toml"),
     ]

@@ -321,21 +321,24 @@ def require_plannable(scene: Scene) -> None:
     check_mass_matrix(scene.model)
 
 
-def _effect(key: str, values: object) -> Effect:
-    """An effect from its key and its fields as a file has them. Raises SceneError."""
+def _effect(key: str, values: object, name: str = "effects") -> Effect:
+    """An effect from its key and its fields as a file has them. name: of the table of effects.
+
+    Raises SceneError.
+    """
     if key not in REGISTRY:
         raise SceneError(f"there is no effect {key!r}; {nearest(str(key), REGISTRY)}")
     known = {each.name for each in dataclasses.fields(REGISTRY[key]) if each.init}
     if not isinstance(values, Mapping):
         raise SceneError(f"effect {key!r} takes {', '.join(sorted(known))}, not {values!r}.")
-    for name in values:
-        if name not in known:
-            hint = nearest(str(name), known)
-            raise SceneError(f"unknown key `effects.{key}.{name}`; {hint}")
+    for given in values:
+        if given not in known:
+            hint = nearest(str(given), known)
+            raise SceneError(f"unknown key `{name}.{key}.{given}`; {hint}")
     for each in dataclasses.fields(REGISTRY[key]):
         needed = each.default is MISSING and each.default_factory is MISSING
         if needed and each.name not in values:
-            raise SceneError(f"`effects.{key}.{each.name}` is missing.")
+            raise SceneError(f"`{name}.{key}.{each.name}` is missing.")
     return REGISTRY[key](**values)
 
 
@@ -346,11 +349,14 @@ def _passive_names(names: object) -> tuple[str, ...]:
     return tuple(names)
 
 
-def as_effects(given: object) -> tuple[Effect, ...]:
-    """Effects as a tuple. Raises SceneError for anything but a list or a table of effects."""
+def as_effects(given: object, name: str = "effects") -> tuple[Effect, ...]:
+    """Effects as a tuple. name: of their table in messages.
+
+    Raises SceneError for anything but a list or a table of effects.
+    """
     effects: tuple[Any, ...] = (None,)
     if isinstance(given, Mapping):
-        effects = tuple(_effect(key, values) for key, values in given.items())
+        effects = tuple(_effect(key, values, name) for key, values in given.items())
     elif isinstance(given, Iterable) and not isinstance(given, str | np.ndarray):
         effects = tuple(given)
     if not all(isinstance(each, Effect) for each in effects):

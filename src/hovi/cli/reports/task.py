@@ -46,7 +46,8 @@ def describe_task(task: Task) -> str:
 
 def _segments(task: Task) -> list[str]:
     """The segments: when they end, where, and what is theirs alone."""
-    from hovi.planning.sequence.segment import as_goal, names_of
+    from hovi.planning.problem.notation.ends import as_end
+    from hovi.planning.sequence.segment import names_of
 
     robot, lines, end = task.scene.robot, [], 0.0
     for name, each in zip(names_of(task.segments), task.segments, strict=True):
@@ -57,7 +58,7 @@ def _segments(task: Task) -> list[str]:
             own.append(f"limits {_limits(each.limits)}")
         where = ["goal: none, where the best motion passes"]
         if each.goal is not None:
-            where = _end(as_goal(each.goal, robot), "goal", robot)
+            where = _end(as_end(each.goal, robot, "goal"), "goal", robot)
         lines += [f"  {line}" for line in (*own, *where)]
     return lines
 
@@ -92,8 +93,8 @@ def _frame_parts(goal: FrameGoal) -> list[str]:
         parts.append(f"  position {_numbers(np.asarray(goal.position))} m")
     if goal.rotation is not None:
         parts += [f"  rotation {_numbers(row)}" for row in np.asarray(goal.rotation)]
-    if goal.axis is not None:
-        inner, world = (_numbers(np.asarray(each)) for each in goal.axis)
+    if goal.directions is not None:
+        inner, world = (_numbers(each) for each in goal.directions)
         parts.append(f"  its axis {inner} along {world}")
     return parts
 

@@ -28,7 +28,8 @@ TOUCH_DEPTH = 1e-3
 class Clearance:
     """distance >= margin between the robot's collision shapes and obstacles, all along a motion.
 
-    obstacles: static shapes in the world; those without a name are numbered.
+    obstacles: shapes in the world, or tables of them as in a scene file, such as {"kind": "box",
+        ...} or {"kind": "file", "file": "kitchen.yaml"}; those without a name are numbered.
     margin: the minimum distance, in [m]; 0 allows contact.
     self_collision: whether links keep the margin from each other, too: all pairs that are not
         connected by one joint, except those that the robot's SRDF disables and those that overlap
@@ -44,15 +45,15 @@ class Clearance:
     may_touch: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
-        if isinstance(self.obstacles, Obstacle):
+        if isinstance(self.obstacles, Obstacle | Mapping):
             object.__setattr__(self, "obstacles", (self.obstacles,))
         if not isinstance(self.obstacles, Sequence):
             raise InputError(
                 f"obstacles must be a list, such as of hovi.Sphere, got {self.obstacles!r}."
             )
-        if len(self.obstacles) > MAX_OBSTACLES:
+        given = [obstacle for i, x in enumerate(self.obstacles) for obstacle in _obstacles(x, i)]
+        if len(given) > MAX_OBSTACLES:
             raise InputError(f"there may be at most {MAX_OBSTACLES} obstacles.")
-        given = [_from_table(x) if isinstance(x, Mapping) else x for x in self.obstacles]
         for each in given:
             if not isinstance(each, Obstacle):
                 raise InputError(
@@ -107,11 +108,13 @@ class Clearance:
             ) from error
 
 
-def _from_table(table: Mapping[str, Any]) -> Obstacle:
-    """An obstacle in the words of a scene file. Raises InputError."""
-    from hovi.planning.clearance.obstacles import obstacle_from_dict  # 10 ms
+def _obstacles(given: Any, number: int) -> Sequence[Any]:
+    """What is given as an obstacle, or those of a table in the words of a scene file."""
+    if not isinstance(given, Mapping):
+        return (given,)
+    from hovi.planning.clearance.obstacles import obstacles_from_table  # 10 ms
 
-    return obstacle_from_dict(table)
+    return obstacles_from_table(given, number)
 
 
 def _pairs_of_names(pairs: Any) -> tuple[tuple[str, str], ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -14,9 +14,10 @@ import pinocchio as pin
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of
+from hovi.checks.tables import entries_of
 from hovi.effects import Payload
 from hovi.errors import InputError, expect, nearest
-from hovi.planning.obstacles.obstacle import Obstacle, pose_of
+from hovi.planning.obstacles.obstacle import Obstacle, obstacle_of_kind, pose_of
 from hovi.planning.obstacles.primitives import Box, Capsule, Cylinder, Sphere
 from hovi.robot.model import build_model
 from hovi.robot.robot import Robot
@@ -32,6 +33,13 @@ MAX_MASS = 1e9
 """Largest mass, in [kg]."""
 _ORIGIN = (0.0, 0.0, 0.0)
 _SHAPES = (Box, Sphere, Cylinder, Capsule)
+_KINDS = {each.__name__.lower(): each for each in _SHAPES}
+NEEDED = {
+    "frame": "the name of a link of the robot",
+    "mass": "a positive number of kilograms",
+    "shape": "a table such as an obstacle's, or a list of them",
+}
+"""What a table of a grasped object must have, and what that is."""
 
 
 @check_arguments_except("shape", "mass", "position", "rpy", "center", "inertia", "may_touch")
@@ -42,7 +50,8 @@ class Grasped:
     It becomes a link of its own, so that it is kept clear of obstacles, has a frame that goals may
     name, is part of the dynamics and is drawn.
 
-    shape: a hovi.Box, Sphere, Cylinder or Capsule in the object's frame, or several of them.
+    shape: a hovi.Box, Sphere, Cylinder or Capsule in the object's frame, its table such as
+        {"kind": "box", "size": ..., "position": ...}, or several of them.
     frame: the link that carries it. mass: in [kg].
     name: of its link and frame.
     position: of the object's frame in that of the link, shape (3,), in [m].
@@ -55,7 +64,7 @@ class Grasped:
     Raises InputError for other values.
     """
 
-    shape: Obstacle | Sequence[Obstacle]
+    shape: Obstacle | Mapping[str, Any] | Sequence[Obstacle | Mapping[str, Any]]
     frame: str
     mass: float
     name: str = "grasped"
@@ -66,12 +75,17 @@ class Grasped:
     may_touch: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        shapes = (self.shape,) if isinstance(self.shape, Obstacle) else self.shape
+        shapes = self.shape
+        if isinstance(shapes, Obstacle | Mapping):
+            shapes = (shapes,)
         listed = isinstance(shapes, Sequence) and len(shapes) > 0
+        if listed:
+            shapes = [self._of_table(x) if isinstance(x, Mapping) else x for x in shapes]
         if not listed or not all(isinstance(each, _SHAPES) for each in shapes):
             raise InputError(
-                f"{self._what} must be a hovi.Box, Sphere, Cylinder or Capsule, or a list of them, "
-                f"got {self.shape!r:.200}."
+                f"`shape` of {self._what} must be a table such as an obstacle's, or in Python it "
+                "must be a hovi.Box, Sphere, Cylinder or Capsule, or a list of them, got "
+                f"{self.shape!r:.200}."
             )
         object.__setattr__(self, "shape", tuple(shapes))
         if not self.name:
@@ -89,6 +103,13 @@ class Grasped:
         object.__setattr__(self, "may_touch", tuple(names))
         if self.inertia is not None and np.linalg.eigvalsh(self._tensor)[0] < 0.0:
             raise InputError(f"`inertia` of {self._what} must not have a negative principal value.")
+
+    def _of_table(self, table: Mapping[str, Any]) -> Obstacle:
+        """A shape from a table in the words of a scene file. Raises InputError."""
+        try:
+            return obstacle_of_kind(table, _KINDS)
+        except InputError as wrong:
+            raise InputError(f"`shape` of {self._what}: {wrong}") from None
 
     @property
     def _what(self) -> str:
@@ -143,10 +164,13 @@ class Grasped:
         return {**known, "shape": shapes if len(shapes) > 1 else shapes[0]}
 
 
-def holding(robot: Robot, grasped: Grasped | Sequence[Grasped]) -> Robot:
+def holding(
+    robot: Robot, grasped: Grasped | Mapping[str, Any] | Sequence[Grasped | Mapping[str, Any]]
+) -> Robot:
     """A robot that holds objects: each is a link, joined to the one that carries it.
 
-    The same robot and objects give the same Robot.
+    grasped: a hovi.Grasped, a table in the words of a scene file, or a list of these. The same
+        robot and objects give the same Robot.
     Raises InputError for a frame that is no link, a name that exists, and a robot without a URDF.
     """
     expect(robot, Robot, "a robot of hovi.load_robot")
@@ -155,18 +179,29 @@ def holding(robot: Robot, grasped: Grasped | Sequence[Grasped]) -> Robot:
 
 def as_grasped(objects: Any) -> tuple[Grasped, ...]:
     """Grasped objects as a tuple. Raises InputError for anything else, and for equal names."""
-    if isinstance(objects, Grasped):
+    if isinstance(objects, Grasped | Mapping):
         objects = (objects,)
-    right = isinstance(objects, Sequence) and all(isinstance(each, Grasped) for each in objects)
+    listed = isinstance(objects, Sequence)
+    right = listed and all(isinstance(each, Grasped | Mapping) for each in objects)
     if not right or len(objects) > MAX_GRASPED:
         raise InputError(
             f"grasped must be a list of up to {MAX_GRASPED} hovi.Grasped, got {objects!r:.200}."
         )
+    objects = [
+        _from_table(each, i) if isinstance(each, Mapping) else each
+        for i, each in enumerate(objects)
+    ]
     names = [each.name for each in objects]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"two grasped objects have the name {name!r}; give each its own name.")
     return tuple(objects)
+
+
+def _from_table(table: Mapping[str, Any], number: int) -> Grasped:
+    """An object from a table in the words of a scene file. Raises InputError."""
+    keys = [each.name for each in dataclasses.fields(Grasped)]
+    return Grasped(**entries_of(table, f"grasped[{number}]", keys, NEEDED))
 
 
 def scene_holding(scene: Scene, objects: tuple[Grasped, ...]) -> Scene:

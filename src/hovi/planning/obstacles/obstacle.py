@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, NamedTuple
 
 import coal
@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.checks.shapes import numbers_of
-from hovi.errors import InputError
+from hovi.errors import InputError, nearest
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
 
 Array = npt.NDArray[np.float64]
@@ -110,6 +110,30 @@ class Obstacle(ABC):
                 f"`{key}` of a {self.in_words} must be positive, in metres, got "
                 f"{getattr(self, key)!r}."
             )
+
+
+def obstacle_of_kind(
+    table: Mapping[str, Any], kinds: Mapping[str, type[Obstacle]], *others: str
+) -> Obstacle:
+    """The obstacle of a table with its `kind` and the fields of that class. Raises InputError.
+
+    others: kinds that exist elsewhere, for the message.
+    """
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in kinds:
+        raise InputError(
+            f"there is no obstacle of kind {kind!r}: {nearest(str(kind), [*kinds, *others])}"
+        )
+    words = kind.replace("_", " ")
+    known = {each.name: each.default is MISSING for each in fields(kinds[kind])}
+    given = {key: value for key, value in table.items() if key != "kind"}
+    for key in given:
+        if key not in known:
+            raise InputError(f"a {words} has no `{key}`: {nearest(str(key), known)}")
+    for key, needed in known.items():
+        if needed and key not in given:
+            raise InputError(f"a {words} needs `{key}`.")
+    return kinds[kind](**given)
 
 
 def pose_of(position: npt.ArrayLike, rpy: npt.ArrayLike) -> pin.SE3:

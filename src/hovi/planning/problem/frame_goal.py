@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -44,7 +44,8 @@ class FrameGoal:
     rotation: of the frame's axes in the world, shape (3, 3).
     rpy: the same as roll, pitch and yaw in [rad]: Rz(yaw) Ry(pitch) Rx(roll), as in a URDF.
     quaternion_xyzw, quaternion_wxyz: the same as a unit quaternion, in that order.
-    axis: (direction in the frame, direction in the world), two vectors of shape (3,).
+    axis: (direction in the frame, direction in the world), two vectors of shape (3,); or
+        {"frame": direction, "world": direction}.
     free_velocity: joints whose velocity at the goal is free, by name or ALL; the others are at
         rest.
     guess: configuration (nq,) from which inverse kinematics starts.
@@ -57,7 +58,7 @@ class FrameGoal:
     pose: Any = None
     position: npt.ArrayLike | None = None
     rotation: npt.ArrayLike | None = None
-    axis: tuple[npt.ArrayLike, npt.ArrayLike] | None = None
+    axis: tuple[npt.ArrayLike, npt.ArrayLike] | Mapping[str, npt.ArrayLike] | None = None
     rpy: npt.ArrayLike | None = field(default=None, kw_only=True)
     quaternion_xyzw: npt.ArrayLike | None = field(default=None, kw_only=True)
     quaternion_wxyz: npt.ArrayLike | None = field(default=None, kw_only=True)
@@ -95,11 +96,7 @@ class FrameGoal:
         if self.rotation is not None:
             object.__setattr__(self, "rotation", _rotation(self.rotation))
         if self.axis is not None:
-            if len(self.axis) != 2:
-                raise InputError(
-                    "an axis must be a pair: a direction in the frame and one in the world."
-                )
-            object.__setattr__(self, "axis", tuple(_direction(each) for each in self.axis))
+            object.__setattr__(self, "axis", _axis(self.axis))
         if isinstance(self.free_velocity, str):
             object.__setattr__(self, "free_velocity", (self.free_velocity,))
 
@@ -111,6 +108,14 @@ class FrameGoal:
         """The goal as a condition c(q) = 0."""
         self.check(robot)
         return FrameCondition(self, robot)
+
+    @property
+    def directions(self) -> tuple[Array, Array] | None:
+        """The axis: unit vectors (3,) in the frame and in the world; None if there is none."""
+        if self.axis is None:
+            return None
+        inner, world = (np.asarray(each) for each in _axis(self.axis))
+        return inner, world
 
     @property
     def equations(self) -> int:
@@ -126,8 +131,8 @@ class FrameGoal:
         angle = 0.0
         if self.rotation is not None:
             angle = _norm(pin.log3(np.asarray(self.rotation).T @ R))
-        if self.axis is not None:
-            inner, world = (np.asarray(each) for each in self.axis)
+        if self.directions is not None:
+            inner, world = self.directions
             angle = float(np.arctan2(_norm(np.cross(R @ inner, world)), (R @ inner) @ world))
         return distance, angle
 
@@ -202,8 +207,8 @@ class FrameCondition(Condition):
             target = ca.DM(np.asarray(self.goal.rotation))
             turns = [ca.cross(target[:, i], R[:, i]) for i in range(3)]
             rows.append((turns[0] + turns[1] + turns[2]) / 2)
-        if self.goal.axis is not None:
-            inner, world = (np.asarray(each) for each in self.goal.axis)
+        if self.goal.directions is not None:
+            inner, world = self.goal.directions
             across = np.linalg.svd(world[None])[2][1:]  # two directions orthogonal to the target
             rows.append(ca.DM(across) @ (R @ ca.DM(inner)))
         return ca.vertcat(*rows)
@@ -231,6 +236,17 @@ def _vector(name: str, value: npt.ArrayLike) -> Array:
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise InputError(f"the {name} of a frame goal must be three finite numbers, got {value!r}.")
     return vector
+
+
+def _axis(given: Any) -> tuple[npt.ArrayLike, ...]:
+    """Two directions, from a pair or from a table of them. Raises InputError."""
+    if isinstance(given, Mapping):
+        if given.keys() != {"frame", "world"}:
+            raise InputError("the axis of a frame goal needs two directions, `frame` and `world`.")
+        given = given["frame"], given["world"]
+    if len(given) != 2:
+        raise InputError("an axis must be a pair: a direction in the frame and one in the world.")
+    return tuple(_direction(each) for each in given)
 
 
 def _direction(value: npt.ArrayLike) -> Array:

@@ -20,8 +20,10 @@ from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.branches import Branches, find_branches
 from hovi.planning.problem.limits import Limits, as_limits
+from hovi.planning.problem.notation.ends import end_of
 from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
+from hovi.robot.space.joint_table import configuration_of
 from hovi.robot.tip_frame import moves_frame
 
 Array = npt.NDArray[np.float64]
@@ -51,11 +53,11 @@ class InverseKinematicsResult:
 @check_arguments_except("robot", "goal", "near", "limits", "obstacles", "margin", "most", "seeds")
 def inverse_kinematics(
     robot: Robot,
-    goal: FrameGoal,
+    goal: FrameGoal | Mapping[str, Any],
     *,
-    near: npt.ArrayLike | str | None = None,
+    near: npt.ArrayLike | str | Mapping[str, Any] | None = None,
     limits: str | Limits | Mapping[str, Any] = "urdf",
-    obstacles: Sequence[Obstacle] = (),
+    obstacles: Sequence[Obstacle | Mapping[str, Any]] = (),
     margin: float = DEFAULT_MARGIN,
     self_collision: bool = False,
     most: int = MOST,
@@ -70,9 +72,11 @@ def inverse_kinematics(
     differ by at least 0.3 rad or m in a joint. Joints that do not move the frame keep the values of
     `near`.
 
-    goal: what the frame has to meet: see FrameGoal.
-    near: a configuration (nq,) or the name of a pose, from which the search begins; by default the
-        goal's guess, or the middle of the joints' ranges, 0 for joints without or with full turns.
+    goal: what the frame has to meet: a FrameGoal, or a table such as {"frame": "tool0",
+        "position": [0.4, 0.2, 0.3]}.
+    near: a configuration (nq,), the name of a pose or a table of joints, from which the search
+        begins; by default the goal's guess, or the middle of the joints' ranges, 0 for joints
+        without or with full turns.
     limits: as for `plan`; only those on q count.
     obstacles, margin, self_collision: as for `plan`; configurations that come closer are left out.
     most: number of configurations at which the search ends.
@@ -80,7 +84,10 @@ def inverse_kinematics(
     Raises UnreachableError, with the nearest configuration, if none is found; InputError.
     """
     expect(robot, Robot, "one from hovi.load_robot")
+    if isinstance(goal, Mapping):
+        goal = end_of(goal, "goal")  # type: ignore[assignment]  # which the next line checks
     expect(goal, FrameGoal, "hovi.FrameGoal(frame, ...)")
+    assert isinstance(goal, FrameGoal)
     goal.check(robot)
     most, seeds = _count("most", most), _count("seeds", seeds)
     clearance = _clearance_of(obstacles, margin, self_collision)
@@ -143,13 +150,14 @@ def _named(robot: Robot, limits: str) -> Limits:
 
 
 def first_configuration(
-    robot: Robot, goal: FrameGoal, near: npt.ArrayLike | str | None, bounds: Bounds
+    robot: Robot,
+    goal: FrameGoal,
+    near: npt.ArrayLike | str | Mapping[str, Any] | None,
+    bounds: Bounds,
 ) -> Array:
     """Where the search begins, shape (nq,). Raises InputError."""
-    if isinstance(near, str):
-        return robot.pose(near)
     if near is not None:
-        return robot.check_configuration(near, "near")
+        return robot.check_configuration(configuration_of(near, robot, "near"), "near")
     if goal.guess is not None:
         return robot.check_configuration(goal.guess, "the goal's guess")
     lower, upper = bounds

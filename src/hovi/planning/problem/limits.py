@@ -279,7 +279,7 @@ def as_limits(
     keys = ("base", *KINDS, "margin", "tolerance")
     for key in limits:
         if key not in keys:
-            raise InputError(f"limits have no key {key!r}: {nearest(str(key), keys)}")
+            raise InputError(f"unknown key `limits.{key}`; {nearest(str(key), keys)}")
     base = _by_name(coordinates, limits.get("base", "urdf"), order)
     if not limits.keys().isdisjoint(OF_ORDER_3):
         base = _with_all_kinds(base)

@@ -18,6 +18,8 @@ DURATIONS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0}
 """Units of lengths, angles, relative errors and durations, in [m], [rad], 1 and [s]."""
 _TEXT = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d]*|%)")
 
+SECONDS_IN_WORDS = 'a positive number of seconds, or a text such as "500 ms"'
+"""What a given duration or a time is, in messages about scene files and in Python."""
 DURATION_IN_WORDS = (
     'a positive number of seconds, a text such as "2 s", or a list [lower, upper] of two'
 )

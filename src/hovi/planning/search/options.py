@@ -17,7 +17,7 @@ from hovi.planning.clearance.clearance import DEFAULT_MARGIN, Clearance
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.goals import Via
 from hovi.planning.problem.limits import Limits, as_limits
-from hovi.planning.problem.notation.ends import as_via
+from hovi.planning.problem.notation.via_points import as_via
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_time_limit
 from hovi.planning.search.option_fields import (
@@ -124,13 +124,13 @@ class PlanOptions:
     )
     obstacles: Sequence[Obstacle] = option(
         (),
-        "hovi.Sphere, hovi.Box or other obstacles, from which the robot's collision shapes keep a "
-        "distance of `margin` along the whole motion.",
+        "hovi.Sphere, hovi.Box or other obstacles, or tables as in a scene file, from which the "
+        "robot's collision shapes keep a distance of `margin` along the whole motion.",
     )
     grasped: Sequence[Grasped] = option(
         (),
-        "hovi.Grasped, objects that links of the robot carry along the whole motion: with mass, "
-        "shape, and names of what they may touch.",
+        "hovi.Grasped, or tables as in a scene file: objects that links of the robot carry along "
+        "the whole motion, with mass, shape, and names of what they may touch.",
     )
     margin: float = option(
         DEFAULT_MARGIN,

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments_except
-from hovi.checks.kinds import shown
+from hovi.checks.kinds import is_number, shown
 from hovi.checks.shapes import numbers_of
+from hovi.checks.tables import entries_of
 from hovi.discrete.state import State
 from hovi.effects import Effect
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import Limits
-from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.problem.units import seconds
+from hovi.planning.problem.notation.ends import End, as_end
+from hovi.planning.problem.units import SECONDS_IN_WORDS, seconds
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
 from hovi.scene.scene import as_effects
@@ -35,19 +35,20 @@ _ONLY_AT_THE_END = ("a", "free_acceleration", "jerk", "free_jerk")
 class Segment:
     """A segment of a sequence of motions, which `hovi.plan_sequence` plans together.
 
-    goal: where it ends: a State, a configuration of shape (nq,) at rest, the name of a pose, or a
-        FrameGoal. The motion stops there unless the goal gives velocities or leaves them free
-        (`free_velocity`), and it does not stop where there is none (None).
+    goal: where it ends: a State, a configuration of shape (nq,) at rest, the name of a pose, a
+        FrameGoal, or a table as for `hovi.plan`. The motion stops there unless the goal gives
+        velocities or leaves them free (`free_velocity`), and it does not stop where there is none
+        (None).
     duration: T in [s], or a text such as "1.5 s".
     effects: what acts in this segment beside the effects of the scene, such as the payload that is
-        carried; one of a kind that the scene has takes its place.
+        carried, also as tables by name; one of a kind that the scene has takes its place.
     limits: of this segment, as for `hovi.plan`; those of the options if None.
     name: in messages and reports.
     Raises InputError for a duration that is not positive, and for a goal or limits of another kind,
     SceneError for effects that are none.
     """
 
-    goal: State | FrameGoal | npt.ArrayLike | str | None
+    goal: End | None
     duration: float
     _: KW_ONLY
     effects: Sequence[Effect] = ()
@@ -60,13 +61,35 @@ class Segment:
             raise InputError(f"the duration of a segment must be positive, got {T} s.")
         object.__setattr__(self, "duration", T)
         object.__setattr__(self, "effects", as_effects(self.effects))
-        if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str):
+        if self.goal is not None and not isinstance(self.goal, State | FrameGoal | str | Mapping):
             numbers_of("the goal of a segment", self.goal)
         if self.limits is not None and not isinstance(self.limits, str | Limits | Mapping):
             raise InputError(
                 "the limits of a segment are 'urdf', 'none', the name of an arm, a mapping or a "
                 f"hovi.Limits, not {shown(self.limits)}."
             )
+
+
+Table = Segment | Mapping[str, Any]
+"""A segment, or its table in the words of a scene file."""
+
+
+def as_segment(given: Table, number: int) -> Segment:
+    """A segment, from one or from a table as [[segments]] in a scene file. Raises InputError.
+
+    number: of the segment, from 0.
+    """
+    if isinstance(given, Segment):
+        return given
+    keys = [each.name for each in fields(Segment)]
+    name = f"segments[{number}]"
+    entries = entries_of(given, name, keys, {"duration": SECONDS_IN_WORDS})
+    T = entries["duration"]
+    if is_number(T) and not (math.isfinite(T) and T > 0):
+        raise InputError(f"`{name}.duration` must be {SECONDS_IN_WORDS}, but it is {shown(T)}.")
+    if "effects" in entries:
+        entries["effects"] = as_effects(entries["effects"], f"{name}.effects")
+    return Segment(entries.pop("goal", None), entries.pop("duration"), **entries)
 
 
 def names_of(segments: Sequence[Segment]) -> tuple[str, ...]:
@@ -79,9 +102,10 @@ def duration_of(segments: Sequence[Segment]) -> float:
     return float(sum(each.duration for each in segments))
 
 
-def as_goal(given: Any, robot: Robot) -> State | FrameGoal:
-    """A goal, or a start, as a State or a FrameGoal. Raises InputError for an unknown pose."""
-    return as_end(given, robot, "goal")
+def goals_of(segments: Sequence[Segment], robot: Robot) -> tuple[State | FrameGoal | None, ...]:
+    """The goals of the segments, as States or FrameGoals. Raises InputError."""
+    named = ((f"segments[{i}].goal", each.goal) for i, each in enumerate(segments))
+    return tuple(None if goal is None else as_end(goal, robot, name) for name, goal in named)
 
 
 def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]:
@@ -89,12 +113,15 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
 
     options: of its plan.
     """
-    if not isinstance(segments, Sequence) or not all(isinstance(x, Segment) for x in segments):
+    listed = isinstance(segments, Sequence)
+    if not listed or not all(isinstance(x, Segment | Mapping) for x in segments):
         raise InputError(
-            f"segments must be a list of hovi.Segment(goal, duration), got {shown(segments)}."
+            "segments must be a list of hovi.Segment(goal, duration), or of tables with a goal and "
+            f"a duration, got {shown(segments)}."
         )
     if not 1 <= len(segments) <= MAX_SEGMENTS:
         raise InputError(f"a sequence has 1 to {MAX_SEGMENTS:,} segments, got {len(segments)}.")
+    segments = [as_segment(each, i) for i, each in enumerate(segments)]
     names = names_of(segments)
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -103,7 +130,8 @@ def checked_segments(segments: Any, options: PlanOptions) -> tuple[Segment, ...]
         raise InputError(f"the last segment, {names[-1]!r}, needs a goal.")
     for name, segment in zip(names[:-1], segments[:-1], strict=True):
         for key in _ONLY_AT_THE_END:
-            given = getattr(segment.goal, key, None)
+            goal = segment.goal
+            given = goal.get(key) if isinstance(goal, Mapping) else getattr(goal, key, None)
             if given is not None and np.size(given) > 0:
                 raise InputError(
                     f"the goal of {name!r} takes no `{key}`, since accelerations are free where "

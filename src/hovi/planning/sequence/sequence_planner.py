@@ -11,6 +11,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.measures.segment_spans import SEGMENT_NAMES
 from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
+from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.search.group import in_group
 from hovi.planning.search.job import Acting, Progress
 from hovi.planning.search.option_fields import spell_out
@@ -18,7 +19,7 @@ from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.planner import holding, plan, run, silent, warn_of_ends
 from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
-from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, names_of
+from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
 from hovi.planning.sequence.sequence_job import job_of
 from hovi.planning.solver.solver import Solution
 from hovi.scene.scene import Scene
@@ -36,7 +37,7 @@ class _PlanSequence(Protocol[Keywords]):
         self,
         scene: Scene,
         start: Start,
-        segments: Sequence[Segment],
+        segments: Sequence[Table],
         progress: Progress | None = None,
         options: PlanOptions | None = None,
         *_: Keywords.args,
@@ -65,7 +66,7 @@ def _with_option_keywords(
 def plan_sequence(
     scene: Scene,
     start: Start,
-    segments: Sequence[Segment],
+    segments: Sequence[Table],
     progress: Progress | None = None,
     options: PlanOptions | None = None,
     **changes: Any,
@@ -80,8 +81,9 @@ def plan_sequence(
 
     scene: the robot with the effects that act all the time.
     start: as for `plan`.
-    segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), in order of time; the
-        last one needs a goal.
+    segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), or tables as in a
+        scene file, {"goal": {"q": ...}, "duration": "1 s", ...}, in order of time; the last one
+        needs a goal.
     progress: called with a line of text and the completed fraction, in [0, 1].
     options: a PlanOptions; the following keywords override it. The `intervals` are those of all
         segments together, and the times of `via` count from the start of the first.
@@ -97,17 +99,17 @@ def plan_sequence(
     chosen = PlanOptions() if options is None else options
     expect(chosen, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     chosen = chosen.with_changes(**changes)
-    segments = checked_segments(segments, chosen)
-    if len(segments) == 1:
-        return _alone(scene, start, segments[0], progress, chosen)
-    scene, begin, goals = _in_group(holding(scene, chosen), start, segments, chosen)
+    parts = checked_segments(segments, chosen)
+    if len(parts) == 1:
+        return _alone(scene, start, parts[0], progress, chosen)
+    scene, begin, goals = _in_group(holding(scene, chosen), start, parts, chosen)
     chosen, deadline = chosen.on(scene), Deadline(chosen.time_limit_seconds)
     with deadline.in_force():
-        job = job_of(scene, begin, goals, segments, chosen)
+        job = job_of(scene, begin, goals, parts, chosen)
         job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     solution = run(Search(job, deadline, progress or silent), began)
-    return _named(solution, segments)
+    return _named(solution, parts)
 
 
 def _alone(
@@ -129,8 +131,8 @@ def _in_group(
     scene: Scene, start: Start, segments: Sequence[Segment], options: PlanOptions
 ) -> tuple[Scene, End, tuple[End | None, ...]]:
     """The scene, the start and the goals, of the chosen group of joints if there is one."""
-    begin = as_goal(start, scene.robot)
-    goals = tuple(None if x.goal is None else as_goal(x.goal, scene.robot) for x in segments)
+    begin = as_end(start, scene.robot, "start")
+    goals = goals_of(segments, scene.robot)
     if options.group is None:
         return scene, begin, goals
     small, first = scene, begin

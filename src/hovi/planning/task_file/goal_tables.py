@@ -11,7 +11,8 @@ from hovi.discrete.state import State
 from hovi.errors import HoviError, InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of, require_no_rates
+from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
+from hovi.planning.problem.notation.via_points import require_no_rates
 from hovi.planning.problem.units import seconds
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, ViaTable
@@ -45,7 +46,7 @@ def _given(end: EndTable) -> dict[str, Any]:
     """What a table has, in the notation of `end_of`."""
     table = {key: getattr(end, key) for key in END_KEYS if key in end.model_fields_set}
     if end.axis is not None:
-        table["axis"] = (end.axis.frame, end.axis.world)
+        table["axis"] = end.axis.model_dump()
     return table
 
 
@@ -109,8 +110,9 @@ def end_table(goal: State | FrameGoal, robot: Robot, name: str) -> dict[str, Any
         table["position"] = _floats(goal.position)
     if goal.rotation is not None:
         table["rpy"] = _floats(pin.rpy.matrixToRpy(np.asarray(goal.rotation)))
-    if goal.axis is not None:
-        table["axis"] = {"frame": _floats(goal.axis[0]), "world": _floats(goal.axis[1])}
+    if goal.directions is not None:
+        inner, world = goal.directions
+        table["axis"] = {"frame": _floats(inner), "world": _floats(world)}
     if goal.free_velocity:
         table["free_velocity"] = list(goal.free_velocity)
     return table

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from hovi.errors import HoviError, InputError
-from hovi.planning.clearance.obstacles import obstacle_from_dict
+from hovi.errors import HoviError
 from hovi.planning.obstacles.grasped import Grasped, as_grasped, holding
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.schema import GraspedTable
@@ -23,11 +22,7 @@ def read_grasped(
 
 
 def _grasped(table: GraspedTable, number: int, toml: TomlText) -> Grasped:
-    given = {key: x for key, x in table.model_dump().items() if x is not None}
     try:
-        shapes = given["shape"] if isinstance(given["shape"], list) else [given["shape"]]
-        if not all(isinstance(each, dict) for each in shapes):
-            raise InputError("`shape` must be a table such as an obstacle's, or a list of them.")
-        return Grasped(**{**given, "shape": [obstacle_from_dict(each) for each in shapes]})
+        return Grasped(**{key: x for key, x in table.model_dump().items() if x is not None})
     except HoviError as wrong:
-        raise toml.error(("grasped", number), f"object {table.name!r}: {wrong}") from None
+        raise toml.error(("grasped", number), str(wrong)) from None

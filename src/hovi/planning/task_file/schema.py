@@ -10,8 +10,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
+from hovi.planning.obstacles.grasped import NEEDED
 from hovi.planning.problem.arms.limit_set import LimitSetName
-from hovi.planning.problem.units import DURATION_IN_WORDS
+from hovi.planning.problem.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
 from hovi.planning.search.options import MAX_INTERVALS, PlanOptions
 
@@ -139,18 +140,14 @@ class GoalTable(EndTable):
 class ViaTable(GoalTable):
     """[[via]]."""
 
-    time: PositiveSeconds = Field(
-        description='a positive number of seconds, or a text such as "500 ms"'
-    )
+    time: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
 
 
 class SegmentTable(Table):
     """[[segments]]: the segments of a sequence."""
 
     name: str = Field(default="", description="a text")
-    duration: PositiveSeconds = Field(
-        description='a positive number of seconds, or a text such as "500 ms"'
-    )
+    duration: PositiveSeconds = Field(description=SECONDS_IN_WORDS)
     goal: GoalTable | None = Field(
         default=None,
         description="a table with q and, if moving, v, or with a frame and its target",
@@ -199,9 +196,9 @@ class GraspedTable(Table):
     """[[grasped]]."""
 
     name: str = Field(default="grasped", description="the name of the object's link")
-    frame: str = Field(description="the name of a link of the robot")
-    mass: FiniteFloat = Field(gt=0, description="a positive number of kilograms")
-    shape: Any = Field(description="a table such as an obstacle's, or a list of them")
+    frame: str = Field(description=NEEDED["frame"])
+    mass: FiniteFloat = Field(gt=0, description=NEEDED["mass"])
+    shape: Any = Field(description=NEEDED["shape"])
     position: Direction | None = Field(default=None, description="a list of three finite numbers")
     rpy: Direction | None = Field(
         default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"

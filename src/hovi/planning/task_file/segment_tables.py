@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from hovi.errors import InputError
+from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.problem.units import seconds
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, names_of
+from hovi.planning.sequence.segment import Segment, checked_segments, names_of
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
 from hovi.planning.task_file.goal_tables import end_table, read_end
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
@@ -69,7 +70,7 @@ def _segment_table(segment: Segment, name: str, robot: Robot) -> dict[str, Any]:
     if segment.limits is not None:
         table["limits"] = limits_value(segment.limits, robot)
     if segment.goal is not None:
-        table["goal"] = end_table(as_goal(segment.goal, robot), robot, name)
+        table["goal"] = end_table(as_end(segment.goal, robot, name), robot, name)
     if segment.effects:
         table["effects"] = {each.key: effect_table(each) for each in segment.effects}
     return table

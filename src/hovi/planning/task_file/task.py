@@ -15,7 +15,7 @@ from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.sequence.segment import Segment, as_goal, checked_segments, duration_of
+from hovi.planning.sequence.segment import Segment, Table, checked_segments, duration_of, goals_of
 from hovi.scene.scene import Scene
 
 
@@ -59,7 +59,7 @@ class Task:
         cls,
         scene: Scene,
         start: State | FrameGoal,
-        segments: Sequence[Segment],
+        segments: Sequence[Table],
         options: PlanOptions | None = None,
         name: str = "task",
     ) -> Self:
@@ -70,7 +70,8 @@ class Task:
         """
         chosen = PlanOptions() if options is None else options
         parts = checked_segments(segments, chosen)
-        goal = as_goal(parts[-1].goal, scene.robot)
+        goal = goals_of(parts, scene.robot)[-1]
+        assert goal is not None
         return cls(scene, start, goal, duration_of(parts), chosen, name, parts)
 
     def __getattr__(self, name: str) -> Any:

@@ -12,11 +12,14 @@ import tomlkit
 
 import hovi
 from hovi.discrete.state import State
-from hovi.errors import InputError, SceneError
+from hovi.errors import HoviWarning, InputError, SceneError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.goals import Via
-from hovi.planning.problem.notation.ends import EndError, as_end, as_via
+from hovi.planning.problem.notation.ends import EndError, as_end
+from hovi.planning.problem.notation.via_points import as_via
 from hovi.planning.task_file.reading import load_task
+from samples.meshes import channel
+from samples.world_files import CUPBOARD, PLANNING_SCENE
 
 POSITION, RPY = [0.45, 0.25, 0.25], [3.0, 0.1, 0.2]
 QUATERNION = [0.6, 0.0, 0.0, 0.8]
@@ -166,3 +169,67 @@ def test_a_plan_takes_the_tables_of_its_file(two_link: hovi.Robot) -> None:
     plain = hovi.plan(scene, [0.0, 0.0], [0.4, 0.3], 1.0, intervals=6)
     tables = {"q": {"elbow": 0.0, "shoulder": 0.0}}, {"shoulder": 0.4, "elbow": 0.3}
     assert hovi.plan(scene, *tables, "1 s", intervals=6).cost == plain.cost
+
+
+def test_tables_of_obstacles_are_those_of_a_file(tmp_path: Path) -> None:
+    for name, text in (("cupboard.urdf", CUPBOARD), ("kitchen.yaml", PLANNING_SCENE)):
+        (tmp_path / name).write_text(text)
+    (tmp_path / "channel.obj").write_text(channel())
+    tables = [
+        {"kind": "box", "size": [0.1, 0.1, 0.1], "position": [5.0, 0.0, 0.0]},
+        {"kind": "file", "name": "a", "file": "cupboard.urdf", "joints": {"hinge": 0.7}},
+        {"kind": "file", "name": "b", "file": "kitchen.yaml", "position": [0.0, 5.0, 0.0]},
+    ]
+    with pytest.warns(HoviWarning, match="convex hull"):
+        read = loaded(tmp_path, obstacles=tables).options.obstacles
+    here = [
+        each | ({"file": str(tmp_path / str(each["file"]))} if "file" in each else {})
+        for each in tables
+    ]
+    given = hovi.PlanOptions(obstacles=here).obstacles  # type: ignore[arg-type]
+    assert [each.name for each in given] == [each.name for each in read]
+    assert "a/door" in {each.name for each in given}
+    assert given == read
+
+
+def test_tables_of_grasped_objects_are_those_of_a_file(tmp_path: Path) -> None:
+    box = {"kind": "box", "size": [0.1, 0.1, 0.2], "position": [0.0, 0.0, 0.0]}
+    ball = {"kind": "sphere", "radius": 0.1, "position": [0.0, 0.0, 0.1]}
+    for shape in (box, [box, ball]):
+        table = {"name": "crate", "frame": "tool0", "mass": 2.0, "shape": shape, "rpy": [0, 0, 1.0]}
+        read = loaded(tmp_path, grasped=[table]).options.grasped
+        assert hovi.PlanOptions(grasped=[table]).grasped == read  # type: ignore[arg-type]
+        assert (hovi.Grasped(**table),) == read  # type: ignore[arg-type]
+    robot = hovi.load_robot("ur5")
+    assert hovi.holding(robot, table).frame_names == hovi.holding(robot, read).frame_names
+
+
+def test_tables_of_segments_are_those_of_a_file(tmp_path: Path) -> None:
+    load = {"payload": {"frame": "tool0", "mass": 2.0}}
+    tables: list[dict[str, Any]] = [
+        {"name": "reach", "duration": "800 ms", "goal": {"frame": "tool0", "position": POSITION}},
+        {"duration": 1.5, "goal": {"q": Q}, "effects": load, "limits": {"v": 1e-3}},
+    ]
+    text = {"robot": "ur5", "start": {"q": Q}, "segments": tables}
+    path = tmp_path / "scene.toml"
+    path.write_text(tomlkit.dumps(text))
+    robot = hovi.load_robot("ur5")
+    read = load_task(path).segments
+    given = hovi.Task.of_segments(hovi.Scene(robot, []), State(Q), tables).segments
+    for one, other in zip(read, given, strict=True):
+        assert (one.name, one.duration) == (other.name, other.duration)
+        assert (one.effects, one.limits) == (other.effects, other.limits)
+        ends = [fields(as_end(each.goal, robot, "goal"), robot) for each in (one, other)]  # type: ignore[arg-type]
+        assert ends[0] == ends[1]
+
+
+def test_a_goal_of_inverse_kinematics_may_be_a_table(ur5: hovi.Robot) -> None:
+    near = dict(zip(ur5.joint_names, Q, strict=True))
+    table = {"frame": "tool0", "position": POSITION, "axis": AXIS}
+    goal = FrameGoal("tool0", position=POSITION, axis=AXIS)
+    assert fields(goal, ur5) == fields(as_end(table, ur5, "goal"), ur5)
+    found = hovi.inverse_kinematics(ur5, table, near=near)
+    assert np.array_equal(found, hovi.inverse_kinematics(ur5, goal, near=Q))
+    for wrong in ({"q": Q}, {"frame": "tool0", "axis": {"frame": [0, 0, 1]}}, {"position": Q[:3]}):
+        with pytest.raises(InputError):
+            hovi.inverse_kinematics(ur5, wrong)

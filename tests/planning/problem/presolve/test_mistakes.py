@@ -38,6 +38,15 @@ HEAVY = GRAVITY | {"payload": {"frame": "tool0", "mass": 30.0}}
 BALL = {"kind": "sphere", "name": "ball", "radius": 0.1}
 WALL = {"kind": "box", "name": "wall", "size": [0.1, 0.1, 0.1], "position": [5.0, 5.0, 0.0]}
 BRIEF = {"time_limit": 0.2}
+REACH: dict[str, Any] = {"duration": "500 ms", "goal": {"q": [0.4, 0.3]}}
+BACK: dict[str, Any] = {"duration": 1.0, "goal": {"q": [0.0, 0.0]}}
+PICK: dict[str, Any] = {
+    "robot": TWO_LINK,
+    "start": {"q": [0, 0]},
+    "segments": [REACH, BACK],
+    "scheme": COARSE,
+    "effects": GRAVITY,
+}
 STRETCHED = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
 
 
@@ -149,6 +158,78 @@ WRONG: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
         UR5 | {"via": [{"time": 0.7, "q": Q1, "a": Q0}]},
         ("a via point takes no `a`: leave it out.",),
     ),
+    "an unknown key of a segment": (
+        PICK | {"segments": [REACH | {"time": 1.0}, BACK]},
+        ("unknown key `segments[0].time`; did you mean 'name'?",),
+    ),
+    "a segment without a duration": (
+        PICK | {"segments": [REACH, {"goal": {"q": [0.0, 0.0]}}]},
+        ("`segments[1].duration` is missing; it must be a positive number of seconds, or a text",),
+    ),
+    "a negative duration of a segment": (
+        PICK | {"segments": [REACH | {"duration": -1.0}, BACK]},
+        ("`segments[0].duration` must be a positive number of seconds, or a text", "it is -1.0"),
+    ),
+    "a goal of a segment that names a frame twice": (
+        PICK | {"segments": [REACH, BACK | {"goal": {"position": [0.1, 0.2, 0.3]}}]},
+        ("`position` needs a `frame`.",),
+    ),
+    "a goal of a segment without a joint": (
+        PICK | {"segments": [REACH, BACK | {"goal": {"q": {"elbow": 0.2}}}]},
+        ("`segments[1].goal.q` leaves out joint 'shoulder'; it needs every joint.",),
+    ),
+    "an unknown key of a payload in a segment": (
+        PICK | {"segments": [REACH, BACK | {"effects": {"payload": {"frame": "tip", "mas": 1.0}}}]},
+        ("unknown key `segments[1].effects.payload.mas`; did you mean 'mass'?",),
+    ),
+    "a negative limit in a segment": (
+        PICK | {"segments": [REACH | {"limits": {"v": {"elbow": -2.0}}}, BACK]},
+        ("limits.v of 'elbow' must be a positive number",),
+    ),
+    "a last segment without a goal": (
+        PICK | {"segments": [REACH, {"duration": 1.0}]},
+        ("the last segment, 'segment 2', needs a goal.",),
+    ),
+    "an acceleration where segments meet": (
+        PICK | {"segments": [REACH | {"goal": {"q": [0.4, 0.3], "a": [1.0, 0.0]}}, BACK]},
+        ("the goal of 'segment 1' takes no `a`",),
+    ),
+    "an unknown kind of obstacle": (
+        UR5 | {"obstacles": [WALL | {"kind": "boks"}]},
+        ("obstacle 'wall': there is no obstacle of kind 'boks': did you mean 'box'?",),
+    ),
+    "an unknown key of an obstacle": (
+        UR5 | {"obstacles": [{**WALL, "centre": [0, 0, 0]}]},
+        ("obstacle 'wall': a box has no `centre`: ",),
+    ),
+    "an obstacle without a size": (
+        UR5 | {"obstacles": [{"kind": "box", "position": [0, 0, 3]}]},
+        ("obstacle 'number 1': a box needs `size`.",),
+    ),
+    "a file of obstacles that is no such file": (
+        UR5 | {"obstacles": [{"kind": "file", "name": "hall", "file": "hall.step"}]},
+        ("obstacle 'hall': obstacles are read from .urdf, .yaml, .yml files",),
+    ),
+    "a grasped object without a mass": (
+        UR5 | {"grasped": [{"frame": "tool0", "shape": BALL}]},
+        ("`grasped[0].mass` is missing; it must be a positive number of kilograms",),
+    ),
+    "an unknown key of a grasped object": (
+        UR5 | {"grasped": [{"frame": "tool0", "mass": 1.0, "shape": BALL, "rot": 1.0}]},
+        ("unknown key `grasped[0].rot`; ",),
+    ),
+    "a grasped object of an unknown kind": (
+        UR5 | {"grasped": [{"frame": "tool0", "mass": 1.0, "shape": {"kind": "bal"}}]},
+        ("`shape` of grasped object 'grasped': there is no obstacle of kind 'bal'",),
+    ),
+    "one direction of an axis": (
+        UR5 | {"goal": HANDLE | {"axis": {"frame": [0.0, 0.0, 1.0]}}},
+        ("axis",),
+    ),
+    "an unknown kind of limits": (
+        UR5 | {"limits": {"base": "urdf", "speed": 1.0}},
+        ("unknown key `limits.speed`; ",),
+    ),
     "a number of intervals given twice": (
         UR5 | {"intervals": 7},
         ("`intervals` and `scheme.intervals` are the same: leave one of them out.",),
@@ -227,8 +308,10 @@ def planned(task: Mapping[str, Any]) -> hovi.Solution:
     rest = dict(task)
     free = rest.pop("free_flyer", False)
     robot, effects = hovi.load_robot(rest.pop("robot"), free_flyer=free), rest.pop("effects")
-    ends = rest.pop("start"), rest.pop("goal"), rest.pop("duration")
-    return hovi.plan(hovi.Scene(robot, effects), *ends, **rest)
+    scene, start = hovi.Scene(robot, effects), rest.pop("start")
+    if "segments" in rest:
+        return hovi.plan_sequence(scene, start, rest.pop("segments"), **rest)
+    return hovi.plan(scene, start, rest.pop("goal"), rest.pop("duration"), **rest)
 
 
 def sentences(task: Mapping[str, Any]) -> tuple[str, list[str], str]:

@@ -80,7 +80,7 @@ def find_branches(
     count, _ = compiled.kernel.search(
         position=_contiguous(goal.position),
         rotation=_contiguous(goal.rotation),
-        axis=None if goal.axis is None else np.array(goal.axis),
+        axis=None if goal.directions is None else np.array(goal.directions),
         weight=1 / LENGTH,
         near=chain.angles(near),
         apart=ISOLATED if chain.n <= size else IN_A_FAMILY,

@@ -1,4 +1,4 @@
-"""Starts, goals and via points from tables, in the words of a scene file."""
+"""Starts and goals from tables, in the words of a scene file."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy.typing as npt
 
-from hovi.checks.kinds import shown
 from hovi.discrete.state import State, as_state
 from hovi.errors import InputError, nearest
 from hovi.planning.problem.frame_goal import FrameGoal
-from hovi.planning.problem.goals import Via
 from hovi.planning.problem.kinematics.orientation import ORIENTATIONS
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
@@ -61,30 +59,6 @@ def as_end(given: End, on: Coordinates, name: str) -> State | FrameGoal:
     return state
 
 
-def as_via(given: Any, number: int) -> Via:
-    """A via point from a Via, or from a table as [[via]] in a scene file. Raises InputError."""
-    if isinstance(given, Via):
-        return given
-    if not isinstance(given, Mapping):
-        raise InputError(
-            "via must be a list of hovi.Via(time, goal), or of tables with a time and a goal, got "
-            f"{shown(given)}."
-        )
-    name, table = f"via[{number}]", dict(given)
-    if "time" not in table:
-        raise EndError(f"`{name}.time` is missing.", "time")
-    time = table.pop("time")
-    require_no_rates(table)
-    return Via(time, end_of(table, name))
-
-
-def require_no_rates(table: Mapping[str, Any]) -> None:
-    """Raise EndError for keys of a state that via points do not take."""
-    for key in ("a", "free_acceleration"):
-        if _is_given(table.get(key)):
-            raise EndError(f"a via point takes no `{key}`: leave it out.", key)
-
-
 def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
     """The state or the frame goal of a table with END_KEYS. name: in messages, such as "start".
 
@@ -108,10 +82,8 @@ def end_of(table: Mapping[str, Any], name: str) -> State | FrameGoal:
             what = "a start" if name == "start" else "a goal"
             raise EndError(f"{what} of a `frame` takes no `{key}`: leave it out.", key)
     axis = given.get("axis")
-    if isinstance(axis, Mapping):
-        if axis.keys() != {"frame", "world"}:
-            raise EndError(f"`{name}.axis` needs two directions, `frame` and `world`.", "axis")
-        given["axis"] = (axis["frame"], axis["world"])
+    if isinstance(axis, Mapping) and axis.keys() != {"frame", "world"}:
+        raise EndError(f"`{name}.axis` needs two directions, `frame` and `world`.", "axis")
     return FrameGoal(given.pop("frame"), **given)
 
 

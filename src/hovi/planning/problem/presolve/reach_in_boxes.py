@@ -72,8 +72,8 @@ def _angle(goal: FrameGoal, rotation: Array) -> Array | None:
     """The angles by which frames (M, 3, 3) miss the goal; None if it has no direction."""
     if goal.rotation is not None:
         chord = np.linalg.norm(rotation - np.asarray(goal.rotation), axis=(1, 2)) / np.sqrt(2)
-    elif goal.axis is not None:
-        inner, world = (np.asarray(each) for each in goal.axis)
+    elif goal.directions is not None:
+        inner, world = goal.directions
         chord = np.linalg.norm(rotation @ inner - world, axis=1)
     else:
         return None
