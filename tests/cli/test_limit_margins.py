@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hovi
-from hovi.cli.reports.limit_margins import Margins, least_distance, limit_margins
+from hovi.cli.reports.limit_margins import KnownMargins, least_distance, limit_margins
 from hovi.planning.clearance.obstacles import Sphere
 from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import Deadline
@@ -92,9 +92,9 @@ def test_a_motion_without_limits_and_obstacles_has_no_margins(arm_scene: hovi.Sc
 
 
 def test_margins_that_no_time_is_left_for_are_missing(limited: Solution) -> None:
-    known = Margins.of(limited, Deadline())
+    known = KnownMargins.of(limited, Deadline())
     assert known.missing == ""
     assert known.limits is not None
     assert known.distance == least_distance(limited)
-    late = Margins.of(limited, Deadline(-1.0))
-    assert late == Margins(None, None, "the time limit was reached")
+    late = KnownMargins.of(limited, Deadline(-1.0))
+    assert late == KnownMargins(missing="the time limit was reached")

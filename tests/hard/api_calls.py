@@ -526,7 +526,7 @@ def _plans() -> list[Call]:
         **{"guess": "cubic", "turns": None, "weight": None, "continuation": False},
         **{"group": None},
     }
-    ends = [0.0, 0.0], [0.3, 0.7]
+    ends, limits = ([0.0, 0.0], [0.3, 0.7]), hovi.as_limits(robot(), {"base": "none", "v": 1.0})
     return [
         call(hovi.plan, scene(), *ends, 1.0, progress=None, options=None, **quick, **options),
         call(hovi.plan, scene(), *ends, (0.5, 1.0), **quick),
@@ -561,6 +561,9 @@ def _plans() -> list[Call]:
             **{"time_limit": "1 s", "max_iterations": 2},
         ),
         own(solution(), "advance", 0.1, [0.05, 0.1], [0.3, 0.6], duration=0.8, time_limit=1.0),
+        own(solution(), "margins"),
+        build(hovi.LimitMargins, names=("a", "b"), margin=np.zeros((4, 2)), limits=limits),
+        build(hovi.Margins, limits=None, distance=0.1, segments={}),
         call(hovi.certify, solution(), "tip", estimate=False),
         call(hovi.estimate_error, solution(), "tip"),
     ]

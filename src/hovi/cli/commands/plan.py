@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from hovi.cli.reports.limit_margins import Margins
+    from hovi.cli.reports.limit_margins import KnownMargins
     from hovi.discrete.trajectory import Trajectory
     from hovi.planning.refinement.certificate import Certificate
     from hovi.planning.search.job import Progress
@@ -191,15 +191,15 @@ def _note_assumptions(task: Task) -> None:
             print(f"note: {sentence}", file=sys.stderr, flush=True)
 
 
-def _margins(solution: Solution, deadline: Deadline, report: Progress | None) -> Margins:
+def _margins(solution: Solution, deadline: Deadline, report: Progress | None) -> KnownMargins:
     """The margins of the report, for which there is a second after the deadline, too."""
-    from hovi.cli.reports.limit_margins import Margins
+    from hovi.cli.reports.limit_margins import KnownMargins
     from hovi.system.deadline import Deadline
 
     if report is not None:
         report("margins to limits and obstacles", 1.0)
     left = deadline.seconds_left
-    return Margins.of(solution, Deadline(None if left is None else max(left, MARGIN_SECONDS)))
+    return KnownMargins.of(solution, Deadline(None if left is None else max(left, MARGIN_SECONDS)))
 
 
 def _certificate(

@@ -13,12 +13,13 @@ from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines
 from hovi.cli.reports.extremes import extremes_json, extremes_lines
-from hovi.cli.reports.limit_margins import LimitMargins, Margins
+from hovi.cli.reports.limit_margins import KnownMargins
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.segments import segment_lines, segments_json
 from hovi.cli.reports.terminal_table import print_table, terminal_table
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.planning.refinement.certificate import Certificate
+from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
@@ -29,7 +30,7 @@ def as_json(
     solution: Solution,
     task: Task,
     out: Path | None,
-    margins: Margins,
+    margins: KnownMargins,
     certificate: Certificate | None = None,
 ) -> str:
     """The one JSON object of `hovi plan --json`; numbers are finite or null."""
@@ -56,9 +57,11 @@ def as_json(
         "limit_set": limit_set_json(limit_set_of(task), trajectory.grid.order),
         "limits": None if limits is None else limits.by_kind(),
         "excess": None if limits is None else limits.excess,
+        "usable": None if margins.violation is None else not margins.violation,
+        "violation": margins.violation or None,
         "least_distance": margins.distance,
         "out": None if out is None else str(out),
-        **segments_json(solution),
+        **segments_json(solution, margins.segments),
         **accuracy_json(solution, task),
         "certificate": None if certificate is None else certificate_json(certificate),
     }
@@ -69,11 +72,11 @@ def print_report(
     solution: Solution,
     task: Task,
     out: Path | None,
-    margins: Margins,
+    margins: KnownMargins,
     certificate: Certificate | None = None,
 ) -> None:
     """Print a summary, the peaks of the motion, the certificate and the output file."""
-    for label, text in _summary(solution, task):
+    for label, text in _summary(solution, task, margins):
         print(f"{label:9s}{text}")
     arm = limit_set_of(task)
     if arm is not None:
@@ -109,7 +112,7 @@ def _estimate(solution: Solution, certificate: Certificate | None) -> float | No
     return None if certificate.errors is None else certificate.errors.cost
 
 
-def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
+def _summary(solution: Solution, task: Task, margins: KnownMargins) -> list[tuple[str, str]]:
     """Labels and their text."""
     grid = solution.trajectory.grid
     rows = [
@@ -122,12 +125,19 @@ def _summary(solution: Solution, task: Task) -> list[tuple[str, str]]:
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
-    rows += segment_lines(solution)
+    if not solution.success and margins.violation is not None:
+        rows.insert(2, ("usable", _usable(margins.violation)))
+    rows += segment_lines(solution, margins.segments)
     if len(solution.minima) > 1:
         costs = [f"{cost:.6g}" for cost in solution.minima]
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
         rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
     return rows
+
+
+def _usable(violation: str) -> str:
+    """Whether a motion that is no minimum can be used, and why not."""
+    return f"no: {violation}" if violation else "yes: its ends and limits hold"
 
 
 def _infeasible_note(solution: Solution) -> str:
@@ -166,7 +176,8 @@ def _margins_table(extremes: Peaks, margins: LimitMargins) -> Table:
 
 
 def _margins_note(margins: LimitMargins) -> str:
-    note = "margin: distance to the nearest limit, in percent of the range; * at a limit"
+    near = ", in the segment that comes nearest" if margins.limits.parts else ""
+    note = f"margin: distance to the nearest limit{near}, in percent of the range; * at a limit"
     return note + (", ! beyond one." if margins.exceeded else ".")
 
 

@@ -2,31 +2,49 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from hovi.discrete.measures.segment_spans import SegmentSpan, segment_spans
+from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 
 
-def segment_lines(solution: Solution) -> list[tuple[str, str]]:
-    """Labels and text: when each segment begins and ends, and what it costs."""
+def segment_lines(solution: Solution, margins: Mapping[str, LimitMargins]) -> list[tuple[str, str]]:
+    """Labels and text: when each segment begins and ends, what it costs, its tightest limit.
+
+    margins: to the limits of each segment, by its name.
+    """
     return [
         (
             "segment",
-            f"{span.name!r} from {span.begin:.6g} to {span.end:.6g} s, cost {cost:.6g}",
+            f"{span.name!r} from {span.begin:.6g} to {span.end:.6g} s, cost {cost:.6g}"
+            f"{_tightest(margins.get(span.name))}",
         )
         for span, cost in _costs(solution)
     ]
 
 
-def segments_json(solution: Solution) -> dict[str, Any]:
-    """`segments`: name, begin, end and cost of each; nothing for a motion in one scene."""
-    rows = [
-        {"name": span.name, "begin": span.begin, "end": span.end, "cost": cost}
-        for span, cost in _costs(solution)
-    ]
+def _tightest(margins: LimitMargins | None) -> str:
+    """The smallest margin of a segment as the end of its line; "" without limits."""
+    if margins is None or not margins.limits.bounded.any():
+        return ""
+    kind, joint, margin = margins.tightest
+    return f", tightest limit {kind} of {joint!r}, margin {margins.in_words(margin)}"
+
+
+def segments_json(solution: Solution, margins: Mapping[str, LimitMargins]) -> dict[str, Any]:
+    """`segments`: name, begin, end, cost and margins of each; nothing for a motion in one scene.
+
+    margins: to the limits of each segment, by its name.
+    """
+    rows: list[dict[str, Any]] = []
+    for span, cost in _costs(solution):
+        row = {"name": span.name, "begin": span.begin, "end": span.end, "cost": cost}
+        own = margins.get(span.name)
+        rows.append(row | {"limits": None if own is None else own.by_kind()})
     return {"segments": rows} if rows else {}
 
 

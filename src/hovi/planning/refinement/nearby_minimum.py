@@ -14,7 +14,8 @@ import numpy as np
 from hovi.discrete.grid import DiscretePath
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.solver import Solution, minimum_at
+from hovi.planning.solver.outcome.without_solve import minimum_at
+from hovi.planning.solver.solver import Solution
 from hovi.system.deadline import raise_if_late
 
 MAX_HESSIANS = 5

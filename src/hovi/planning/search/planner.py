@@ -28,7 +28,8 @@ from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.search.smoothing import smoothed
-from hovi.planning.solver.solver import Solution, infeasible_at_once
+from hovi.planning.solver.outcome.without_solve import infeasible_at_once
+from hovi.planning.solver.solver import Solution
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order

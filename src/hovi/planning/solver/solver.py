@@ -33,6 +33,8 @@ from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
+from hovi.planning.solver.outcome.margins import Margins, margins_of
+from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.receding.ends import (
     as_goal,
     as_start,
@@ -42,7 +44,7 @@ from hovi.planning.solver.receding.ends import (
 )
 from hovi.planning.solver.receding.last_motion import last_motion, meets
 from hovi.planning.solver.receding.shift import Shift
-from hovi.planning.solver.status import Status, infeasible_sentence, unfinished
+from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
@@ -63,7 +65,8 @@ class Solution:
 
     success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
         `solve` and `replan`, a resolved one.
-    status, message: the outcome, as a word and in a sentence.
+    status, message: the outcome, as a word and in a sentence. Whatever it is, `usable` says whether
+        ends and limits hold, and `violation` what does not.
     trajectory: the motion; the best one found if there is no minimum.
     cost: the discrete action of L~, by default 1/2 integral |tau|^2.
     error_estimate: of the cost, relative; None if there is none.
@@ -108,6 +111,26 @@ class Solution:
         other costs and the price of time are left out. None for a Lagrangian without torques.
         """
         return effort_of(self.trajectory)
+
+    def margins(self) -> Margins:
+        """How far the motion stays from each of its limits, and from obstacles.
+
+        Raises InputError if this solution has no problem.
+        """
+        return margins_of(self._solved_problem, self.trajectory)
+
+    @cached_property
+    def violation(self) -> str:
+        """What the motion violates of its ends, limits, distances and equations, "" if nothing.
+
+        A clause about the first that does not hold to 1e-6. InputError without a problem.
+        """
+        return violation_of(self._solved_problem, self.trajectory)
+
+    @property
+    def usable(self) -> bool:
+        """Whether ends, limits, distances and equations hold, be the motion a minimum or not."""
+        return not self.violation
 
     @cached_property
     def duration_derivative(self) -> float:
@@ -360,28 +383,6 @@ def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float
         instants=result.instants,
         central=result.central,
     )
-
-
-def minimum_at(
-    problem: TrajectoryProblem, path: DiscretePath, steps: int, seconds: float
-) -> Solution:
-    """A Solution from a path that is known to be a minimum, without limits or constraints.
-
-    steps: of the optimiser. seconds: wall time.
-    """
-    value = problem.ld.action(path)
-    message = f"a minimum of cost {value:.10g} after {steps} steps."
-    result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
-    return solution_of(result, 0.0, seconds)
-
-
-def infeasible_at_once(
-    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
-) -> Solution:
-    """The guess of a problem that is known to have no motion. reason: as a clause."""
-    path, message = guess_path(problem, guess), infeasible_sentence(reason)
-    value = problem.ld.action(path)
-    return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)
 
 
 def _the_guess(problem: TrajectoryProblem, path: DiscretePath, stop: Stop) -> MethodResult:

@@ -1,0 +1,1 @@
+"""What a motion keeps: its margins to limits and obstacles, and what it violates."""

@@ -1,0 +1,50 @@
+"""What a motion violates of its ends, its equations, its limits and its distances, if anything."""
+
+from __future__ import annotations
+
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
+from hovi.planning.problem.limit_violation import excess_along, worst_sentence
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import FEASIBLE_RESIDUAL, within
+from hovi.planning.solver.receding.last_motion import MET, misses
+
+
+def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
+    """The first of what a motion violates, as a clause; "" if ends, equations and limits hold.
+
+    They hold to 1e-6: ends in [rad] and [m], limits relative to their ranges or to their own
+    tolerance, passive torques to the largest torque, distances in [m]. Between the nodes, too.
+    Raises OutOfTimeError when the deadline in force passes before that is known.
+    """
+    path = motion.path
+    missed = misses(problem, path)
+    if missed:
+        return f"the motion {missed}"
+    if problem.unreachable:
+        return problem.unreachable
+    if problem.constrained:
+        residuals = ActionObjective(problem).residuals(path)
+        if not within(residuals, FEASIBLE_RESIDUAL, FEASIBLE_RESIDUAL):
+            return (
+                f"goals at nodes are missed by up to {residuals.node_error:.3g}, and passive "
+                f"joints have {residuals.torque_share:.3g} of the largest torque"
+            )
+    limits = problem.limits
+    if limits is not None and _exceeded(motion, limits):
+        return worst_sentence(motion, limits, problem.coordinates)
+    if problem.distances is None or problem.clearance is None:
+        return ""
+    margin = float(problem.clearance.margin)
+    approach = approach_along(motion, problem.distances, margin)
+    if approach.distance.min() >= margin - MET:
+        return ""
+    return approach_sentence(motion, problem.distances, approach, margin)
+
+
+def _exceeded(motion: Trajectory, limits: Limits) -> bool:
+    if not limits.bounded.any():
+        return False
+    return excess_along(motion, limits).worst > max(MET, limits.tolerance)

@@ -1,0 +1,33 @@
+"""Solutions that no solve has found: what is a minimum already, and what has no motion."""
+
+from __future__ import annotations
+
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.trajectory import Trajectory
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.initial_path import guess_path
+from hovi.planning.solver.methods.method import MethodResult
+from hovi.planning.solver.solver import Solution, solution_of
+from hovi.planning.solver.status import Status, infeasible_sentence
+
+
+def minimum_at(
+    problem: TrajectoryProblem, path: DiscretePath, steps: int, seconds: float
+) -> Solution:
+    """A Solution from a path that is known to be a minimum, without limits or constraints.
+
+    steps: of the optimiser. seconds: wall time.
+    """
+    value = problem.ld.action(path)
+    message = f"a minimum of cost {value:.10g} after {steps} steps."
+    result = MethodResult(problem, path, value, Status.MINIMUM, message, steps, n_neg=0)
+    return solution_of(result, 0.0, seconds)
+
+
+def infeasible_at_once(
+    problem: TrajectoryProblem, guess: str | Trajectory | DiscretePath, reason: str
+) -> Solution:
+    """The guess of a problem that is known to have no motion. reason: as a clause."""
+    path, message = guess_path(problem, guess), infeasible_sentence(reason)
+    value = problem.ld.action(path)
+    return solution_of(MethodResult(problem, path, value, Status.INFEASIBLE, message), 0.0, 0.0)
