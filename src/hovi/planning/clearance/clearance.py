@@ -81,6 +81,17 @@ class Clearance:
         """Whether there are obstacles or self-collisions to avoid."""
         return bool(self.obstacles) or self.self_collision
 
+    def from_time(self, time: float) -> Clearance:
+        """The clearance by a clock that starts at a time, in [s]: itself if nothing moves."""
+        if all(each.motion is None for each in self.obstacles):
+            return self
+        paths = [each.motion for each in self.obstacles]
+        later = [
+            dataclasses.replace(each, path=None if path is None else path.from_time(time))
+            for each, path in zip(self.obstacles, paths, strict=True)
+        ]
+        return dataclasses.replace(self, obstacles=later)
+
     def to_dict(self) -> dict[str, Any]:
         """The clearance as JSON-able data."""
         return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -87,6 +87,10 @@ class ObstaclePath:
         """The path as JSON-able data, with the keys of a scene file."""
         values = {each.name: getattr(self, each.name) for each in fields(self)}
         return {key: np.asarray(x).tolist() for key, x in values.items() if x is not None}
+
+    def from_time(self, time: float) -> ObstaclePath:
+        """The path by a clock that starts at a time, in [s]."""
+        return replace(self, times=np.asarray(self.times) - time)
 
     def poses(self, t: npt.ArrayLike) -> Array:
         """Positions and unit quaternions (x, y, z, w) at times (P,), shape (P, 7)."""

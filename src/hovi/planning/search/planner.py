@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
@@ -28,8 +28,10 @@ from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
 from hovi.planning.search.smoothing import smoothed
+from hovi.planning.solver.outcome.self_collision import self_collision_sentence
 from hovi.planning.solver.outcome.without_solve import infeasible_at_once
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order
@@ -131,18 +133,32 @@ def plan(
         warn(sentence)
     if found.reason:
         nothing = infeasible_at_once(longest, chosen.guess, found.reason)
-        return _with_assumptions(nothing, job, time.perf_counter() - began)
+        return with_notes(nothing, [job.scene], job.options, time.perf_counter() - began)
     if FrameGoal in map(type, given):
         ends = chosen_ends(scene, *given, T, chosen, deadline)
         job = search.job(ends, deadline, job.scene if ends[0] is job.start else None)
-    return _with_assumptions(run(Search(job, deadline, progress or silent, free), began), job)
+    solution = run(Search(job, deadline, progress or silent, free), began)
+    return with_notes(solution, [job.scene], job.options)
 
 
-def _with_assumptions(found: Solution, job: Job, setup_seconds: float | None = None) -> Solution:
-    """The solution, with a message that ends with what its scene leaves unsaid."""
-    said = assumptions(job.scene, found.trajectory, job.options.weight is not None)
+def with_notes(
+    found: Solution,
+    scenes: Sequence[Scene],
+    options: PlanOptions,
+    setup_seconds: float | None = None,
+) -> Solution:
+    """The solution, with a message that ends with what was left unsaid, self-collision included.
+
+    scenes: of its segments; what one of them says is said.
+    """
+    weighted = options.weight is not None
+    of_scenes = [assumptions(scene, found.trajectory, weighted) for scene in scenes]
+    said = [each for each in of_scenes[0] if all(each in others for others in of_scenes)]
+    if not options.self_collision and found.status not in (Status.INFEASIBLE, Status.DIVERGED):
+        said.append(self_collision_sentence(found.trajectory))
+    message = " ".join([found.message, *filter(None, said)])
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
-    return dataclasses.replace(found, message=" ".join([found.message, *said]), setup_seconds=setup)
+    return dataclasses.replace(found, message=message, setup_seconds=setup)
 
 
 def run(search: Search, began: float) -> Solution:

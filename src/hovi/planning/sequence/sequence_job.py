@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
-from hovi.errors import InputError
+from hovi.errors import InputError, warn
 from hovi.planning.problem.limits import Limits, as_limits
 from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
@@ -19,8 +19,8 @@ from hovi.planning.search.job import Acting, Job, Part
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.smoothing import smoothed
 from hovi.planning.sequence.branches import End, Leg, chosen_branches
-from hovi.planning.sequence.contradictory_segment import contradictory_segment
 from hovi.planning.sequence.segment import Segment, names_of
+from hovi.planning.sequence.segment_findings import segment_findings
 from hovi.scene.scene import Scene
 from hovi.schemes import of_order
 
@@ -61,8 +61,10 @@ def job_of(
         grid = sequence_grid(segments, options, scene.order)
     legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
     job = Job(scene, grid, known, reached[-1], options, parts)
-    reason = contradictory_segment(job, legs, limits, names_of(segments))
-    seams = [Seam(leg.end, leg.goal, unreachable=reason) for leg in legs[:-1]]
+    found = segment_findings(job, legs, limits, names_of(segments))
+    for sentence in found.warnings:
+        warn(sentence)
+    seams = [Seam(leg.end, leg.goal, unreachable=found.reason) for leg in legs[:-1]]
     if any(each.limits is not None for each in segments):
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))

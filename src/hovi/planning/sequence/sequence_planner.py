@@ -16,7 +16,7 @@ from hovi.planning.search.group import in_group
 from hovi.planning.search.job import Acting, Progress
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import holding, plan, run, silent, warn_of_ends
+from hovi.planning.search.planner import holding, plan, run, silent, warn_of_ends, with_notes
 from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
 from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
@@ -109,7 +109,8 @@ def plan_sequence(
         job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     solution = run(Search(job, deadline, progress or silent), began)
-    return _named(solution, parts)
+    scenes = [part.acting.on(job.scene) for part in job.parts]
+    return _named(with_notes(solution, scenes, job.options), parts)
 
 
 def _alone(

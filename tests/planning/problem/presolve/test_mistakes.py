@@ -34,7 +34,8 @@ UR5: dict[str, Any] = {
 }
 ARM: dict[str, Any] = UR5 | {"robot": TWO_LINK, "start": {"q": [0, 0]}, "goal": {"q": [0.4, 0.3]}}
 HANDLE = {"frame": "tool0", "position": [0.45, 0.25, 0.25]}
-HEAVY = GRAVITY | {"payload": {"frame": "tool0", "mass": 30.0}}
+LOAD = {"payload": {"frame": "tool0", "mass": 30.0}}
+HEAVY = GRAVITY | LOAD
 BALL = {"kind": "sphere", "name": "ball", "radius": 0.1}
 WALL = {"kind": "box", "name": "wall", "size": [0.1, 0.1, 0.1], "position": [5.0, 5.0, 0.0]}
 BRIEF = {"time_limit": 0.2}
@@ -48,6 +49,14 @@ PICK: dict[str, Any] = {
     "effects": GRAVITY,
 }
 STRETCHED = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+FAR_SIDE = HANDLE | {"position": [-0.45, -0.25, 0.25]}
+LIFT: dict[str, Any] = {
+    "robot": "ur5",
+    "start": {"q": Q0},
+    "scheme": COARSE,
+    "effects": GRAVITY,
+}
+OUT: dict[str, Any] = {"name": "out", "duration": 1.5, "goal": {"q": Q1}}
 
 
 def limited(**kinds: Any) -> dict[str, Any]:
@@ -102,6 +111,28 @@ REFUSED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "a goal in which links overlap": (
         UR5 | {"self_collision": True, "goal": {"q": [0.0, 0.0, 3.1, 0.0, 0.0, 0.0]}},
         ("at the goal link 'upper_arm_link' and link 'wrist_1_link' overlap by 0.078 m",),
+    ),
+    "too little time for a segment": (
+        LIFT | {"segments": [OUT, {"name": "rush", "duration": 0.2, "goal": {"q": Q0}}]},
+        ("in 'rush' joint 'shoulder_pan_joint' has to move by 1.2 rad, which takes 0.381 s",),
+    ),
+    "too little time for a frame of a segment": (
+        LIFT
+        | {
+            "segments": [
+                {"name": "rush", "duration": 0.2, "goal": FAR_SIDE},
+                {"duration": 2.0, "goal": {"q": Q0}},
+            ]
+        },
+        ("in 'rush' frame 'tool0' cannot be at the goal within 0.2 s",),
+    ),
+    "a goal of a segment in an obstacle": (
+        LIFT
+        | {
+            "obstacles": [BALL | {"position": [0.8, 0.19, 0.0]}],
+            "segments": [OUT | {"goal": {"q": STRETCHED}}, {"duration": 2.0, "goal": {"q": Q0}}],
+        },
+        ("in 'out' at the goal link 'wrist_3_link' and obstacle 'ball' overlap by 0.",),
     ),
     "a margin in millimetres": (
         UR5 | {"margin": 10.0, "obstacles": [BALL | {"position": [1.0, 1.0, 1.0]}]},
@@ -271,6 +302,29 @@ POSSIBLE: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
             "whose limit is -150",
         ),
     ),
+    "a load of a segment that cannot be held": (
+        LIFT
+        | BRIEF
+        | {
+            "segments": [
+                OUT | {"goal": {"q": STRETCHED}},
+                {"name": "lift", "duration": 2.0, "goal": {"q": Q0}, "effects": LOAD},
+            ]
+        },
+        (
+            "in 'lift' holding the robot still at the start takes -299.7 N m at joint",
+            "whose limit is -150",
+        ),
+    ),
+    "an obstacle in millimetres beside a sequence": (
+        LIFT
+        | BRIEF
+        | {
+            "obstacles": [BALL | {"position": [457.0, 191.0, 300.0]}],
+            "segments": [OUT, {"duration": 2.0, "goal": {"q": Q0}}],
+        },
+        ("obstacle 'ball' is 579 m", "away from the robot's base", "lengths are in metres"),
+    ),
     "a load that cannot be held at any configuration of the goal": (
         UR5
         | {"start": {"q": [0.0, -1.57, 0.0, -1.57, 0.0, 0.0]}, "effects": HEAVY}
@@ -284,6 +338,10 @@ POSSIBLE: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
 ASSUMED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "gravity that is not named": (
         ARM | {"effects": {}},
+        ("Gravity is left out, as the scene does not name it.",),
+    ),
+    "gravity that no segment names": (
+        PICK | {"effects": {}},
         ("Gravity is left out, as the scene does not name it.",),
     ),
     "a base without motors": (

@@ -34,18 +34,26 @@ def findings(
 
     start, goal: as they were given; those of the problem may be one of several configurations.
     """
+    found = about_limits(problem, start, goal)
+    return Findings(found.reason, (*slips(problem), *found.warnings))
+
+
+def about_limits(
+    problem: TrajectoryProblem, start: State | FrameGoal, goal: State | FrameGoal | Periodic
+) -> Findings:
+    """As `findings`, what follows from limits and obstacles alone."""
     limits = problem.limits or no_limits(problem.coordinates)
-    warnings = [*_slips(problem)]
     if not problem.limited:
-        return Findings("", tuple(warnings))
+        return Findings()
+    warnings = list[str]()
     at_frame = isinstance(start, FrameGoal)  # of which the problem has one configuration alone
     reason = "" if at_frame else contradiction(problem, limits)
     if reason or isinstance(goal, Periodic):
-        return Findings(reason, tuple(warnings))
+        return Findings(reason)
     stops = [Stop("start", 0.0, start), *(_via(problem)), Stop("goal", problem.grid.duration, goal)]
     short = frame_too_far(problem.robot, stops, limits)
     if short is not None and short.certain:
-        return Findings(short.clause, tuple(warnings))
+        return Findings(short.clause)
     if short is not None:
         warnings.append(f"{short.clause}.")
     if not at_frame:
@@ -62,7 +70,8 @@ def _via(problem: TrajectoryProblem) -> list[Stop]:
     return sorted(stops, key=lambda stop: stop.time)
 
 
-def _slips(problem: TrajectoryProblem) -> list[str]:
+def slips(problem: TrajectoryProblem) -> list[str]:
+    """Sentences about lengths and angles of a problem that look like other units."""
     states = [(x.goal, x.name) for x in _via(problem) if isinstance(x.goal, State)]
     inner = [state.on(problem.robot, name)[0] for state, name in states]
     q = [problem.boundary[0], *inner]

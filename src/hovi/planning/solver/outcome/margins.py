@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from hovi.checks.arguments import check_arguments
 from hovi.discrete.measures.segment_spans import segment_spans
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
@@ -20,6 +21,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 Array = npt.NDArray[np.float64]
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class LimitMargins:
     """The smallest margin to the limits, per kind and velocity coordinate.
@@ -76,6 +78,7 @@ class LimitMargins:
         }
 
 
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Margins:
     """How far a motion stays from each of its limits and from obstacles, between the nodes, too.

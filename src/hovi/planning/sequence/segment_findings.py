@@ -1,0 +1,61 @@
+"""What is found about the segments of a sequence before it is solved, each looked at alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import Grid
+from hovi.discrete.state import ALL, State
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.presolve.findings import Findings, about_limits, slips
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.job import Job
+from hovi.planning.sequence.branches import End, Leg
+from hovi.schemes import galerkin
+
+
+def segment_findings(
+    job: Job, legs: Sequence[Leg], limits: Sequence[Limits], names: Sequence[str]
+) -> Findings:
+    """What is found about the segments of a sequence before it is solved, with their names.
+
+    legs: of the sequence; limits are not looked at in those over several segments, nor after a goal
+    that cannot be met, which the problem itself names. limits, names: of the segments.
+    """
+    told, looked_like, before = list[str](), list[str](), _as_start(job.start)
+    for leg in legs:
+        number = leg.numbers[0]
+        if before is None:
+            break
+        problem = _alone(job, leg, before, limits[number])
+        looked_like += slips(problem)
+        if len(leg.numbers) == 1:
+            found = about_limits(problem, before, leg.goal)
+            told += [f"in {names[number]!r} {sentence}" for sentence in found.warnings]
+            if found.reason:
+                reason = f"in {names[number]!r} {found.reason}"
+                return Findings(reason, (*dict.fromkeys(looked_like), *told))
+        before = _as_start(leg.goal)
+    return Findings("", (*dict.fromkeys(looked_like), *told))
+
+
+def _alone(job: Job, leg: Leg, start: State, limits: Limits) -> TrajectoryProblem:
+    """The problem of a segment alone, on one interval; only its ends are looked at."""
+    scene = job.parts[leg.numbers[0]].acting.on(job.scene)
+    grid = Grid.uniform(leg.end - leg.begin, 1, galerkin(2, scene.order))
+    ld = DiscreteLagrangian(scene.effort_lagrangian(job.options.weight), grid)
+    clearance = job.options.clearance.from_time(leg.begin)
+    return TrajectoryProblem(ld, start, leg.goal, limits, (), clearance)
+
+
+def _as_start(goal: End) -> State | None:
+    """The goal of a segment as the start of the next one, free where the target of a frame is.
+
+    None where no configuration meets it.
+    """
+    if isinstance(goal, State):
+        return goal
+    if goal.guess is None:
+        return None
+    return State(goal.guess, free=(ALL,), free_velocity=tuple(goal.free_velocity))
