@@ -17,7 +17,7 @@ from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
 from hovi.robot.robot import Robot
-from hovi.robot.space.angle_ranges import ranges_in_degrees
+from hovi.robot.space.angle_ranges import ranges_in_degrees, speeds_in_degrees
 from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
@@ -293,11 +293,17 @@ def as_limits(
 
 
 def _warned_of_degrees(coordinates: Coordinates, limits: Limits) -> Limits:
-    """The limits, after a warning if the ranges of angles look like degrees."""
-    lower, upper = limits.lower[KINDS.index("q")], limits.upper[KINDS.index("q")]
-    suspicion = ranges_in_degrees(coordinates.coordinate_names, ~coordinates.sliding, lower, upper)
-    if suspicion:
-        warn(f"{suspicion}; limits are in radians.")
+    """The limits, after a warning if those of angles or of their velocities look like degrees."""
+    angles = coordinates.coordinate_names, ~coordinates.sliding
+    known = (
+        coordinates.velocity_limit if isinstance(coordinates, Robot) else np.zeros(angles[1].size)
+    )
+    for suspicion in (
+        ranges_in_degrees(*angles, limits.lower[0], limits.upper[0]),
+        speeds_in_degrees(*angles, limits.upper[1], known),
+    ):
+        if suspicion:
+            warn(f"{suspicion}; limits are in radians.")
     return limits
 
 

@@ -17,6 +17,7 @@ from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.notation.ends import End, as_end
 from hovi.planning.problem.presolve.assumptions import assumptions
 from hovi.planning.problem.presolve.findings import findings
+from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
 from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
@@ -280,7 +281,10 @@ def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:
 
 
 def warn_of_ends(robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions) -> None:
-    """Warn if the given configurations, in order of time, look like degrees."""
+    """Warn if the given configurations, in order of time, or what is grasped look like degrees or
+    millimetres."""
+    for sentence in grasped_slips(options.grasped):
+        warn(sentence)
     stops = sorted(options.via, key=lambda via: via.time)
     given = [start, *(via.goal for via in stops), goal]
     states = [each for each in given if isinstance(each, State)]

@@ -38,6 +38,28 @@ def ranges_in_degrees(
     )
 
 
+def speeds_in_degrees(
+    names: Sequence[str], angles: npt.NDArray[np.bool_], speeds: Array, known: Array
+) -> str:
+    """The velocity limits that look like degrees per second, as a clause; "" if none does.
+
+    Those which are ten times what the robot can do, and would not be in degrees.
+    names: of the coordinates, (nv,). angles: which are angles, (nv,). speeds: limits, (nv,).
+    known: what the robot states, (nv,), 0 where it states nothing. All in [rad/s].
+    """
+    suspicious = (speeds > 10 * known) & (np.radians(speeds) <= 2 * known) & (known > 0)
+    found = np.flatnonzero(angles & suspicious & (speeds > MIN_SUSPICIOUS))
+    if not len(found):
+        return ""
+    i = int(found[0])
+    more = f" and of {len(found) - 1} more" if len(found) > 1 else ""
+    return (
+        f"the velocity limit of {names[i]}{more}, {speeds[i]:g} rad/s, looks like degrees: "
+        f"{speeds[i]:g} degrees per second are {np.radians(speeds[i]):.4g} rad/s, and the robot "
+        f"states {known[i]:.4g} rad/s"
+    )
+
+
 def angles_in_degrees(
     names: Sequence[str], angles: npt.NDArray[np.bool_], q: Array, lower: Array, upper: Array
 ) -> str:

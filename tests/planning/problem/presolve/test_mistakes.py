@@ -38,6 +38,13 @@ LOAD = {"payload": {"frame": "tool0", "mass": 30.0}}
 HEAVY = GRAVITY | LOAD
 BALL = {"kind": "sphere", "name": "ball", "radius": 0.1}
 WALL = {"kind": "box", "name": "wall", "size": [0.1, 0.1, 0.1], "position": [5.0, 5.0, 0.0]}
+FLIGHT = {"times": [0.0, 1.0], "positions": [[400.0, -100.0, 0.0], [400.0, 100.0, 0.0]]}
+HELD: dict[str, Any] = {
+    "name": "tin",
+    "frame": "tool0",
+    "mass": 0.1,
+    "shape": {"kind": "sphere", "radius": 0.02, "position": [0.0, 0.0, 0.0]},
+}
 BRIEF = {"time_limit": 0.2}
 REACH: dict[str, Any] = {"duration": "500 ms", "goal": {"q": [0.4, 0.3]}}
 BACK: dict[str, Any] = {"duration": 1.0, "goal": {"q": [0.0, 0.0]}}
@@ -284,6 +291,41 @@ POSSIBLE: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "a box turned in degrees": (
         UR5 | {"obstacles": [WALL | {"rpy": [0.0, 0.0, 45.0]}]} | BRIEF,
         ("obstacle 'wall': rpy = (0, 0, 45) rad looks like degrees",),
+    ),
+    "the size of a box in millimetres": (
+        UR5 | {"obstacles": [WALL | {"size": [457.0, 300.0, 200.0], "position": [1, 1, 2]}]},
+        ("obstacle 'wall' measures 457 x 300 x 200 m, which looks like millimetres, 0.457 x 0.3",),
+    ),
+    "the radius of a sphere in millimetres": (
+        UR5 | {"obstacles": [BALL | {"radius": 100.0, "position": [1.0, 1.0, 2.0]}]},
+        ("obstacle 'ball' measures 200 x 200 x 200 m, which looks like millimetres, 0.2 x 0.2",),
+    ),
+    "a path of an obstacle in millimetres": (
+        UR5 | BRIEF | {"obstacles": [BALL | {"position": [0, 0, 0], "path": FLIGHT}]},
+        ("obstacle 'ball' is 412.3 m away from the robot's base", "lengths are in metres"),
+    ),
+    "the size of a grasped object in millimetres": (
+        UR5 | BRIEF | {"grasped": [HELD | {"shape": WALL | {"size": [50.0, 50.0, 200.0]}}]},
+        ("grasped object 'tin' measures 200 x 50 x 50 m, which looks like millimetres, 0.2 x",),
+    ),
+    "the position of a grasped object in millimetres": (
+        UR5 | BRIEF | {"grasped": [HELD | {"position": [0.0, 0.0, 80.0]}]},
+        ("the position (0, 0, 80) m of grasped object 'tin' is far from link 'tool0'",),
+    ),
+    "a grasped object turned in degrees": (
+        UR5 | BRIEF | {"grasped": [HELD | {"rpy": [0.0, 0.0, 90.0]}]},
+        ("grasped object 'tin': rpy = (0, 0, 90) rad looks like degrees",),
+    ),
+    "ranges of joints in degrees": (
+        UR5 | BRIEF | limited(q=170.0),
+        ("the position range of shoulder_pan_joint and of 5 more, -170 to 170 rad, looks like",),
+    ),
+    "velocities of joints in degrees": (
+        UR5 | BRIEF | limited(v={"elbow_joint": 180.0}),
+        (
+            "the velocity limit of elbow_joint, 180 rad/s, looks like degrees: 180 degrees per",
+            "3.142 rad/s, and the robot states 3.15 rad/s; limits are in radians.",
+        ),
     ),
     "a payload's center in millimetres": (
         UR5

@@ -13,7 +13,9 @@ import numpy.typing as npt
 
 from hovi.effects import Payload
 from hovi.planning.clearance.clearance import Clearance
+from hovi.planning.obstacles.grasped import Grasped
 from hovi.planning.obstacles.obstacle import Body, Obstacle
+from hovi.planning.obstacles.primitives import HalfSpace
 from hovi.planning.problem.presolve.frame_hints import FAR, MILLIMETRE, reach_of
 from hovi.robot.space.angle_ranges import rpy_in_degrees
 from hovi.scene.scene import Scene
@@ -26,8 +28,12 @@ WIDE_MARGIN = 1.0
 """Margin from which it may have been meant in millimetres, in [m]."""
 LONG_SLIDE = 50.0
 """Displacement of a sliding joint from which it may have been meant in millimetres, in [m]."""
+HUGE, THICK = 50.0, 2.0
+"""Length and thickness of an obstacle, in [m], from which both may have been meant in millimetres:
+floors and walls are thinner."""
 FAR_CENTER = 5.0
-"""Distance of a payload's center from its frame that is as suspicious, in [m]."""
+"""Distance of a payload's center from its frame that is as suspicious, in [m]; and the size of what
+a gripper holds."""
 
 
 def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iterator[str]:
@@ -60,15 +66,58 @@ def _obstacle_slips(obstacle: Obstacle, reach: float) -> Iterator[str]:
             f"obstacle {obstacle.name!r} is {nearest:.4g} m away from the robot's base, which "
             f"reaches about {reach:.2g} m: lengths are in metres."
         )
+    elif not isinstance(obstacle, HalfSpace):
+        size = _size(obstacle.bodies())
+        if size.max() > HUGE and size.min() > THICK:
+            yield f"obstacle {obstacle.name!r} measures {_measures(size)}: lengths are in metres."
     turned = getattr(obstacle, "rpy", None)
     note = "" if turned is None else rpy_in_degrees(np.asarray(turned, dtype=float))
     if note:
         yield f"obstacle {obstacle.name!r}: {note}."
 
 
+def grasped_slips(grasped: Sequence[Grasped]) -> Iterator[str]:
+    """Sentences about what is grasped: lengths in millimetres, angles in degrees."""
+    for each in grasped:
+        size = max((_size(shape.bodies()) for shape in each.shapes), key=np.max)
+        if size.max() > FAR_CENTER:
+            yield f"grasped object {each.name!r} measures {_measures(size)}: lengths are in metres."
+        if np.linalg.norm(each.position) > FAR_CENTER:
+            shown = ", ".join(f"{x:g}" for x in np.asarray(each.position))
+            yield (
+                f"the position ({shown}) m of grasped object {each.name!r} is far from link "
+                f"{each.frame!r}: lengths are in metres."
+            )
+        note = rpy_in_degrees(np.asarray(each.rpy, dtype=float))
+        if note:
+            yield f"grasped object {each.name!r}: {note}."
+
+
+def _size(bodies: Sequence[Body]) -> Array:
+    """The edges of the boxes around bodies along their own axes, the largest of each, (3,)."""
+    edges = []
+    for body in bodies:
+        body.shape.computeLocalAABB()
+        edges.append(np.sort(np.asarray(body.shape.aabb_local.max_ - body.shape.aabb_local.min_)))
+    return np.asarray(np.max(edges, axis=0))
+
+
+def _measures(size: Array) -> str:
+    """The size of something in metres, in a sentence that says what the same are in millimetres."""
+    metres, millimetres = (
+        " x ".join(f"{x:.4g}" for x in np.sort(each)[::-1]) for each in (size, MILLIMETRE * size)
+    )
+    return f"{metres} m, which looks like millimetres, {millimetres} m"
+
+
 def _distance_from_origin(obstacle: Obstacle) -> float:
-    """Signed distance of an obstacle from the world's origin, in [m]; 0 if it moves or is near."""
-    bodies = () if obstacle.motion is not None else obstacle.bodies()
+    """Signed distance of an obstacle from the world's origin, in [m]; 0 if it is near.
+
+    Of one that moves, the least distance of its path's positions.
+    """
+    if obstacle.motion is not None:
+        return float(np.linalg.norm(np.asarray(obstacle.motion.positions), axis=1).min())
+    bodies = obstacle.bodies()
     endless = any(isinstance(body.shape, coal.Halfspace | coal.Plane) for body in bodies)
     near = any(np.linalg.norm(body.placement.translation) <= FAR for body in bodies)
     if endless or near or not bodies:
