@@ -47,7 +47,7 @@ def speeds_in_degrees(
     names: of the coordinates, (nv,). angles: which are angles, (nv,). speeds: limits, (nv,).
     known: what the robot states, (nv,), 0 where it states nothing. All in [rad/s].
     """
-    suspicious = (speeds > 10 * known) & (np.radians(speeds) <= 2 * known) & (known > 0)
+    suspicious = (speeds / 10 > known) & (np.radians(speeds) / 2 <= known) & (known > 0)
     found = np.flatnonzero(angles & suspicious & (speeds > MIN_SUSPICIOUS))
     if not len(found):
         return ""
