@@ -12,6 +12,7 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.outcome import margins
 from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 
@@ -44,7 +45,12 @@ class KnownMargins:
 
     @classmethod
     def of(cls, solution: Solution, deadline: Deadline) -> KnownMargins:
-        """What is known by a deadline; distances of long motions take minutes."""
+        """What is known by a deadline; distances of long motions take minutes.
+
+        Of a motion that is but a guess, as there is none, nothing is of interest.
+        """
+        if is_guess(solution):
+            return cls(missing="there is no motion, only a guess")
         limits, segments, violation = None, dict[str, LimitMargins](), None
         try:
             with deadline.in_force():
@@ -54,6 +60,11 @@ class KnownMargins:
                 return cls(limits, least_distance(solution), segments, violation)
         except OutOfTimeError as late:
             return cls(limits, None, segments, violation, str(late))
+
+
+def is_guess(solution: Solution) -> bool:
+    """Whether the motion is but a guess, as nothing had to be solved to tell that there is none."""
+    return solution.status is Status.INFEASIBLE and solution.nit == 0
 
 
 def _trajectory_of(motion: Solution | Trajectory) -> Trajectory:

@@ -13,7 +13,7 @@ from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
 from hovi.cli.reports.certificate import certificate_json, certificate_lines
 from hovi.cli.reports.extremes import extremes_json, extremes_lines
-from hovi.cli.reports.limit_margins import KnownMargins
+from hovi.cli.reports.limit_margins import KnownMargins, is_guess
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.segments import segment_lines, segments_json
 from hovi.cli.reports.terminal_table import print_table, terminal_table
@@ -78,6 +78,9 @@ def print_report(
     """Print a summary, the peaks of the motion, the certificate and the output file."""
     for label, text in _summary(solution, task, margins):
         print(f"{label:9s}{text}")
+    if is_guess(solution):
+        _print_file(out, solution)
+        return
     arm = limit_set_of(task)
     if arm is not None:
         print(f"limits   {limit_set_text(arm, solution.trajectory.grid.order)}")
@@ -101,6 +104,11 @@ def print_report(
     if certificate is not None:
         for label, text in certificate_lines(certificate):
             print(f"{label:9s}{text}")
+    _print_file(out, solution)
+
+
+def _print_file(out: Path | None, solution: Solution) -> None:
+    """Print where the motion was written, if it was."""
     if out is not None:
         print(f"wrote {out}" + ("" if solution.success else ", which is not a minimum"))
 
@@ -125,7 +133,7 @@ def _summary(solution: Solution, task: Task, margins: KnownMargins) -> list[tupl
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
-    if not solution.success and margins.violation is not None:
+    if margins.violation is not None and not solution.success:
         rows.insert(2, ("usable", _usable(margins.violation)))
     rows += segment_lines(solution, margins.segments)
     if len(solution.minima) > 1:
@@ -142,6 +150,8 @@ def _usable(violation: str) -> str:
 
 def _infeasible_note(solution: Solution) -> str:
     """A note on the cost of an infeasible problem; "" otherwise."""
+    if is_guess(solution):
+        return " of the guess, as there is no motion"
     unfit = solution.status == Status.INFEASIBLE
     return " of the motion below, which violates the constraints" if unfit else ""
 

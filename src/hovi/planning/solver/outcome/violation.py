@@ -47,4 +47,6 @@ def violation_of(problem: TrajectoryProblem, motion: Trajectory) -> str:
 def _exceeded(motion: Trajectory, limits: Limits) -> bool:
     if not limits.bounded.any():
         return False
-    return excess_along(motion, limits).worst > max(MET, limits.tolerance)
+    most = max(MET, limits.tolerance)
+    at_samples = excess_along(motion, limits, refined=False).worst
+    return at_samples > most or excess_along(motion, limits).worst > most
