@@ -483,3 +483,30 @@ def test_a_duration_that_is_none_is_refused(duration: Any) -> None:
 def test_effects_that_are_none_are_refused(effects: Any) -> None:
     with pytest.raises(SceneError, match="effects is a list such as"):
         Segment(GRAB, 1.0, effects=effects)
+
+
+@pytest.mark.parametrize("seconds", [1e-9, 5e-3])
+def test_a_time_limit_that_ends_before_the_search_leaves_the_guess(seconds: float) -> None:
+    goal = hovi.FrameGoal("tip", position=[-0.6, 0.0, 1.4])
+    parts = [Segment(goal, 0.6), Segment([0.0, 0.0], 0.8)]
+    late = hovi.plan_sequence(scene(), [0.0, 0.0], parts, time_limit=seconds)
+    assert late.status is hovi.Status.TIME_LIMIT
+    assert np.isfinite(late.cost)
+
+
+def test_obstacles_that_move_are_looked_at_by_the_clock_of_the_sequence() -> None:
+    """A ball is at the goal of the second segment while the first one lasts, and far away later."""
+    robot = hovi.load_robot("ur5")
+    q = [[0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [0.9, -1.0, 0.8, 0.1, -0.3, 0.5], [0.0] * 6]
+    tip = robot.frame_pose("tool0", np.array(q[2]))[:3, 3]
+    path: dict[str, Any] = {
+        "times": [0.0, 1.6, 1.8],
+        "positions": [[0, 0, 0], [0, 0, 0], [0, 0, 9.0]],
+    }
+    ball = {"kind": "sphere", "name": "ball", "radius": 0.1, "position": tip, "path": path}
+    parts = [{"goal": q[1], "duration": 1.5}, {"goal": q[2], "duration": 1.5}]
+    arm = hovi.Scene(robot, [hovi.effects.Gravity()])
+    for begin, refused in ((0.0, False), (1.5, True)):
+        path["times"] = [begin, begin + 1.6, begin + 1.8]
+        found = hovi.plan_sequence(arm, q[0], parts, obstacles=[ball], time_limit=0.2)
+        assert ("and obstacle 'ball' overlap" in found.message) == refused

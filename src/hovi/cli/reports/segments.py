@@ -31,8 +31,7 @@ def _tightest(margins: LimitMargins | None) -> str:
     """The smallest margin of a segment as the end of its line; "" without limits."""
     if margins is None or not margins.limits.bounded.any():
         return ""
-    kind, joint, margin = margins.tightest
-    return f", tightest limit {kind} of {joint!r}, margin {margins.in_words(margin)}"
+    return f", {margins}"
 
 
 def segments_json(solution: Solution, margins: Mapping[str, LimitMargins]) -> dict[str, Any]:

@@ -86,7 +86,7 @@ def inverse_kinematics(
     expect(robot, Robot, "one from hovi.load_robot")
     if isinstance(goal, Mapping):
         goal = end_of(goal, "goal")  # type: ignore[assignment]  # which the next line checks
-    expect(goal, FrameGoal, "hovi.FrameGoal(frame, ...)")
+    expect(goal, FrameGoal, "hovi.FrameGoal(frame, ...), or its table with a `frame`")
     assert isinstance(goal, FrameGoal)
     goal.check(robot)
     most, seeds = _count("most", most), _count("seeds", seeds)

@@ -104,9 +104,8 @@ def plan_sequence(
         return _alone(scene, start, parts[0], progress, chosen)
     scene, begin, goals = _in_group(holding(scene, chosen), start, parts, chosen)
     chosen, deadline = chosen.on(scene), Deadline(chosen.time_limit_seconds)
-    with deadline.in_force():
-        job = job_of(scene, begin, goals, parts, chosen)
-        job.problem()  # raises for invalid input before the search
+    job = job_of(scene, begin, goals, parts, chosen)
+    job.problem()  # raises for invalid input before the search
     warn_of_ends(scene.robot, job.start, job.goal, job.options)
     solution = run(Search(job, deadline, progress or silent), began)
     scenes = [part.acting.on(job.scene) for part in job.parts]

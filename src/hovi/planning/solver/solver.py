@@ -41,6 +41,7 @@ from hovi.planning.solver.receding.ends import (
     first_state,
     inside_limits,
     is_near,
+    require_known,
 )
 from hovi.planning.solver.receding.last_motion import last_motion, meets
 from hovi.planning.solver.receding.shift import Shift
@@ -170,6 +171,7 @@ class Solution:
         that no configuration meets.
         """
         deadline = Deadline(as_time_limit(time_limit))
+        require_known(options, Solution.replan, solve_on_grid)
         old = self._solved_problem
         problem = old.between(
             old.start if start is None else as_start(start, old),
@@ -214,6 +216,7 @@ class Solution:
         periodic, in segments, among moving obstacles, or of a scene that depends on time.
         """
         deadline = Deadline(as_time_limit(time_limit))
+        require_known(options, Solution.advance, solve_on_grid)
         old = self._solved_problem
         length = None if duration is None else seconds(duration, "the duration")
         shift = Shift.of(old, seconds(elapsed, "the time elapsed"), length)

@@ -72,3 +72,10 @@ def test_the_distance_is_the_least_along_the_motion(scene: hovi.Scene) -> None:
     assert found.problem.distances is not None
     q = found.trajectory.sample(np.linspace(0.0, 1.0, 2_001)).q
     assert margins.distance == pytest.approx(found.problem.distances.values(q).min(), abs=1e-5)
+
+
+def test_margins_are_printed_in_a_few_lines(sequence: hovi.Solution) -> None:
+    first, *others = str(sequence.margins()).splitlines()
+    assert first.startswith("tightest limit v of '")
+    assert [line.split(":")[0] for line in others] == ["'reach'", "'wait'", "'return'"]
+    assert len(repr(sequence.margins())) < 500

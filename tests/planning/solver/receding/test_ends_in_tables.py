@@ -91,6 +91,14 @@ def test_what_is_no_goal_gets_the_sentence_of_plan(
     assert str(told.value) == str(by_plan.value)
 
 
+def test_an_option_that_does_not_exist_is_named(planned: hovi.Solution) -> None:
+    with pytest.raises(InputError, match="replan has no option 'gaol': did you mean 'goal'"):
+        planned.replan(gaol=Q)
+    with pytest.raises(InputError, match="advance has no option 'durations': did you mean"):
+        planned.advance(0.1, durations=1.0)
+    assert planned.replan(max_iterations=50, escape_saddles=False).success
+
+
 def test_a_problem_about_no_robot_has_no_frames() -> None:
     grid = hovi.Grid.uniform(1.0, 4, hovi.schemes.galerkin(1))
     ld = hovi.DiscreteLagrangian(hovi.spline(2), grid)

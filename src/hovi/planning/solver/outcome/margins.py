@@ -34,8 +34,13 @@ class LimitMargins:
     """
 
     names: tuple[str, ...]
-    margin: Array
-    limits: Limits
+    margin: Array = field(repr=False)
+    limits: Limits = field(repr=False)
+
+    def __str__(self) -> str:
+        """The tightest limit."""
+        kind, joint, margin = self.tightest
+        return f"tightest limit {kind} of {joint!r}, margin {self.in_words(margin)}"
 
     @property
     def excess(self) -> float:
@@ -92,6 +97,13 @@ class Margins:
     limits: LimitMargins | None = None
     distance: float | None = None
     segments: Mapping[str, LimitMargins] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        """The tightest limit of the motion and of each segment, and the least distance."""
+        known = ["no limits" if self.limits is None else str(self.limits)]
+        known += [f"{name!r}: {each}" for name, each in self.segments.items()]
+        known += [] if self.distance is None else [f"least distance {self.distance:.4g} m"]
+        return "\n".join(known)
 
 
 def margins_of(problem: TrajectoryProblem, motion: Trajectory) -> Margins:

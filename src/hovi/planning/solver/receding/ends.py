@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.state import Periodic, State
+from hovi.errors import InputError, nearest
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import (
@@ -54,6 +57,18 @@ def as_start(given: End, problem: TrajectoryProblem) -> State:
 def as_goal(given: End | Periodic, problem: TrajectoryProblem) -> State | FrameGoal | Periodic:
     """A goal, from whatever `plan` takes, or Periodic. Raises InputError."""
     return given if isinstance(given, Periodic) else as_end(given, problem.coordinates, "goal")
+
+
+def require_known(
+    options: Mapping[str, Any], method: Callable[..., Any], solve: Callable[..., Any]
+) -> None:
+    """Raise InputError for options that neither a method of a solution nor a solve has."""
+    solving = [*inspect.signature(solve).parameters][2:]
+    own = [*inspect.signature(method).parameters][1:-1]
+    for name in options:
+        if name not in solving:
+            hint = nearest(name, {*own, *solving})
+            raise InputError(f"{method.__name__} has no option {name!r}: {hint}")
 
 
 def first_state(path: DiscretePath) -> State:
