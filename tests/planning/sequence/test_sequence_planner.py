@@ -495,18 +495,18 @@ def test_a_time_limit_that_ends_before_the_search_leaves_the_guess(seconds: floa
 
 
 def test_obstacles_that_move_are_looked_at_by_the_clock_of_the_sequence() -> None:
-    """A ball is at the goal of the second segment while the first one lasts, and far away later."""
+    """A ball leaves the last goal after half of the time, or comes there at its end."""
     robot = hovi.load_robot("ur5")
     q = [[0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [0.9, -1.0, 0.8, 0.1, -0.3, 0.5], [0.0] * 6]
     tip = robot.frame_pose("tool0", np.array(q[2]))[:3, 3]
-    path: dict[str, Any] = {
-        "times": [0.0, 1.6, 1.8],
-        "positions": [[0, 0, 0], [0, 0, 0], [0, 0, 9.0]],
-    }
-    ball = {"kind": "sphere", "name": "ball", "radius": 0.1, "position": tip, "path": path}
+    here, away = [0.0, 0.0, 0.0], [0.0, 0.0, 9.0]
     parts = [{"goal": q[1], "duration": 1.5}, {"goal": q[2], "duration": 1.5}]
     arm = hovi.Scene(robot, [hovi.effects.Gravity()])
-    for begin, refused in ((0.0, False), (1.5, True)):
-        path["times"] = [begin, begin + 1.6, begin + 1.8]
+    for times, positions, refused in (
+        ([1.5, 3.0], [here, away], False),
+        ([0.0, 3.0], [away, here], True),
+    ):
+        path = {"times": times, "positions": positions}
+        ball = hovi.Sphere(tip, 0.1, name="ball", path=path)
         found = hovi.plan_sequence(arm, q[0], parts, obstacles=[ball], time_limit=0.2)
         assert ("and obstacle 'ball' overlap" in found.message) == refused
