@@ -45,3 +45,24 @@ def test_a_simulation_shows_that_it_runs(
     monkeypatch.setattr(reports, "LINE_PERIOD", 0.01)
     assert main(["simulate", "two_link_reach", "--duration", "20", "--intervals", "2000"]) == 0
     assert "  0 % simulating (" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("scene", ["two_link_pick", "ur5_reach_limited"])
+def test_every_part_of_a_plan_shows_that_it_runs(
+    scene: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reports, "LINE_PERIOD", 1e-3)
+    assert main(["plan", scene]) == 0
+    shown = capfd.readouterr().err
+    for part in ("  0 % reading the scene (", "100 % certificate: ", "100 % margins to limits"):
+        assert part in shown
+
+
+def test_a_study_of_effects_shows_each_of_them(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(reports, "LINE_PERIOD", 1e-3)
+    assert main(["effects", "two_link_reach", "--time-limit", "5 s"]) == 0
+    shown = capfd.readouterr().err
+    assert "  0 % reading the scene (" in shown
+    assert " % trying viscous_friction (" in shown

@@ -63,7 +63,8 @@ def accuracy(
 
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {str(out)!r} is a file; name a folder.")
-    task = load_task(find_scene(scene))
+    with progress(quiet=json, doing="reading the scene"):
+        task = load_task(find_scene(scene))
     shortcuts = {"crocoddyl": crocoddyl, "drake": drake}
     names = [*(peer or ()), *(["collocation"] if collocation else [])]
     names += [f"{name}={python}" for name, python in shortcuts.items() if python is not None]

@@ -48,8 +48,9 @@ def effects(
     limit = None if time_limit is None else positive_seconds("--time-limit", time_limit)
     if out is not None:
         check_output(out, ".png", ".pdf", ".svg")
-    task = load_task(find_scene(scene))
-    effects = None if candidates is None else load_task(find_scene(candidates)).scene.effects
+    with progress(quiet=json, doing="reading the scene"):
+        task = load_task(find_scene(scene))
+        effects = None if candidates is None else load_task(find_scene(candidates)).scene.effects
     with progress(quiet=json) as report:
         study = study_effects(task, effects, report, limit)
     if out is not None:

@@ -75,10 +75,13 @@ def plan(
     Exit code 0 for a minimum, 1 when none was found, 2 for invalid input.
     """
     from hovi.cli.arguments.files import check_output
+    from hovi.cli.reports.progress import progress
 
     if out is not None:
         check_output(out, ".npz")
-    task = _task(scene, _options(context.params), compile)
+    options = _options(context.params)
+    with progress(quiet=json, doing="reading the scene"):  # meshes may be divided into parts
+        task = _task(scene, options, compile)
     raise typer.Exit(_plan(task, out, json, certificate))
 
 

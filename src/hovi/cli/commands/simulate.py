@@ -56,7 +56,8 @@ def simulate(
         )
     if plan is None and feedback != "none":
         raise InputError("--feedback needs a plan to track; give one with --plan F.npz.")
-    task = load_task(find_scene(scene))
+    with progress(quiet=json, doing="reading the scene"):
+        task = load_task(find_scene(scene))
     task.require_one_motion("a simulation")
     with progress(quiet=json, doing="simulating"):
         if plan is None:
