@@ -11,6 +11,7 @@ import json
 import logging
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -44,13 +45,11 @@ class Checked(ob.StateValidityChecker):
         super().__init__(info)
         self._world, self._space = world, space
         self._data, self._placed = world.model.createData(), world.geometry.createData()
-        for request, allowed in zip(
-            self._placed.collisionRequests, world.allowances, strict=True
-        ):
+        for request, allowed in zip(self._placed.collisionRequests, world.allowances, strict=True):
             request.security_margin = world.margin + (EXTRA if allowed == 0.0 else -allowed)
             request.break_distance = request.security_margin + 0.05
 
-    def isValid(self, state: Any) -> bool:  # noqa: N802
+    def isValid(self, state: Any) -> bool:
         """As OMPL calls it."""
         x = np.array([state[i] for i in range(self._space.size)])
         return self.is_free(self._space.q(x))
@@ -93,7 +92,7 @@ def path_of(world: World, stops: list[Array], lower: Array, upper: Array, given:
     setup.setStateValidityChecker(checked)
     info.setStateValidityCheckingResolution(RESOLUTION)
     parts = []
-    for first, last in zip(at[:-1], at[1:], strict=True):
+    for first, last in pairwise(at):
         setup.clear()
         ends = []
         for x in (first, last):
@@ -114,7 +113,7 @@ def path_of(world: World, stops: list[Array], lower: Array, upper: Array, given:
         parts.append(np.array([[each[i] for i in range(space.size)] for each in states]))
     given["direct"] = all(
         checked.is_free(space.q(x))
-        for first, last in zip(at[:-1], at[1:], strict=True)
+        for first, last in pairwise(at)
         for x in np.linspace(first, last, 200)
     )
     return np.concatenate([parts[0], *(part[1:] for part in parts[1:])]), "", space
@@ -141,11 +140,15 @@ def solved(request: dict[str, Any]) -> dict[str, Any]:
     if motion is None:
         return answer | {"why": "TOPP-RA finds no motion along the path"}
     T = float(motion.duration)
-    answer |= {"least_duration": T, "direct": request["direct"], "effort": effort(world, motion, request["duration"], space)}
+    answer |= {
+        "least_duration": T,
+        "direct": request["direct"],
+        "effort": effort(world, motion, request["duration"], space),
+    }
     t = np.linspace(0.0, T, CHECK_SAMPLES)
     clearance, _ = least_clearance(world, np.array([space.q(x) for x in motion(t)]))
     answer |= {"clearance": clearance, "success": request["duration"] >= T and clearance > 0.0}
-    if T > request["duration"]:
+    if request["duration"] < T:
         answer["why"] = f"the path takes {T:.2f} s"
     elif clearance <= 0.0:
         answer["why"] = "the spline through the path touches"

@@ -1,8 +1,9 @@
 """The suite of models/tasks: hovi at its default settings, and OMPL with TOPP-RA beside it.
 
-    python tasks.py                          # all tasks, or those whose names contain a word
-    python tasks.py --peer PYTHON bin shelf  # with OMPL and TOPP-RA, in the Python of an environment
-                                             # with `pip install ompl toppra pin`
+    python tasks.py                     # all tasks
+    python tasks.py bin panda           # those whose names contain one of these words
+    python tasks.py --peer PYTHON       # with OMPL and TOPP-RA, by the Python of an environment
+                                        # with `pip install ompl toppra pin`
 
 Every task runs in a process of its own, which ends at a time limit, and leaves its result in a
 folder (`--results`), so that an interrupted run goes on where it was; `--again` forgets results.
@@ -62,12 +63,12 @@ def robot_files(scene: Path) -> dict[str, Any]:
     return {"urdf": str(example.urdf), "packages": packages, "srdf": given or own}
 
 
-def planned(scene: Path) -> dict[str, Any]:
+def planned(scene: Path, limit: float) -> dict[str, Any]:
     """hovi's result for one task, at its default settings and on one thread."""
     task = hovi.load_task(scene)
     began = _processor_time()
     try:
-        found = hovi.plan_task(task, time_limit=LIMIT)
+        found = hovi.plan_task(task, time_limit=limit)
     except hovi.HoviError as error:
         return {"status": type(error).__name__, "message": str(error), "success": False}
     taken = _processor_time() - began
@@ -213,7 +214,11 @@ def row(name: str, ours: dict[str, Any], theirs: dict[str, Any] | None) -> list[
         return cells
     times = [theirs.get("path_seconds"), theirs.get("timing_seconds")]
     taken = sum(each for each in times if each is not None)
-    cells += [f"{taken:.2f}", _number(theirs, "effort", ".5g"), _number(theirs, "clearance", ".1f", 1e3)]
+    cells += [
+        f"{taken:.2f}",
+        _number(theirs, "effort", ".5g"),
+        _number(theirs, "clearance", ".1f", 1e3),
+    ]
     return [*cells, "yes" if theirs["success"] else f"no: {theirs['why']}"]
 
 
@@ -233,13 +238,16 @@ def summary(results: dict[str, dict[str, Any]], peers: dict[str, dict[str, Any]]
         f"within {LIMIT:.0f} s; the median time is {np.median(times):.2f} s. "
         f"The least clearance is {min(near, default=np.nan):.3f} of the margin."
     )
-    both = [(x["effort"], peers[k]["effort"]) for k, x in results.items() if x["success"]
-            and k in peers and peers[k]["success"]]
+    both = [
+        (x["effort"], peers[k]["effort"])
+        for k, x in results.items()
+        if x["success"] and k in peers and peers[k]["success"]
+    ]
     if both:
         ratios = [theirs / ours for ours, theirs in both]
         text += (
-            f" OMPL and TOPP-RA find a motion for {sum(x['success'] for x in peers.values())} tasks; "
-            f"where both do, its effort is {np.median(ratios):.1f} times hovi's in the median, "
+            f" OMPL and TOPP-RA find a motion for {sum(x['success'] for x in peers.values())} "
+            f"tasks; where both do, its effort is {np.median(ratios):.1f} times hovi's in the median, "
             f"{min(ratios):.2f} to {max(ratios):.1f} times."
         )
     return text
@@ -250,6 +258,7 @@ def main() -> None:
     arguments.add_argument("words", nargs="*", help="parts of names of tasks")
     arguments.add_argument("--peer", help="the Python of an environment with ompl, toppra and pin")
     arguments.add_argument("--results", default=str(Path(tempfile.gettempdir()) / "hovi_tasks"))
+    arguments.add_argument("--limit", type=float, default=LIMIT, help="of a plan, in [s]")
     arguments.add_argument("--again", action="store_true", help="forget the results of hovi")
     arguments.add_argument("--only-peer", action="store_true", help="leave hovi out")
     arguments.add_argument("--one", help=argparse.SUPPRESS)
@@ -260,7 +269,7 @@ def main() -> None:
         scene = Path(given.one)
         file = folder / f"{scene.stem}.json"
         known = json.loads(file.read_text()) if file.exists() else None
-        answer = peer(scene, given.peer, known) if given.peer else planned(scene)
+        answer = peer(scene, given.peer, known) if given.peer else planned(scene, given.limit)
         print(json.dumps(answer))
         return
     results, peers, rows = {}, {}, []
@@ -269,9 +278,10 @@ def main() -> None:
         if given.words and not any(word in name for word in given.words):
             continue
         words, place = ["--one", str(scene)], ["--results", str(folder)]
+        place += ["--limit", str(given.limit)]
         if not given.only_peer:
             file = folder / f"{scene.stem}.json"
-            results[name] = kept(file, given.again, [*words, *place], LIMIT + GRACE)
+            results[name] = kept(file, given.again, [*words, *place], given.limit + GRACE)
         if given.peer:
             file = folder / f"{scene.stem}.peer.json"
             more = [*words, *place, "--peer", given.peer]

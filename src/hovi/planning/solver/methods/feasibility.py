@@ -168,7 +168,11 @@ def _moved_out_of_obstacles(
     """A guess: the motion of least action without obstacles, moved out of them in stages.
 
     In one stage a motion deep in an obstacle would leave it on different sides at different times.
+    A guess that is free of obstacles stays as it is.
     """
+    given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
+    if float(given.distance.min()) >= wanted.least:
+        return path
     options, search.clearance = search.options, None
     path = _without_obstacles(search, path)
     approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
