@@ -247,8 +247,8 @@ def summary(results: dict[str, dict[str, Any]], peers: dict[str, dict[str, Any]]
         ratios = [theirs / ours for ours, theirs in both]
         text += (
             f" OMPL and TOPP-RA find a motion for {sum(x['success'] for x in peers.values())} "
-            f"tasks; where both do, its effort is {np.median(ratios):.1f} times hovi's in the median, "
-            f"{min(ratios):.2f} to {max(ratios):.1f} times."
+            f"tasks; where both do, its effort is {np.median(ratios):.1f} times hovi's in the "
+            f"median, {min(ratios):.2f} to {max(ratios):.1f} times."
         )
     return text
 
