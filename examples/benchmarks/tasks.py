@@ -30,9 +30,9 @@ from task_world import least_clearance, read_world
 
 import hovi
 from hovi.planning.problem.limits import as_limits
+from hovi.robot.bundled_models import task_suite
 from hovi.robot.example_robots import example_robot
 
-FOLDER = Path(__file__).resolve().parents[2] / "models" / "tasks"
 LIMIT = 60.0
 """Time limit of a plan, in [s]."""
 GRACE = 120.0
@@ -43,11 +43,6 @@ PATH_SECONDS = 20.0
 BRANCHES = 4
 """Number of configurations at the goal that OMPL tries if hovi found no motion."""
 SEED = 1
-
-
-def task_files() -> list[Path]:
-    """The scene files of the suite, by family and name."""
-    return sorted(FOLDER.glob("*/*.toml"))
 
 
 def robot_files(scene: Path) -> dict[str, Any]:
@@ -273,7 +268,7 @@ def main() -> None:
         print(json.dumps(answer))
         return
     results, peers, rows = {}, {}, []
-    for scene in task_files():
+    for scene in task_suite():
         name = f"{scene.parent.name}/{scene.stem}"
         if given.words and not any(word in name for word in given.words):
             continue

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,7 @@ def test_a_path_leads_around_the_obstacle_and_a_seed_repeats_it(two_link: Robot)
         found.append(points)
         np.testing.assert_allclose(points[[0, -1]], [np.zeros(2), goal], atol=1e-12)
         dense = np.concatenate(
-            [np.linspace(a, b, 50) for a, b in zip(points[:-1], points[1:], strict=True)]
+            [np.linspace(a, b, 50) for a, b in pairwise(points)]
         )
         assert space.depth(space.q(dense)) < 0.005
     np.testing.assert_array_equal(found[0], found[1])
