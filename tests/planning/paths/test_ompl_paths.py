@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hovi
+from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.paths import ompl_paths
 from hovi.planning.paths.free_space import FreeSpace
 from hovi.planning.paths.ompl_paths import OmplProcess
@@ -22,7 +23,7 @@ from planning.paths.test_path_guess import ball, problem_of
 needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="needs the extra `obstacles`")
 
 
-def space_of(robot: Robot, *obstacles: hovi.Obstacle) -> tuple[FreeSpace, np.ndarray]:
+def space_of(robot: Robot, *obstacles: Obstacle) -> tuple[FreeSpace, np.ndarray]:
     """The space of a problem with obstacles, and the coordinates of its goal."""
     space = FreeSpace.of(problem_of(robot, *obstacles), np.zeros(2))
     assert space is not None
@@ -39,9 +40,7 @@ def test_a_path_leads_around_the_obstacle_and_a_seed_repeats_it(two_link: Robot)
         assert points is not None
         found.append(points)
         np.testing.assert_allclose(points[[0, -1]], [np.zeros(2), goal], atol=1e-12)
-        dense = np.concatenate(
-            [np.linspace(a, b, 50) for a, b in pairwise(points)]
-        )
+        dense = np.concatenate([np.linspace(a, b, 50) for a, b in pairwise(points)])
         assert space.depth(space.q(dense)) < 0.005
     np.testing.assert_array_equal(found[0], found[1])
     assert not np.array_equal(found[0], found[2])
@@ -97,7 +96,7 @@ def test_the_time_limit_ends_a_path(two_link: Robot, monkeypatch: pytest.MonkeyP
 def test_a_process_that_fails_gives_no_path(
     two_link: Robot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, program: str
 ) -> None:
-    script = tmp_path / "worker.py"
+    script = tmp_path / "failing"
     script.write_text(program)
     monkeypatch.setattr(ompl_paths, "_WORKER", script)
     monkeypatch.setattr(ompl_paths, "MAX_SILENCE", 0.5)

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline
 
 import hovi
 from hovi.discrete.grid import Grid
+from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.paths.free_space import FreeSpace
 from hovi.planning.paths.path_guess import depth_of, motion_along, natural_slopes, on_spline
 from hovi.planning.problem.limits import as_limits
@@ -21,7 +22,7 @@ POINTS = np.array([[0.0, 0.0], [0.1, 0.5], [0.2, 0.9], [0.4, 0.2], [0.5, 0.0]])
 """A path in coordinates of a free space."""
 
 
-def problem_of(robot: Robot, *obstacles: hovi.Obstacle, order: int = 2) -> TrajectoryProblem:
+def problem_of(robot: Robot, *obstacles: Obstacle, order: int = 2) -> TrajectoryProblem:
     """From (0, 0) to (1, 0), a turn of the whole arm."""
     effects = [hovi.effects.JerkCost(0.1)] if order == 3 else []
     scene = hovi.Scene(robot, [hovi.effects.Gravity(), *effects])

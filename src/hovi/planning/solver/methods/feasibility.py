@@ -69,7 +69,10 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     path = search.guess
     if search.clearance is not None:
         path = _moved_out_of_obstacles(search, path, search.clearance)
-    outcome = _solved_nearby(search, path) or search.solve(path)
+    if search.clearance is not None and path is search.guess:
+        outcome = solved_from(search, path)  # on its side of the obstacles
+    else:
+        outcome = _solved_nearby(search, path) or search.solve(path)
     if outcome.stop is Stop.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(path)
