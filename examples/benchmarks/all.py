@@ -6,6 +6,7 @@ table of swing_up goes into the README as well, between two comments that name i
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -43,7 +44,11 @@ SCRIPTS = (
     "inverse_kinematics",
 )
 
+PEER = [f"--peer={os.environ['TASKS_PEER']}"] if "TASKS_PEER" in os.environ else []
+"""The Python of an environment with OMPL and TOPP-RA, beside which tasks are planned."""
+
 LONG = {
+    "tasks": ("tasks.py", *PEER),
     "hard_cases_long": ("hard_cases.py", "long"),
     "limited_reaches_ipopt": ("limited_reaches.py", "--ipopt"),
     "limited_reaches_rotors": ("limited_reaches.py", "kinova", "xarm7", "--armature", "0.1"),

@@ -38,6 +38,7 @@ INSIDE = {
         {"obstacles"},
         {"clearance"},
         {"problem"},
+        {"paths"},
         {"solver"},
         {"refinement"},
         {"search"},

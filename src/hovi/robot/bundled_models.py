@@ -19,7 +19,7 @@ def example(name: str) -> Path:
     name: such as "two_link_swing_up" or "two_link.urdf"; without a suffix, a scene is preferred
         to a URDF. Raises SceneError for an unknown name.
     """
-    known = _shipped()
+    known = _shipped("**/*")
     for file_name in (name, f"{name}.toml", f"{name}.urdf"):
         if file_name in known:
             return known[file_name]
@@ -27,13 +27,19 @@ def example(name: str) -> Path:
 
 
 def example_scenes() -> list[str]:
-    """Names of the scenes that ship with hovi, sorted."""
-    return sorted(path.stem for path in _shipped().values() if path.suffix == ".toml")
+    """Names of the scenes that ship with hovi, without its suite of tasks, sorted."""
+    return sorted(path.stem for path in _shipped("*").values() if path.suffix == ".toml")
 
 
-def _shipped() -> dict[str, Path]:
+def task_suite() -> list[Path]:
+    """The scene files of the suite of tasks, in folders by family, sorted."""
+    return sorted(path for path in _shipped("tasks/*/*").values() if path.suffix == ".toml")
+
+
+def _shipped(pattern: str) -> dict[str, Path]:
+    """Scenes and URDFs by file name, of which there is one each."""
     for folder in _FOLDERS:
-        files = {p.name: p for p in folder.glob("*") if p.suffix in (".toml", ".urdf")}
+        files = {p.name: p for p in folder.glob(pattern) if p.suffix in (".toml", ".urdf")}
         if files:
             return files
     return {}

@@ -12,6 +12,7 @@ import pytest
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.guess import cubic, path_on_grid, with_bump
 from hovi.discrete.state import State
+from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.search.final_stages import FinalStages
 from hovi.planning.search.job import Job
 from hovi.planning.search.multistart import (
@@ -58,7 +59,7 @@ def silent(text: str, fraction: float) -> None:
 def search(
     job: Job, guesses: list, starts: int, seed: int = 0, processes: int = 1
 ) -> list[Solution]:
-    found = explore(Pool(job, processes), guesses[0], starts, seed, silent)
+    found = explore(Pool(job, processes), FirstGuesses(guesses[0]), starts, seed, silent)
     assert found.done == starts
     assert not found.interrupted
     return found.minima
@@ -146,7 +147,7 @@ def test_an_exploration_ends_with_a_round_that_every_process_dies_of(
     job: Job, guesses: list
 ) -> None:
     deadly = DeadlyJob(job.scene, job.grid, job.start, job.goal, job.options)
-    found = explore(Pool(deadly, 2), guesses[0], 1000, 0, silent)
+    found = explore(Pool(deadly, 2), FirstGuesses(guesses[0]), 1000, 0, silent)
     assert (found.done, len(found.lost)) == (1, STARTS_PER_ROUND)
     assert found.minima[0].success
     assert not found.interrupted
@@ -272,7 +273,13 @@ def test_the_number_of_processes_changes_nothing(job: Job, guesses: list) -> Non
 
 def test_progress_rises_to_one(job: Job, guesses: list) -> None:
     reports: list[tuple[str, float]] = []
-    explore(Pool(job, 1), guesses[0], 20, 0, lambda text, share: reports.append((text, share)))
+    explore(
+        Pool(job, 1),
+        FirstGuesses(guesses[0]),
+        20,
+        0,
+        lambda text, share: reports.append((text, share)),
+    )
     shares = [share for _, share in reports]
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -284,7 +291,7 @@ def test_progress_rises_to_one(job: Job, guesses: list) -> None:
 
 def test_a_deadline_ends_the_search_with_the_solutions_so_far(job: Job, guesses: list) -> None:
     late = Pool(job, 1, Deadline(-1.0))
-    found = explore(late, guesses[0], 1000, 0, silent)
+    found = explore(late, FirstGuesses(guesses[0]), 1000, 0, silent)
     assert found.done == 1
     assert not found.interrupted
     assert [solution.status for solution in found.minima] == [Status.TIME_LIMIT]
@@ -294,7 +301,7 @@ def test_an_interrupt_between_rounds_keeps_the_solutions_so_far(job: Job, guesse
     def interrupt(text: str, fraction: float) -> None:
         raise KeyboardInterrupt
 
-    found = explore(Pool(job, 1), guesses[0], 1000, 0, interrupt)
+    found = explore(Pool(job, 1), FirstGuesses(guesses[0]), 1000, 0, interrupt)
     assert found.interrupted
     assert 1 < found.done < 1000
     assert found.minima[0].success
@@ -313,7 +320,7 @@ def test_an_interrupt_within_a_solve_ends_the_search(
         return value(self, x)  # type: ignore[arg-type]
 
     monkeypatch.setattr(ActionObjective, "value", interrupted_once)
-    found = explore(Pool(job, 1), guesses[0], 1000, 0, silent)
+    found = explore(Pool(job, 1), FirstGuesses(guesses[0]), 1000, 0, silent)
     assert found.interrupted
     assert 1 < found.done < 100
     assert calls < 110

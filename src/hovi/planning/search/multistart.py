@@ -20,6 +20,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import Curve, stretched, with_bump, with_turns
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import ChartError
+from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress
@@ -37,6 +38,8 @@ STARTS_PER_ROUND = 16
 """Starts per round; constant, so that results do not depend on the number of processes."""
 PERTURBED_MINIMA = 4
 """Number of minima that a round perturbs."""
+COMPARED_TIMES = 17
+"""Number of times at which motions are compared."""
 SAME_COST = 1e-6
 """Relative difference in cost up to which two minima count as the same."""
 
@@ -45,11 +48,12 @@ SAME_COST = 1e-6
 class Solved:
     """The results of solves from several guesses.
 
-    solutions: in the order of the guesses. lost: why others have none, as their process died.
-    interrupted: whether Ctrl-C ended them.
+    solutions: in the order of the guesses. numbers: of their guesses.
+    lost: why others have none, as their process died. interrupted: whether Ctrl-C ended them.
     """
 
     solutions: list[Solution]
+    numbers: list[int]
     lost: list[str] = field(default_factory=list)
     interrupted: bool = False
 
@@ -112,8 +116,9 @@ def _solved(results: dict[int, Solution | Lost], interrupted: bool = False) -> S
     ordered = [results[i] for i in sorted(results)]
     lost = [each.reason for each in ordered if isinstance(each, Lost)]
     solutions = [each for each in ordered if not isinstance(each, Lost)]
+    numbers = [i for i in sorted(results) if not isinstance(results[i], Lost)]
     ended = interrupted or any(each.status is Status.INTERRUPTED for each in solutions)
-    return Solved(solutions, lost, ended)
+    return Solved(solutions, numbers, lost, ended)
 
 
 def _solve(
@@ -141,12 +146,15 @@ class Exploration:
     minima: distinct minima by ascending cost; the best other solution if there are none.
     done: number of starts that were solved. interrupted: whether Ctrl-C ended the exploration.
     lost: why starts have no solution, as the process that solved them died, one reason for each.
+    first: the guesses of the first starts. by_path: motions that began as one of their paths.
     """
 
     minima: list[Solution]
     done: int
     interrupted: bool
     lost: tuple[str, ...] = ()
+    first: FirstGuesses | None = None
+    by_path: tuple[Trajectory, ...] = ()
 
     def without_price(self, free: FreeDuration) -> Exploration:
         """The same with costs without the price of time, in the same order."""
@@ -156,25 +164,47 @@ class Exploration:
         ]
         return dataclasses.replace(self, minima=minima)
 
+    def guess_of(self, motion: Trajectory) -> str:
+        """What a message says of the guess of a refined motion: that of the nearest minimum."""
+        if self.first is None:
+            return ""
+        shares = np.linspace(0.0, 1.0, COMPARED_TIMES)
+        q = motion.configurations(shares * motion.duration)
+        known = [each.trajectory for each in self.minima]
+        far = [np.abs(k.configurations(shares * k.duration) - q).max() for k in known]
+        nearest = self.minima[int(np.argmin(far))]
+        by_path = any(nearest.trajectory is each for each in self.by_path)
+        return self.first.sentence(by_path, nearest.success)
+
 
 def explore(
-    pool: Pool, first: DiscretePath, starts: int, seed: int, progress: Progress
+    pool: Pool, first: FirstGuesses, starts: int, seed: int, progress: Progress
 ) -> Exploration:
-    """Solve from many starts, beginning with the first guess.
+    """Solve from many starts, beginning with the first guesses.
+
+    The direct one is left out for a single start that succeeds from a path.
 
     starts: number of solves. seed: of the random bumps.
     KeyboardInterrupt and the pool's deadline end the exploration with the solutions so far, and so
     does a round of which every process dies.
     """
-    one = pool.solve_all([first])
+    one = pool.solve_all(first.all[:starts])
     solutions, lost = one.solutions, one.lost
     ended = stopped = one.interrupted
+    numbered = zip(one.numbers, one.solutions, strict=True)
+    by_path = tuple(x.trajectory for number, x in numbered if number < len(first.paths))
     try:
+        if starts == 1 and first.paths and not (ended or one.lost or pool.deadline.passed):
+            if not solutions[0].success:
+                progress("from the direct guess", 0.5)
+                again = pool.solve_all([first.direct])
+                solutions, stopped = solutions + again.solutions, again.interrupted
+            ended = True
         while not (ended or pool.deadline.passed):
             tried = len(solutions) + len(lost)
             if tried >= starts:
                 break
-            guesses = _round(pool.job, distinct(solutions), first, tried, starts, seed)
+            guesses = _round(pool.job, distinct(solutions), first.all[0], tried, starts, seed)
             found = pool.solve_all(guesses)
             solutions, lost = solutions + found.solutions, lost + found.lost
             stopped = found.interrupted
@@ -185,7 +215,8 @@ def explore(
     except KeyboardInterrupt:
         record_interrupt()
         stopped = True
-    return Exploration(distinct(solutions), len(solutions), stopped, tuple(lost))
+    minima = distinct(solutions)
+    return Exploration(minima, len(solutions), stopped, tuple(lost), first, by_path)
 
 
 def _round(

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
+from hovi.planning.paths.first_guesses import FirstGuesses, first_guesses
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.resolution import resolved, unresolved_if_whirling
 from hovi.planning.refinement.whirling import whirl_without_minimum
@@ -158,9 +159,18 @@ class Search:
         whole = job is self.fine and job.tolerance is None and self.free is None
         deadline = self.deadline.part(SOLVING_SHARE if whole else EXPLORATION_SHARE)
         pool = Pool(job, options.processes or default_processes(), deadline, self.free)
-        first = guess_path(job.problem(), options.guess)
+        first = self._first_guesses(job, deadline)
         explored = explore(pool, first, options.starts, options.seed, self.progress)
         return explored if self.free is None else explored.without_price(self.free)
+
+    def _first_guesses(self, job: Job, deadline: Deadline) -> FirstGuesses:
+        """The guess, with paths around obstacles that one by name is deep in."""
+        options, problem = job.options, job.problem()
+        direct = guess_path(problem, options.guess)
+        if not isinstance(options.guess, str):
+            return FirstGuesses(direct)
+        given = options.starts, options.seed, deadline, self.progress
+        return first_guesses(problem, direct, *given)
 
     def _continued(self, job: Job, found: list[Solution]) -> list[Solution]:
         """The solutions, or the result of continuation if there is no minimum among them."""
@@ -198,6 +208,8 @@ class Search:
     def _with_ending(self, best: Solution, explored: Exploration) -> Solution:
         """The best solution, with a note in its message if the search ended early."""
         starts, lost = self.fine.options.starts, len(explored.lost)
+        if led := explored.guess_of(best.trajectory):
+            best = _with_note(best, led)
         if explored.done + lost < starts:
             best = _with_note(best, f"The search ended after {explored.done} of {starts} starts.")
         elif interrupted() and best.success:

@@ -85,8 +85,9 @@ class _Rounds:
                 return _unfinished(result, Stop.TIME_LIMIT)
             if len(more) == 0:
                 break
+            free = len(chosen) == 0 and result.nit > 0
             chosen = np.union1d(chosen, more)
-            result = self._again(result, chosen)
+            result = self._again(result, chosen, path if free else None)
         return result
 
     def _violating(self, result: MethodResult, chosen: Index) -> Index:
@@ -109,9 +110,14 @@ class _Rounds:
             least = float(problem.clearance.margin) + beyond
             return near_pairs(problem.trajectory(path), problem.distances, least)
 
-    def _again(self, result: MethodResult, chosen: Index) -> MethodResult:
-        """A solve with other pairs from the motion of a result."""
-        again = self._solved(result.problem, result.path, chosen)
+    def _again(
+        self, result: MethodResult, chosen: Index, free: DiscretePath | None
+    ) -> MethodResult:
+        """A solve with other pairs from the motion of a result, or from a guess that is free."""
+        if free is None:
+            again = self._solved(result.problem, result.path, chosen)
+        else:
+            again = self._solved(self._problem, free, chosen)
         return dataclasses.replace(
             again, nit=result.nit + again.nit, history=[*result.history, *again.history]
         )

@@ -69,7 +69,10 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     path = search.guess
     if search.clearance is not None:
         path = _moved_out_of_obstacles(search, path, search.clearance)
-    outcome = _solved_nearby(search, path) or search.solve(path)
+    if search.clearance is not None and path is search.guess:
+        outcome = solved_from(search, path)  # on its side of the obstacles
+    else:
+        outcome = _solved_nearby(search, path) or search.solve(path)
     if outcome.stop is Stop.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(path)
@@ -168,7 +171,11 @@ def _moved_out_of_obstacles(
     """A guess: the motion of least action without obstacles, moved out of them in stages.
 
     In one stage a motion deep in an obstacle would leave it on different sides at different times.
+    A guess that is free of obstacles stays as it is.
     """
+    given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
+    if float(given.distance.min()) >= wanted.least:
+        return path
     options, search.clearance = search.options, None
     path = _without_obstacles(search, path)
     approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)

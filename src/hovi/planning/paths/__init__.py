@@ -1,0 +1,1 @@
+"""Paths around obstacles by a sampling-based planner, as initial guesses."""

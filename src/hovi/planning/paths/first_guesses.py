@@ -1,0 +1,86 @@
+"""The initial guesses of a search: a direct one, and paths around obstacles that it is deep in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.paths.ompl_paths import has_ompl
+from hovi.planning.paths.path_guess import DEEP, depth_of, path_guesses
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.deadline import Deadline, OutOfTimeError
+
+MAX_PATHS = 8
+"""Maximum number of starts from paths."""
+PATH_SHARE = 0.2
+"""Share of the time limit for finding paths."""
+
+
+@dataclass(frozen=True, eq=False)
+class FirstGuesses:
+    """A direct guess, how deep in obstacles it is, in [m], and guesses along paths around them."""
+
+    direct: DiscretePath
+    depth: float = -np.inf
+    paths: tuple[DiscretePath, ...] = ()
+
+    @property
+    def all(self) -> tuple[DiscretePath, ...]:
+        """The paths, then the direct guess."""
+        return (*self.paths, self.direct)
+
+    def sentence(self, by_path: bool, success: bool) -> str:
+        """What the message of a solution says of its guess, "" if nothing.
+
+        by_path: whether the solution began as one of the paths.
+        """
+        if self.depth < DEEP:
+            return ""
+        if not has_ompl():
+            known = f"The direct guess is {self.depth:.2g} m deep in obstacles"
+            extra = "with OMPL (pip install 'hovi[obstacles]') a path around them is tried first."
+            return "" if success else f"{known}: {extra}"
+        if not self.paths:
+            found = "OMPL found no path around the obstacles"
+            return f"{found}; the direct guess led here." if success else f"{found}."
+        if not success:
+            return (
+                "Neither OMPL's paths around the obstacles nor the direct guess led to a minimum."
+            )
+        led = (
+            "A path around the obstacles by OMPL"
+            if by_path
+            else "The direct guess, no path by OMPL,"
+        )
+        return f"{led} led here."
+
+
+def first_guesses(
+    problem: TrajectoryProblem,
+    direct: DiscretePath,
+    starts: int,
+    seed: int,
+    deadline: Deadline,
+    progress: Callable[[str, float], None],
+) -> FirstGuesses:
+    """The guesses with which a search begins.
+
+    Where the direct one is deep in obstacles and OMPL is installed, one path for every start but
+    the last, and for a single one. seed: of all paths. deadline: of the search.
+    """
+    depth = depth_of(problem, direct)
+    if depth < DEEP or not has_ompl():
+        return FirstGuesses(direct, depth)
+    progress("looking for paths around the obstacles", 0.0)
+    paths = list[DiscretePath]()
+    count = min(max(starts - 1, 1), MAX_PATHS)
+    try:
+        with deadline.part(PATH_SHARE).in_force():
+            for path in path_guesses(problem, direct, count, seed):
+                paths.append(path)
+    except OutOfTimeError:  # with those that there are
+        pass
+    return FirstGuesses(direct, depth, tuple(paths))
