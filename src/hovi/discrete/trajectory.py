@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import io
 import itertools
 import json
 import os
@@ -232,12 +233,12 @@ class Trajectory:
             return (self.space.integrate(path.q[k], x), *rates)[: order + 1]
         return Chart(self.space).jet(path.q[k], x, *rates)[: order + 1]
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str] | io.BytesIO) -> None:
         """Write the motion to one npz file, atomically and with reproducible bytes.
 
         The file contains the scene with the text of the URDF; for a robot given as a Pinocchio
         model it contains the torques instead.
-        path: the file, usually `*.npz`. Raises TrajectoryFileError.
+        path: the file, usually `*.npz`, or a stream. Raises TrajectoryFileError.
         """
         for scheme, _ in self.grid.groups:
             require_known_name(scheme)
