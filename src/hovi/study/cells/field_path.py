@@ -28,7 +28,7 @@ class FieldPath:
         """The path with this notation; names with dots are in quotes. Raises SceneError."""
         keys: list[str | int] = []
         end = 0
-        while end < len(text) <= MAX_LENGTH:
+        while end < len(text) <= MAX_LENGTH and text[0] != ".":
             part = _PART.match(text, end)
             if part is None or (part[3] and not keys):
                 break
