@@ -7,6 +7,8 @@ again gets what it had been given once more.
 
 from __future__ import annotations
 
+import asyncio
+import concurrent.futures
 import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import suppress
@@ -29,6 +31,8 @@ PATIENCE = 120.0
 """Time in [s] to wait for a scheduler that does not answer, or that has no workers."""
 POLL = 1.0
 """Time in [s] after which it is seen whether the scheduler still answers."""
+_DISCONNECTED = OSError, asyncio.CancelledError, concurrent.futures.CancelledError
+"""What is raised where the connection to the scheduler breaks; it then cancels what it was given."""
 Work = Callable[[Any, float | None], Any]
 
 
@@ -116,12 +120,12 @@ class _Crew(Generic[Item, Result]):
     def _done(self) -> list[Future]:
         """Some futures that are done; none after a while without any."""
         try:
-            with suppress(TimeoutError):
+            with suppress(TimeoutError), self.client.as_current():
                 done = wait(list(self.sent), timeout=POLL, return_when="FIRST_COMPLETED").done
-                return [future for future in done if future.status != "cancelled"]
+                return list(done)
             if self.client.status == "running":
                 return []
-        except Exception:  # the connection broke while it was asked
+        except _DISCONNECTED:
             time.sleep(POLL)
         self._again()
         return []

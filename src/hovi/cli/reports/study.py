@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from hovi.cli.reports.progress import progress
+from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.study.running.progress import duration_text
+from hovi.system.files import finite
 
 if TYPE_CHECKING:
     from hovi.planning.search.job import Progress
@@ -66,3 +70,29 @@ def print_ending(report: StudyReport, out: Path) -> int:
         print("interrupted: start it again to do the rest")
         return INTERRUPTED
     return 1 if report.lost else 0
+
+
+def print_summary(found: dict[str, Any], as_json: bool) -> None:
+    """Print the summary of a study, as one JSON object or as a table."""
+    if as_json:
+        print(json.dumps(finite(found), allow_nan=False))
+        return
+    print(f"plans    {found['plans']:,}, of which {found['success']:,} are minima")
+    for status, number in found["status"].items():
+        print(f"{'':9s}{number:,} {status}")
+    if found["irreproducible"]:
+        print(f"{'':9s}{found['irreproducible']:,} may depend on a time limit")
+    print(f"time     {duration_text(found['seconds'])} in all workers together")
+    table = terminal_table()
+    for column in ("minima", "least", "quarter", "median", "three quarters", "largest"):
+        table.add_column(column, justify="left" if column == "minima" else "right")
+    for name, values in found["quantiles"].items():
+        table.add_row(name, *(f"{x:.4g}" for x in values))
+    print_table(table, width=100)
+    for each in found["worst"][:3]:
+        given = ", ".join(f"{k} = {_shown(v)}" for k, v in each["parameters"].items())
+        print(f"worst    cell {each['cell']}: cost {each['cost']:.6g}, {given[:WIDTH]}")
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

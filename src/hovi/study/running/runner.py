@@ -59,8 +59,8 @@ class StudyRun:
         chunks = kind(self.cells, index, self.output, self.workers)
         self.progress.before = self.progress.done = self._count_done(chunks)
         self.progress.take(0)
-        self._report()
         try:
+            self._report()
             self._plan(chunks)
         except KeyboardInterrupt:
             self.interrupted = True
