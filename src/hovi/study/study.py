@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 FrameKind = Literal["pandas", "polars"]
+LOCAL = "local"
+"""The scheduler that a run starts on this machine."""
 MAX_WORKERS = 1000
 """Largest number of worker processes."""
 
@@ -143,6 +145,11 @@ class Study:
         if not 1 <= workers <= MAX_WORKERS:
             raise InputError(f"workers must be from 1 to {MAX_WORKERS}, got {workers}.")
         if scheduler is not None:
+            if scheduler != LOCAL and "://" not in scheduler:
+                raise InputError(
+                    f'scheduler must be "local" or an address such as "tcp://127.0.0.1:8786", got '
+                    f"{scheduler!r}."
+                )
             require_extra("distributed", "cluster")
         about = self._about()
         chosen = Path(folder).absolute()

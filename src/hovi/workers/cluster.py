@@ -32,7 +32,7 @@ PATIENCE = 120.0
 POLL = 1.0
 """Time in [s] after which it is seen whether the scheduler still answers."""
 _DISCONNECTED = OSError, asyncio.CancelledError, concurrent.futures.CancelledError
-"""What is raised where the connection to the scheduler breaks; it then cancels what it was given."""
+"""What is raised where the connection to the scheduler breaks, which cancels what it was given."""
 Work = Callable[[Any, float | None], Any]
 
 

@@ -97,10 +97,15 @@ class StudyRun:
     def _results(self, chunks: Chunks, work: StudyWork) -> Results:
         if self.scheduler is None:
             return results_from(chunks, work, self.workers, Deadline())
-        from hovi.workers.cluster import results_in_cluster  # 0.7 s
+        return self._on_cluster(chunks, work, self.scheduler)
 
-        results: Results = results_in_cluster(chunks, work, self.scheduler, self.workers)
-        return results
+    def _on_cluster(self, chunks: Chunks, work: StudyWork, scheduler: str) -> Results:
+        from hovi.workers.cluster import ClusterError, results_in_cluster  # 0.7 s
+
+        try:
+            yield from results_in_cluster(chunks, work, scheduler, self.workers)
+        except ClusterError as lost:
+            raise StudyError(f"{lost}; what is done stays, start the study again.") from None
 
     def _tell(self, receipts: list[Receipt]) -> None:
         for receipt in receipts:
