@@ -158,6 +158,7 @@ def calls() -> dict[str, Call]:
         _flows,
         _groups,
         _files,
+        _studies,
     )
     for group in groups:
         for each in group():

@@ -17,6 +17,7 @@ from hovi.study.axes.axis_table import AxisContext, VaryTable, axis_of
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.template import Template
 from hovi.study.running.work import Output
+from hovi.system.files import names_file
 
 MAX_SAMPLES = 100_000
 """Maximum number of samples of a motion."""
@@ -97,9 +98,7 @@ def _check_first_cell(cells: Cells, cache: SceneCache, toml: TomlText) -> None:
 
 def _scene_path(text: str, toml: TomlText) -> Path:
     path = toml.path.parent / text
-    if "\0" in text:
-        raise toml.error(("scene",), "`scene` is no name of a file")
-    if text.endswith(".toml") or path.exists():
+    if text.endswith(".toml") or names_file(path):
         return path
     try:
         return example(f"{text}.toml")

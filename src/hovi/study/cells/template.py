@@ -17,6 +17,7 @@ from hovi.planning.task_file.scene_cache import SceneCache
 from hovi.planning.task_file.task import Task
 from hovi.robot.example_robots import example_robot
 from hovi.study.cells.field_path import FieldPath
+from hovi.system.files import names_file
 
 HASH_DIGITS = 32
 """Hexadecimal digits of the hashes of scenes and cells, 128 bits."""
@@ -72,12 +73,12 @@ class Template:
         if not isinstance(text, str) or len(text) > _MAX_NAME:
             return None
         if text not in self._digests:
-            found = [each for each in find(text) if each.is_file()]
+            found = [each for each in find(text) if names_file(each)]
             self._digests[text] = _hash_of_files(found) if found else None
         return self._digests[text]
 
     def _file(self, text: str) -> list[Path]:
-        return [] if "\0" in text or "\n" in text else [self.toml.path.parent / text]
+        return [self.toml.path.parent / text]
 
     def _robot_files(self, text: str) -> list[Path]:
         """The URDF and the SRDF of a robot by its path or its name."""
