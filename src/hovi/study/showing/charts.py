@@ -33,6 +33,7 @@ _LABELS = {
     "seconds": "wall time of a plan [s]",
     "motion_duration": "duration [s]",
 }
+_COORDINATES = {"[0]": "x", "[1]": "y", "[2]": "z"}
 _FAILED = {
     "unreachable": ("#b8b8b8", "no configuration meets it"),
     "infeasible": ("#c0392b", "infeasible"),
@@ -118,7 +119,7 @@ def draw_map(
     if all("position" in name for name in over):
         ax.set_aspect("equal")
     if ax.get_legend_handles_labels()[0]:
-        ax.legend(loc="upper right", fontsize=8)
+        figure.legend(loc="outside lower center", ncols=2, fontsize=8)
     ax.set_title(f"{int(plans.success.sum()):,} of {len(plans):,} plans are minima", fontsize=10)
     write_figure(figure, path)
 
@@ -154,7 +155,7 @@ def _marker_size(x: Array, y: Array) -> float:
     columns, rows = len(np.unique(x)), len(np.unique(y))
     if columns * rows > 4 * len(x):  # no grid
         columns = rows = max(1, int(np.sqrt(len(x))))
-    return float(np.clip(300.0 / max(columns, rows, 1), 1.5, 40.0))
+    return float(np.clip(345.0 / max(columns, rows, 1), 1.5, 40.0))
 
 
 def _draw_status(ax: Axes, plans: Plans) -> None:
@@ -187,4 +188,5 @@ def _bins(values: Array, logarithmic: bool) -> Array:
 def _label(name: str) -> str:
     if name in _LABELS:
         return _LABELS[name]
-    return f"{name} [m]" if ".position" in name else name
+    end, _, entry = name.partition(".position")
+    return f"{_COORDINATES[entry]} of the {end} [m]" if entry in _COORDINATES else name

@@ -35,6 +35,6 @@ def summary(plans: Plans) -> dict[str, Any]:
 
 
 def _worst(plans: Plans, row: int) -> dict[str, Any]:
-    own = {name: plans.columns[name][row] for name in plans.parameters}
+    own = {name: plans.columns[name][row] for name in plans.varying or plans.parameters}
     names = ("cell", "key", "cost")
     return {name: plans.columns[name][row] for name in names} | {"parameters": own}
