@@ -105,12 +105,28 @@ def throughput(count: int) -> None:
     )
 
 
-def run_in_child(count: int, folder: Path, seconds: float, way: str, random: Random) -> None:
-    """A run in a process of its own that is disturbed after some seconds."""
+def lines_of(folder: Path) -> int:
+    return sum(each.read_bytes().count(b"\n") for each in folder.glob("journal/*.lines"))
+
+
+def run_in_child(count: int, folder: Path, way: str, random: Random) -> None:
+    """A run in a process of its own that is disturbed after it has done some plans."""
     limited = way == "full disk"
     command = [sys.executable, __file__, "child", str(count), str(folder), str(int(limited))]
     child = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL)
-    time.sleep(seconds)
+    for wait in (random.randint(4, 40), 3 if way == "kill a worker" else 0):
+        before = lines_of(folder)
+        while child.poll() is None and lines_of(folder) < before + wait:
+            time.sleep(0.01)
+        if wait > 3:
+            disturb(child, way, random)
+    if way == "kill a worker":
+        child.kill()
+    child.wait()
+
+
+def disturb(child: subprocess.Popen[bytes], way: str, random: Random) -> None:
+    """Do what a way says; a full disk comes by itself."""
     if way == "kill the parent":
         child.kill()
     elif way == "Ctrl-C":
@@ -119,9 +135,6 @@ def run_in_child(count: int, folder: Path, seconds: float, way: str, random: Ran
         workers = [int(pid) for pid in children_of(child.pid)]
         if workers:
             os.kill(random.choice(workers), signal.SIGKILL)
-        time.sleep(seconds)
-        child.kill()
-    child.wait()
 
 
 def children_of(pid: int) -> list[str]:
@@ -130,7 +143,7 @@ def children_of(pid: int) -> list[str]:
 
 def child(count: int, folder: Path, limited: bool) -> None:
     if limited:  # the largest size of a file stands for that of a disk
-        resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, resource.RLIM_INFINITY))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, resource.RLIM_INFINITY))
     ur5_reaches(count).run(folder, 2)
 
 
@@ -138,13 +151,13 @@ def killed(count: int) -> None:
     """Ended at random in four ways and started again, against an undisturbed run."""
     random, folder = Random(1), Path(tempfile.mkdtemp())
     study = ur5_reaches(count)
-    seconds, _, _ = timed(lambda: study.run(folder / "whole", 2))
+    study.run(folder / "whole", 2)
+    end_idle_workers()
     out, rows = folder / "disturbed", []
     for number in range(DISTURBANCES):
         way = WAYS[number % len(WAYS)]
-        run_in_child(count, out, 5.0 + random.random() * seconds / DISTURBANCES, way, random)
-        lines = sum(len(each.read_bytes().splitlines()) for each in out.glob("journal/*.lines"))
-        rows.append([str(number + 1), way, f"{lines:,}"])
+        run_in_child(count, out, way, random)
+        rows.append([str(number + 1), way, f"{lines_of(out):,}"])
     report = study.run(out, 2)
     same = digest(out) == digest(folder / "whole")
     runs = Study.load_runs(out)

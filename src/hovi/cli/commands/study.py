@@ -66,7 +66,7 @@ def run(
     with Told() as told:
         report = chosen.run(
             out,
-            workers or default_processes(),
+            default_processes() if workers is None else workers,
             scheduler=scheduler,
             replace=replace,
             progress=told.take,

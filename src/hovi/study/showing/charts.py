@@ -125,11 +125,14 @@ def draw_map(
 
 
 def _draw_failures(ax: Axes, plans: Plans, x: Array, y: Array) -> None:
-    status = np.array(plans.columns["status"])
+    """The places without any minimum, by how plans ended there."""
+    status, success = np.array(plans.columns["status"]), plans.success
+    reached = set(zip(x[success], y[success], strict=True))
+    missed = np.array([place not in reached for place in zip(x, y, strict=True)], dtype=bool)
     size = _marker_size(x, y)
-    for name in dict.fromkeys(status[~plans.success].tolist()):
+    for name in dict.fromkeys(status[missed].tolist()):
         color, label = _FAILED.get(name, _OTHER)
-        here = (status == name) & ~plans.success
+        here = (status == name) & missed
         known = label in ax.get_legend_handles_labels()[1]
         ax.scatter(
             *(x[here], y[here]),
