@@ -20,7 +20,7 @@ from hovi.study.running.runner import StudyRun
 from hovi.study.running.work import Output, motion_from
 from hovi.study.storage.folder import About, used_alone
 from hovi.study.storage.index import Index
-from hovi.study.storage.tables import PLANS, RUNS
+from hovi.study.storage.tables import PLANS, RUNS, read_table
 from hovi.study.study_file import cells_of, validated
 from hovi.version import __version__
 
@@ -181,22 +181,19 @@ class Study:
         Raises StudyError if there is none.
         """
         require_extra(frame, "study")
-        path = _table(folder, PLANS)
+        table = read_table(Path(folder) / PLANS)
         if frame == "polars":
             import polars as pl
 
-            return pl.read_parquet(path)
-        import pandas as pd
-
-        return pd.read_parquet(path)
+            found: pl.DataFrame = pl.from_arrow(table)
+            return found
+        return table.to_pandas()
 
     @staticmethod
     def load_runs(folder: str | Path) -> pd.DataFrame:
         """runs.parquet of a study: when, where and how long each plan was computed."""
         require_extra("pandas", "study")
-        import pandas as pd
-
-        return pd.read_parquet(_table(folder, RUNS))
+        return read_table(Path(folder) / RUNS).to_pandas()
 
     @staticmethod
     def motion(folder: str | Path, key: str) -> Trajectory:
@@ -223,10 +220,3 @@ def _own_folder(folder: Path, about: About) -> Path:
     if held is None or held.identity == about.identity:
         return beside
     return folder.with_name(f"{folder.name}-{about.scene[:8]}-{about.version}")
-
-
-def _table(folder: str | Path, name: str) -> Path:
-    path = Path(folder) / name
-    if not path.is_file():
-        raise StudyError(f"there is no {name} in {folder}: run the study first.")
-    return path

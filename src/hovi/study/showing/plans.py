@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hovi.errors import InputError, StudyError, nearest
 from hovi.study.cells.extras import require_extra
-from hovi.study.storage.tables import PLANS, RUNS
+from hovi.study.storage.tables import PLANS, RUNS, read_table
 
 Array = npt.NDArray[np.float64]
 
@@ -34,12 +34,12 @@ class Plans:
     def read(cls, folder: Path) -> Plans:
         """The plans of a folder. Raises StudyError."""
         require_extra("pyarrow", "study")
-        table = _read(folder / PLANS)
+        table = read_table(folder / PLANS).to_pydict()
         names = list(table)
         if "key" not in names or "status" not in names:
             raise StudyError(f"{folder / PLANS} is not the table of a study.")
         parameters = tuple(names[names.index("key") + 1 : names.index("status")])
-        runs = _read(folder / RUNS)
+        runs = read_table(folder / RUNS).to_pydict()
         taken = zip(runs["key"], runs["seconds"], strict=True)
         return cls(folder, table, parameters, {k: s for k, s in taken if s is not None})
 
@@ -87,16 +87,3 @@ class Plans:
         cost = np.where(self.success, self.numbers("cost"), np.nan)
         order = np.argsort(-cost, kind="stable")
         return [int(i) for i in order[:count] if np.isfinite(cost[i])]
-
-
-def _read(path: Path) -> dict[str, list[Any]]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    if not path.is_file():
-        raise StudyError(f"there is no {path.name} in {path.parent}: run the study first.")
-    try:
-        found: dict[str, list[Any]] = pq.read_table(path).to_pydict()
-    except (pa.ArrowException, OSError, ValueError) as damaged:
-        raise StudyError(f"{path} cannot be read: {damaged}.") from None
-    return found

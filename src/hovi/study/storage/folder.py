@@ -13,7 +13,7 @@ from typing import Self
 
 from hovi.errors import StudyError
 from hovi.study.storage.journal import FOLDER
-from hovi.system.files import reason, require_file, whole_file
+from hovi.system.files import names_file, reason, require_file, whole_file
 
 ABOUT = "study.json"
 """The file that says which study a folder holds."""
@@ -49,7 +49,7 @@ class About:
     def read(cls, folder: Path) -> Self | None:
         """From the file; None if there is none. Raises StudyError."""
         path = folder / ABOUT
-        if not path.exists():
+        if not names_file(path):
             return None
         try:
             require_file(path, _MAX_BYTES)
@@ -75,6 +75,8 @@ def used_alone(folder: Path) -> Iterator[None]:
         descriptor = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except OSError as refused:
         raise StudyError(f"{folder} cannot be written: {reason(refused)}.") from None
+    except ValueError:
+        raise StudyError(f"no folder can have the name {str(folder)!r}.") from None
     try:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

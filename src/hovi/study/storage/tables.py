@@ -19,7 +19,7 @@ from hovi.study.cells.cells import Cells
 from hovi.study.cells.parameters import Parameter, parameters_of
 from hovi.study.storage.index import Index
 from hovi.study.storage.samples import Samples
-from hovi.system.files import reason, whole_file
+from hovi.system.files import names_file, reason, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -44,6 +44,19 @@ def write_tables(folder: Path, cells: Cells, keys: Keys, index: Index, samples: 
     _write(folder / RUNS, _run_schema(), _run_rows(index))
     if samples:
         _write(folder / SAMPLES, _sample_schema(), _sample_rows(folder, keys, index))
+
+
+def read_table(path: Path) -> pa.Table:
+    """A table of a study. Raises StudyError."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not names_file(path):
+        raise StudyError(f"there is no {path.name} in {path.parent}: run the study first.")
+    try:
+        return pq.read_table(path)
+    except (pa.ArrowException, OSError, ValueError) as damaged:
+        raise StudyError(f"{path} cannot be read: {damaged}.") from None
 
 
 def plan_schema(cells: Cells) -> pa.Schema:
