@@ -34,6 +34,7 @@ KINDS = {
     "trajectory": ("hard.mutated_motion", 6_000),
     "segments": ("hard.mutated_segments", 6_000),
     "obstacles": ("hard.mutated_obstacles", 10_000),
+    "study": ("hard.mutated_study", 6_000),
     "compiled": ("hard.compiled_calls", 14_000),
     "api": ("hard.api_calls", 14_000),
     "mesh": ("hard.mutated_mesh", 3_000),

@@ -1,6 +1,6 @@
 """Fuzzing guided by coverage: atheris searches for bytes that reach new lines of the readers.
 
-    python fuzz_coverage.py urdf|scene|trajectory|segments|mesh|compiled|api SECONDS
+    python fuzz_coverage.py urdf|scene|trajectory|segments|study|mesh|compiled|api SECONDS
 
 It starts from mutated inputs of tests/hard, stops at the first fault, and saves it to a file.
 """
@@ -23,6 +23,7 @@ MODULES = {
     "scene": "hard.mutated_scene",
     "trajectory": "hard.mutated_motion",
     "segments": "hard.mutated_segments",
+    "study": "hard.mutated_study",
     "compiled": "hard.compiled_calls",
     "api": "hard.api_calls",
     "mesh": "hard.mutated_mesh",

@@ -89,6 +89,7 @@ from .scene.scene import Scene as Scene
 from .scene.standard_lagrangians import mechanics as mechanics
 from .scene.standard_lagrangians import riemannian_cubic as riemannian_cubic
 from .scene.standard_lagrangians import spline as spline
+from .study.study import Study as Study
 from .version import __version__ as __version__
 from .viewing.csv_table import write_csv as write_csv
 from .viewing.plotting import plot as plot

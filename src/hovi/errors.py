@@ -66,6 +66,10 @@ class TrajectoryFileError(HoviError):
     """A trajectory file cannot be read or written."""
 
 
+class StudyError(HoviError):
+    """The folder of a study cannot be read or written, or does not fit the study."""
+
+
 class UnmeasurableError(HoviError):
     """A method cannot solve a scene, or there is no reference motion to compare methods with."""
 

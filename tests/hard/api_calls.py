@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -158,6 +159,7 @@ def calls() -> dict[str, Call]:
         _flows,
         _groups,
         _files,
+        _studies,
     )
     for group in groups:
         for each in group():
@@ -798,6 +800,31 @@ def _groups() -> list[Call]:
     }.items():
         found.append(own(one, name, *arguments))
     return found
+
+
+def _studies() -> list[Call]:
+    values = {"field": "duration", "values": [1.0, 1.1]}
+    study = hovi.Study(hovi.example("two_link_reach"), [values])
+    toml, out = folder() / "study.toml", folder() / "study"
+    toml.write_text('scene = "two_link_reach"\n')
+    made = [
+        build(
+            hovi.Study,
+            scene="two_link_reach",
+            vary=[values],
+            **{"seed": 0, "warm": False, "motions": True, "samples": 0},
+        ),
+        call(hovi.Study.read, toml),
+    ]
+    if find_spec("pyarrow") is None or find_spec("pandas") is None:
+        return made  # of the extra `study`
+    study.run(out)
+    return [
+        *made,
+        own(study, "run", out, 1, scheduler=None, replace=False, progress=None),
+        *(call(load, out) for load in (hovi.Study.load, hovi.Study.load_runs)),
+        call(hovi.Study.motion, out, study.cells.key(0)),
+    ]
 
 
 def _files() -> list[Call]:

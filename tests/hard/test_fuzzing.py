@@ -19,6 +19,7 @@ from hard import (
     mutated_obstacles,
     mutated_scene,
     mutated_segments,
+    mutated_study,
     mutated_urdf,
 )
 from hard.verdict import Verdict
@@ -30,6 +31,7 @@ MUTATED = (
     mutated_segments,
     mutated_mesh,
     mutated_obstacles,
+    mutated_study,
     compiled_calls,
     api_calls,
 )

@@ -24,7 +24,7 @@ FLOORS = [
     {"flows"},
     {"planning", "symbolic"},
     {"viewing"},
-    {"accuracy", "exchange"},
+    {"accuracy", "exchange", "study"},
     {"cli"},
     {"__main__"},
 ]
@@ -46,6 +46,7 @@ INSIDE = {
         {"task_file"},
     ],
     "accuracy": [{""}, {"effect_study", "peers"}],
+    "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {""}, {"showing"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }
 

@@ -22,6 +22,7 @@ from hovi.cli.commands import plot as plot_command
 from hovi.cli.commands import replay as replay_command
 from hovi.cli.commands import schema as schema_command
 from hovi.cli.commands import simulate as simulate_command
+from hovi.cli.commands import study as study_command
 from hovi.errors import HoviError, HoviWarning
 from hovi.system.files import reason
 
@@ -62,6 +63,7 @@ app.command("plan")(plan_command.plan)
 app.command("accuracy")(accuracy_command.accuracy)
 app.command("simulate")(simulate_command.simulate)
 app.command("effects")(effects_command.effects)
+app.add_typer(study_command.app, name="study")
 app.command("replay")(replay_command.replay)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import io
 import itertools
 import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -232,12 +233,12 @@ class Trajectory:
             return (self.space.integrate(path.q[k], x), *rates)[: order + 1]
         return Chart(self.space).jet(path.q[k], x, *rates)[: order + 1]
 
-    def save(self, path: str | os.PathLike[str]) -> None:
+    def save(self, path: str | os.PathLike[str] | io.BytesIO) -> None:
         """Write the motion to one npz file, atomically and with reproducible bytes.
 
         The file contains the scene with the text of the URDF; for a robot given as a Pinocchio
         model it contains the torques instead.
-        path: the file, usually `*.npz`. Raises TrajectoryFileError.
+        path: the file, usually `*.npz`, or a stream. Raises TrajectoryFileError.
         """
         for scheme, _ in self.grid.groups:
             require_known_name(scheme)
@@ -385,7 +386,8 @@ def _digest(description: Any) -> str:
     return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
 
 
-def _versions() -> dict[str, str]:
+@cache
+def _versions() -> Mapping[str, str]:
     """Versions of hovi and the libraries that computed the motion."""
     versions = {}
     for name in ("hovi", "pin", "casadi"):

@@ -16,8 +16,9 @@ import math
 import os
 import zipfile
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -45,11 +46,11 @@ _BYTES = np.dtype("u1")
 
 
 def write_arrays(
-    path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, Array]
+    path: str | os.PathLike[str] | BinaryIO, header: Mapping[str, Any], arrays: Mapping[str, Array]
 ) -> None:
     """Write a header and named arrays to one npz, atomically and with reproducible bytes.
 
-    path: the file; an existing one is replaced.
+    path: the file; an existing one is replaced. Or a stream, which gets the bytes.
     header: JSON-compatible data.
     arrays: finite doubles of any shape, by name.
     Raises TrajectoryFileError.
@@ -68,7 +69,7 @@ def write_arrays(
             f"this trajectory takes {size} bytes, but a file can have at most {MAX_BYTES}."
         )
     try:
-        with whole_file(path) as stream, zipfile.ZipFile(stream, "w") as archive:
+        with _destination(path) as stream, zipfile.ZipFile(stream, "w") as archive:
             for name, entry in entries.items():
                 info = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
                 info.external_attr = 0o644 << 16
@@ -77,6 +78,10 @@ def write_arrays(
                     np.lib.format.write_array(member, entry, version=(1, 0), allow_pickle=False)
     except OSError as error:
         raise TrajectoryFileError(f"cannot write {str(path)!r}: {reason(error)}.") from error
+
+
+def _destination(path: str | os.PathLike[str] | BinaryIO) -> AbstractContextManager[BinaryIO]:
+    return whole_file(path) if isinstance(path, str | os.PathLike) else nullcontext(path)
 
 
 def read_arrays(

@@ -101,6 +101,14 @@ def require_file(path: str | os.PathLike[str], max_bytes: int) -> None:
         )
 
 
+def names_file(path: Path) -> bool:
+    """Whether there is a regular file at a path, which may be no path that the system knows."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that is too long, among others
+        return False
+
+
 def finite(value: Any) -> Any:
     """A JSON value with None in place of every number that is not finite."""
     if isinstance(value, dict):

@@ -15,7 +15,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
@@ -26,6 +25,7 @@ from hovi.system.deadline import Deadline
 from hovi.workers.frames import ClosedPipeError, Receiver, send
 from hovi.workers.lost import Lost
 from hovi.workers.serving import IDLE_SECONDS
+from hovi.workers.source import Listed, Source
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -58,7 +58,22 @@ def results_in_workers(
     can do without workers. To be closed, as by contextlib.closing, where it is left early.
     Raises what `work` raises.
     """
-    crew = _Crew[Item, Result](work, items, min(processes, len(items)), deadline)
+    yield from results_from(Listed(items), work, min(processes, len(items)), deadline)
+
+
+def results_from(
+    source: Source[Item],
+    work: Callable[[Item, float | None], Result],
+    processes: int,
+    deadline: Deadline,
+) -> Generator[tuple[int, Result | Lost], None, None]:
+    """As results_in_workers, of items that a source gives one at a time, whenever a worker is idle.
+
+    So the source may make them as they are taken, and give more once it has seen a result. It is
+    asked again after every result; the end is when it has none and no worker is busy.
+    Items are numbered in the order in which they are taken.
+    """
+    crew = _Crew[Item, Result](work, source, processes, deadline)
     try:
         yield from crew.results()
     finally:
@@ -121,17 +136,17 @@ _parked: list[_Worker] = []
 
 
 class _Crew(Generic[Item, Result]):
-    """The workers of one call. waiting: numbers of the items that are not begun."""
+    """The workers of one call."""
 
     def __init__(
         self,
         work: Callable[[Item, float | None], Result],
-        items: Sequence[Item],
+        source: Source[Item],
         count: int,
         deadline: Deadline,
     ) -> None:
-        self.work, self.items, self.deadline = cloudpickle.dumps(work), items, deadline
-        self.waiting = deque(range(len(items)))
+        self.work, self.source, self.deadline = cloudpickle.dumps(work), source, deadline
+        self.taken = 0
         self.selector = selectors.DefaultSelector()
         self.hands: list[_Worker] = []
         for _ in range(count):
@@ -187,12 +202,13 @@ class _Crew(Generic[Item, Result]):
         for worker in list(self.hands):
             if not worker.is_ready or worker.item is not None:
                 continue
-            if not self.waiting or self.deadline.passed:
+            item = None if self.deadline.passed else self.source.take()
+            if item is None:
                 return
-            number = self.waiting.popleft()
-            item = cloudpickle.dumps(self.items[number])
+            number, self.taken = self.taken, self.taken + 1
+            sent = cloudpickle.dumps(item.content)
             try:
-                worker.begin(self.work, number, item, self.deadline.seconds_left)
+                worker.begin(self.work, number, sent, self.deadline.seconds_left)
             except ClosedPipeError:
                 yield from self._bury(worker)
 
@@ -209,7 +225,9 @@ class _Crew(Generic[Item, Result]):
             yield from _result(number, *message)
 
     def _bury(self, worker: _Worker) -> Iterator[tuple[int, Lost]]:
-        """Replace a dead worker; its item is lost. One that died before any item is not replaced.
+        """Replace a dead worker if there may be more to do; its item is lost.
+
+        One that died before any item is not replaced.
 
         Otherwise processes would be started for ever where none can run.
         """
@@ -218,7 +236,7 @@ class _Crew(Generic[Item, Result]):
         code = worker.end()
         if worker.item is None:
             return
-        if self.waiting and not self.deadline.passed:
+        if not self.deadline.passed and self.source.may_give_more:
             self._hire()
         yield worker.item, Lost(_cause(code))
 

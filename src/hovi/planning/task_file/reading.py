@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,14 @@ from hovi.planning.task_file.grasped_tables import read_grasped
 from hovi.planning.task_file.limit_tables import read_limits
 from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.obstacle_tables import read_obstacles
+from hovi.planning.task_file.scene_cache import (
+    MOTION_KEYS,
+    ROBOT_KEYS,
+    SCENE_KEYS,
+    SceneCache,
+    chosen,
+    others,
+)
 from hovi.planning.task_file.schema import PLAIN, SchemeTable, ShapedTable, TaskTable
 from hovi.planning.task_file.segment_tables import check_keys, read_segments
 from hovi.planning.task_file.task import Task
@@ -44,28 +53,44 @@ def load_task(path: str | Path) -> Task:
     Raises SceneError with file, line, key, expected and given value, and ModelError if the robot
     cannot be loaded.
     """
-    toml = _read_text(Path(path))
-    table = _validated(toml)
+    toml = read_toml(Path(path))
+    return task_of(parsed(toml), toml)
+
+
+def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = None) -> Task:
+    """The task of a scene file's table, which may differ from its text in some values.
+
+    data: as TOML has it. toml: the text, for the lines in messages, and the path, to which others
+        are relative.
+    cache: of what is built, to be used for one folder only.
+    Raises as load_task does.
+    """
+    table = _validated(data, toml)
     _check_scheme(table, toml)
     check_keys(table, toml)
-    robot, name = _load_robot(table, toml), toml.path.stem
-    grasped, held = read_grasped(table.grasped, robot, toml)
-    scene, start = _scene(table, robot, toml), read_end(table.start, ("start",), held, toml)
+    kept, name = SceneCache() if cache is None else cache, toml.path.stem
+    robot = kept.get("robot", chosen(data, ROBOT_KEYS), lambda: _load_robot(table, toml))
+    grasped, held = kept.get(
+        "grasped",
+        chosen(data, (*ROBOT_KEYS, "grasped")),
+        lambda: read_grasped(table.grasped, robot, toml),
+    )
+    scene = kept.get("scene", chosen(data, SCENE_KEYS), lambda: _scene(table, robot, toml))
+    start = read_end(table.start, ("start",), held, toml)
     if table.segments:
         segments = read_segments(table.segments, held, toml)
         whole = sum(each.duration for each in segments)
         options = _options(table, whole, held, grasped, toml)
         return Task.of_segments(scene, start, segments, options, name)
     assert table.goal is not None
-    duration = _duration(table.duration, toml)
-    return Task(
-        scene=scene,
-        start=start,
-        goal=read_end(table.goal, ("goal",), held, toml),
-        duration=duration,
-        options=_options(table, duration, held, grasped, toml),
-        name=name,
+    duration, goal = _duration(table.duration, toml), read_end(table.goal, ("goal",), held, toml)
+    without = MOTION_KEYS[:2] if table.via else MOTION_KEYS  # via points are before its end
+    options = kept.get(
+        "options",
+        others(data, without),
+        lambda: _options(table, duration, held, grasped, toml),
     )
+    return Task(scene, start, goal, duration, options, name)
 
 
 def _options(
@@ -115,7 +140,8 @@ def _duration(given: Any, toml: TomlText) -> float | tuple[float, float]:
         raise toml.error(("duration",), str(wrong)) from None
 
 
-def _read_text(path: Path) -> TomlText:
+def read_toml(path: Path) -> TomlText:
+    """The text of a scene file. Raises SceneError."""
     try:
         require_file(path, MAX_BYTES)
         return TomlText(path, path.read_text(encoding="utf-8"))
@@ -127,20 +153,24 @@ def _read_text(path: Path) -> TomlText:
         raise SceneError(f"{path} cannot be read: {reason(refused)}.") from None
 
 
-def _validated(toml: TomlText) -> ShapedTable:
+def parsed(toml: TomlText) -> dict[str, Any]:
+    """The table of a TOML file. Raises SceneError, with the line, for text that is no TOML."""
     for number, line in enumerate(toml.text.splitlines(), start=1):
         if line.count(".") > MAX_DOTS:
             raise SceneError(
                 f"{toml.path}, line {number}: more than {MAX_DOTS:,} dots in one line."
             )
     try:
-        data = tomllib.loads(toml.text)
+        return tomllib.loads(toml.text)
     except RecursionError:
         raise SceneError(f"{toml.path}: lists or tables are nested too deeply.") from None
     except tomllib.TOMLDecodeError as invalid:
         raise SceneError(_syntax_sentence(toml, str(invalid))) from None
     except ValueError:
         raise SceneError(f"{toml.path}: a number has too many digits.") from None
+
+
+def _validated(data: Mapping[str, Any], toml: TomlText) -> ShapedTable:
     try:
         return TaskTable.model_validate(data)
     except ValidationError as invalid:

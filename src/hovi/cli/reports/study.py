@@ -1,0 +1,98 @@
+"""What a running study tells on stderr, and how it ended."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from hovi.cli.reports.progress import progress
+from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.study.running.progress import duration_text
+from hovi.system.files import finite
+
+if TYPE_CHECKING:
+    from hovi.planning.search.job import Progress
+    from hovi.study.running.progress import StudyProgress
+    from hovi.study.study import StudyReport
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+WIDTH = 150
+"""Characters of a failure's reason that are printed; the table has all of them."""
+
+
+class Told:
+    """A progress bar with rates and the time left, and a line for each failure."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._report: Progress | None = None
+
+    def __enter__(self) -> Self:
+        self._report = self._stack.enter_context(progress(quiet=False, doing="starting workers"))
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+
+    def take(self, state: StudyProgress) -> None:
+        """Show the state of a run."""
+        if state.failed is not None:
+            failed = state.failed
+            reason = failed.reason if len(failed.reason) <= WIDTH else failed.reason[:WIDTH] + "..."
+            line = f"cell {failed.number}, {failed.status}: {reason}"
+            with suppress(OSError):  # stderr may be closed
+                print(line, file=sys.stderr, flush=True)
+        elif self._report is not None:
+            self._report(state.text(), state.done / max(state.count, 1))
+
+
+def print_ending(report: StudyReport, out: Path) -> int:
+    """Print what a run has done; returns the exit code."""
+    if report.folder != out.absolute():
+        print(f"folder   {out} holds another study, so this one is in {report.folder}")
+    print(f"plans    {report.done:,} of {report.count:,} done, {report.new:,} of them now")
+    for status, number in report.failures.items():
+        print(f"failed   {number:,} {status}")
+    for reason in dict.fromkeys(report.lost):
+        print(f"given up {report.lost.count(reason):,}: {reason}; start again to try them again")
+    print(f"wrote    {report.folder / 'plans.parquet'}")
+    if report.interrupted:
+        print("interrupted: start it again to do the rest")
+        return INTERRUPTED
+    return 1 if report.lost else 0
+
+
+def print_summary(found: dict[str, Any], as_json: bool) -> None:
+    """Print the summary of a study, as one JSON object or as a table."""
+    if as_json:
+        print(json.dumps(finite(found), allow_nan=False))
+        return
+    print(f"plans    {found['plans']:,}, of which {found['success']:,} are minima")
+    for status, number in found["status"].items():
+        print(f"{'':9s}{number:,} {status}")
+    if found["irreproducible"]:
+        print(f"{'':9s}{found['irreproducible']:,} may depend on a time limit")
+    print(f"time     {duration_text(found['seconds'])} in all workers together")
+    table = terminal_table()
+    for column in ("minima", "least", "quarter", "median", "three quarters", "largest"):
+        table.add_column(column, justify="left" if column == "minima" else "right")
+    for name, values in found["quantiles"].items():
+        table.add_row(name, *(f"{x:.4g}" for x in values))
+    print_table(table, width=100)
+    for each in found["worst"][:3]:
+        given = ", ".join(f"{k} = {_shown(v)}" for k, v in each["parameters"].items())
+        print(f"worst    cell {each['cell']}: cost {each['cost']:.6g}, {given[:WIDTH]}")
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""Studies: many plans of one scene with fields that vary, their tables and their pictures."""

@@ -1,0 +1,1 @@
+"""What varies: lists, grids, tables, samples, configurations and poses."""

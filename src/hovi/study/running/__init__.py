@@ -1,0 +1,1 @@
+"""Running a study: chunks of cells for worker processes, on one machine or several."""

@@ -1,0 +1,239 @@
+"""What a worker does: it plans the cells of a chunk, and writes down each as it is done."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import io
+import os
+import socket
+import tempfile
+import time
+import warnings
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from hovi.discrete.state import State
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import HoviError, HoviWarning, UnreachableError
+from hovi.planning.problem.frame_goal import FrameGoal
+from hovi.planning.problem.inverse_kinematics import inverse_kinematics
+from hovi.planning.solver.solver import Solution
+from hovi.planning.solver.status import Status
+from hovi.planning.task_file.scene_cache import SceneCache
+from hovi.planning.task_file.task import Task
+from hovi.planning.task_file.task_plan import plan_task
+from hovi.study.cells.field_path import FieldPath
+from hovi.study.cells.template import Template
+from hovi.study.running.measures import row_of
+from hovi.study.storage.journal import JournalWriter, StorageError, Stored
+from hovi.study.storage.rows import FAILED, REFUSED, UNREACHABLE, PlanRow
+from hovi.study.storage.samples import Samples
+from hovi.system.blas_threads import one_blas_thread
+from hovi.version import __version__
+
+
+@dataclass(frozen=True)
+class Output:
+    """What is stored of each motion.
+
+    motions: whether the whole motion. samples: number of samples, 0 for none.
+    """
+
+    motions: bool = True
+    samples: int = 0
+
+
+@dataclass(frozen=True)
+class CellJob:
+    """A cell to be planned: see Cell.
+
+    attempt: 1 for the first one. guess: where the motion is from which it starts; None for none.
+    follows: whether it starts from the motion of the job before it in the chunk.
+    """
+
+    number: int
+    key: str
+    values: tuple[tuple[FieldPath, Any], ...]
+    ends: tuple[str, ...] = ()
+    attempt: int = 1
+    guess: Stored | None = None
+    follows: bool = False
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """What the parent is told of a plan that is done and stored.
+
+    reason: of a failure; "" for a success. motion: where it is, which the next one starts from.
+    """
+
+    number: int
+    key: str
+    status: str
+    seconds: float
+    reason: str = ""
+    motion: Stored | None = None
+
+    @property
+    def success(self) -> bool:
+        """Whether there is nothing to say about it."""
+        return not self.reason
+
+
+@dataclass(frozen=True, eq=False)
+class StudyWork:
+    """Plans chunks in a worker. folder: of the study, absolute. run: an id of this run."""
+
+    template: Template
+    folder: str
+    output: Output
+    run: str
+
+    @one_blas_thread
+    def __call__(self, chunk: tuple[CellJob, ...], left: float | None = None) -> list[Receipt]:
+        """Plan the cells of a chunk. Raises StorageError, and MemoryError."""
+        desk = _desk(self.folder, self.run, self.template.hash)
+        receipts: list[Receipt] = []
+        before: Trajectory | None = None
+        for job in chunk:
+            guess = before if job.follows else self._stored_motion(job.guess)
+            receipt, before = self._do(job, guess, desk)
+            receipts.append(receipt)
+        return receipts
+
+    def _do(
+        self, job: CellJob, guess: Trajectory | None, desk: _Desk
+    ) -> tuple[Receipt, Trajectory | None]:
+        began, wall, processor = datetime.now(UTC), time.perf_counter(), time.process_time()
+        row, motion = self._planned(job, guess, desk)
+        seconds = time.perf_counter() - wall
+        spent = {"seconds": seconds, "processor_seconds": time.process_time() - processor}
+        stored = samples = None
+        if motion is not None:
+            stored = desk.writer.store(_bytes_of(motion)) if self.output.motions else None
+            if self.output.samples:
+                sampled = Samples.of(motion, self.output.samples)
+                samples = desk.writer.store(sampled.to_bytes())
+        entry = {
+            "key": job.key,
+            "row": row.to_dict(),
+            "motion": None if stored is None else stored.to_list(),
+            "samples": None if samples is None else samples.to_list(),
+            "asked": [self.output.motions, self.output.samples],
+            "run": {
+                "attempt": job.attempt,
+                "outcome": "done",
+                "host": socket.gethostname(),
+                "process": os.getpid(),
+                "began": began.isoformat(),
+                **spent,
+                "version": __version__,
+            },
+        }
+        desk.writer.add(entry)
+        reason = "" if row.success else row.reason or row.status
+        receipt = Receipt(job.number, job.key, row.status, seconds, reason, stored)
+        return receipt, motion if row.success else None
+
+    def _planned(
+        self, job: CellJob, guess: Trajectory | None, desk: _Desk
+    ) -> tuple[PlanRow, Trajectory | None]:
+        """The row of a cell and its motion."""
+        began = time.perf_counter()
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                task = self._task(job, desk)
+                solution = _solved(task, guess)
+            except UnreachableError as error:
+                return self._without_motion(UNREACHABLE, error), None
+            except HoviError as error:
+                return self._without_motion(REFUSED, error), None
+            except (MemoryError, StorageError):
+                raise
+            except Exception as error:  # what it is, the row says
+                return self._without_motion(FAILED, f"{type(error).__name__}: {error}"), None
+        if solution.status is Status.INTERRUPTED:
+            raise KeyboardInterrupt
+        texts = [str(each.message) for each in caught if issubclass(each.category, HoviWarning)]
+        seconds, limit = time.perf_counter() - began, task.options.time_limit_seconds
+        row = row_of(solution, " ".join(dict.fromkeys(texts)), seconds, limit)
+        return row, solution.trajectory
+
+    def _without_motion(self, status: str, reason: Any) -> PlanRow:
+        """The row of a cell without a motion; its reason names no folder of this machine."""
+        folder = f"{self.template.toml.path.parent}/"
+        return PlanRow(status, reason=str(reason).replace(folder, ""), version=__version__)
+
+    def _task(self, job: CellJob, desk: _Desk) -> Task:
+        """The task of a cell, with targets of frames replaced by configurations where asked for."""
+        task = self.template.task(self.template.with_values(job.values), desk.cache)
+        for end, other in (("start", "goal"), ("goal", "start")):
+            target = getattr(task, end)
+            if end in job.ends and isinstance(target, FrameGoal):
+                ends: dict[str, Any] = {end: _met(task, target, getattr(task, other))}
+                task = dataclasses.replace(task, **ends)
+        return task
+
+    def _stored_motion(self, stored: Stored | None) -> Trajectory | None:
+        if stored is None:
+            return None
+        return motion_from(stored.read(Path(self.folder)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Desk:
+    """What a worker keeps between chunks."""
+
+    writer: JournalWriter
+    cache: SceneCache
+
+
+@functools.lru_cache(maxsize=4)
+def _desk(folder: str, run: str, template: str) -> _Desk:
+    return _Desk(JournalWriter(Path(folder)), SceneCache())
+
+
+def _solved(task: Task, guess: Trajectory | None) -> Solution:
+    """The plan, from a guess if there is one, and from its own one where that finds no minimum."""
+    several: dict[str, Any] = {"processes": 1} if task.options.starts > 1 else {}
+    if guess is not None:
+        solution = plan_task(task, guess=guess, **several)
+        if solution.success or solution.status is Status.INTERRUPTED:
+            return solution
+    return plan_task(task, **several)
+
+
+def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:
+    """At rest where a frame meets its target, as near to the other end as was found."""
+    robot, options = task.held_scene.robot, task.options
+    near = None
+    if isinstance(other, State):
+        near = other.resolved(robot, "the other end").on(robot, "it")[0]
+    found = inverse_kinematics(
+        robot,
+        target,
+        near=near,
+        limits=options.limits,
+        obstacles=options.obstacles,
+        margin=options.margin,
+        self_collision=options.self_collision,
+    )
+    return State(found[0])
+
+
+def _bytes_of(motion: Trajectory) -> bytes:
+    stream = io.BytesIO()
+    motion.save(stream)
+    return stream.getvalue()
+
+
+def motion_from(content: bytes) -> Trajectory:
+    """The motion of an npz file's bytes. Raises TrajectoryFileError."""
+    with tempfile.NamedTemporaryFile(suffix=".npz") as file:
+        file.write(content)
+        file.flush()
+        return Trajectory.load(file.name)

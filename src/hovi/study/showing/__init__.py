@@ -1,0 +1,1 @@
+"""What a study shows: summaries, histograms, maps and the worst motions."""

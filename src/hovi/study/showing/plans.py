@@ -1,0 +1,89 @@
+"""plans.parquet and runs.parquet, read to be shown."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import InputError, StudyError, nearest
+from hovi.study.cells.extras import require_extra
+from hovi.study.storage.tables import PLANS, RUNS, read_table
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plans:
+    """The plans of a study.
+
+    folder: of the study. columns: of plans.parquet, by name, as lists. parameters: names of those
+    that vary. seconds: that each plan took, by key; of the last run that did it.
+    """
+
+    folder: Path
+    columns: dict[str, list[Any]]
+    parameters: tuple[str, ...]
+    seconds: dict[str, float]
+
+    @classmethod
+    def read(cls, folder: Path) -> Plans:
+        """The plans of a folder. Raises StudyError."""
+        require_extra("pyarrow", "study")
+        table = read_table(folder / PLANS).to_pydict()
+        names = list(table)
+        if "key" not in names or "status" not in names:
+            raise StudyError(f"{folder / PLANS} is not the table of a study.")
+        parameters = tuple(names[names.index("key") + 1 : names.index("status")])
+        runs = read_table(folder / RUNS).to_pydict()
+        taken = zip(runs["key"], runs["seconds"], strict=True)
+        return cls(folder, table, parameters, {k: s for k, s in taken if s is not None})
+
+    def __len__(self) -> int:
+        return len(self.columns["key"])
+
+    def numbers(self, name: str) -> Array:
+        """A column of numbers, NaN where there is none, shape (M,).
+
+        name: of the column, or "seconds". Raises InputError for other columns.
+        """
+        if name == "seconds":
+            return np.array([self.seconds.get(key, np.nan) for key in self.columns["key"]])
+        if name not in self.columns:
+            raise InputError(f"the study has no column {name!r}; {nearest(name, self.columns)}")
+        values = self.columns[name]
+        if any(isinstance(value, str | list) for value in values):
+            raise InputError(f"column {name!r} of the study has no numbers: choose another one.")
+        return np.array([np.nan if value is None else float(value) for value in values])
+
+    @property
+    def success(self) -> npt.NDArray[np.bool_]:
+        """Which plans found a minimum, shape (M,)."""
+        return np.array(self.columns["success"], dtype=bool)
+
+    @property
+    def varying(self) -> tuple[str, ...]:
+        """Parameters that are numbers and differ between plans."""
+        found = []
+        for name in self.parameters:
+            try:
+                values = self.numbers(name)
+            except InputError:
+                continue
+            if len(values) and np.nanmax(values) > np.nanmin(values):
+                found.append(name)
+        return tuple(found)
+
+    def by_status(self) -> dict[str, int]:
+        """The number of plans of each status, the most frequent first."""
+        return dict(Counter(self.columns["status"]).most_common())
+
+    def worst(self, count: int) -> list[int]:
+        """Rows of the minima that cost most, the costliest first."""
+        cost = np.where(self.success, self.numbers("cost"), np.nan)
+        order = np.argsort(-cost, kind="stable")
+        return [int(i) for i in order[:count] if np.isfinite(cost[i])]

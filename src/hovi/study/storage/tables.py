@@ -1,0 +1,217 @@
+"""The tables of a study: plans.parquet, runs.parquet and samples.parquet.
+
+plans.parquet has the cells in their order, whoever planned them and whenever: equal plans give
+equal bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.errors import StudyError
+from hovi.study.cells.cells import Cells
+from hovi.study.cells.parameters import Parameter, parameters_of
+from hovi.study.storage.index import Index
+from hovi.study.storage.samples import Samples
+from hovi.system.files import names_file, reason, whole_file
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+PLANS, RUNS, SAMPLES = "plans.parquet", "runs.parquet", "samples.parquet"
+ROWS = 5_000
+"""Rows of a row group of plans.parquet and runs.parquet, which are in memory at once."""
+SAMPLED_PLANS = 500
+"""Plans whose samples are a row group."""
+Keys = npt.NDArray[np.bytes_]
+
+
+def write_tables(folder: Path, cells: Cells, keys: Keys, index: Index, samples: int) -> None:
+    """Write the tables, each as a whole.
+
+    keys: of the cells, empty where they are not known yet. samples: of each motion, 0 for none.
+    Raises StudyError if they cannot be written.
+    """
+    for number in np.flatnonzero(keys == b""):
+        keys[number] = cells.key(int(number)).encode()
+    _write(folder / PLANS, plan_schema(cells), _plan_rows(cells, keys, index))
+    _write(folder / RUNS, _run_schema(), _run_rows(index))
+    if samples:
+        _write(folder / SAMPLES, _sample_schema(), _sample_rows(folder, keys, index))
+
+
+def read_table(path: Path) -> pa.Table:
+    """A table of a study. Raises StudyError."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not names_file(path):
+        raise StudyError(f"there is no {path.name} in {path.parent}: run the study first.")
+    try:
+        return pq.read_table(path)
+    except (pa.ArrowException, OSError, ValueError) as damaged:
+        raise StudyError(f"{path} cannot be read: {damaged}.") from None
+
+
+def plan_schema(cells: Cells) -> pa.Schema:
+    """The columns of plans.parquet."""
+    import pyarrow as pa
+
+    numbers = pa.list_(pa.float64())
+    kinds = {
+        "number": pa.float64(),
+        "whole": pa.int64(),
+        "truth": pa.bool_(),
+        "text": pa.string(),
+        "json": pa.string(),
+    }
+    parameters = [pa.field(each.name, kinds[each.kind]) for each in parameters_of(cells.axes)]
+    return pa.schema(
+        [
+            pa.field("cell", pa.int64()),
+            pa.field("key", pa.string()),
+            *parameters,
+            pa.field("status", pa.string()),
+            pa.field("success", pa.bool_()),
+            pa.field("reason", pa.string()),
+            pa.field("warnings", pa.string()),
+            *(pa.field(name, pa.float64()) for name in ("cost", "effort", "error_estimate")),
+            *(pa.field(name, pa.int64()) for name in ("nit", "n_neg")),
+            pa.field("motion_duration", pa.float64()),
+            pa.field("motion_intervals", pa.int64()),
+            *(pa.field(name, numbers) for name in ("peak_v", "peak_a", "peak_tau")),
+            *(pa.field(name, pa.float64()) for name in ("margin", "least_distance")),
+            *(pa.field(name, numbers) for name in ("q_start", "q_goal")),
+            pa.field("reproducible", pa.bool_()),
+            pa.field("parent", pa.string()),
+            pa.field("scene", pa.string()),
+            pa.field("version", pa.string()),
+        ]
+    )
+
+
+def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[list[dict[str, Any]]]:
+    """The rows of what is done, in the order of the cells, in groups."""
+    parameters = parameters_of(cells.axes)
+    rows: list[dict[str, Any]] = []
+    for number, key in enumerate(keys):
+        done = index.done(key.decode())
+        if done is None:
+            continue
+        row = done.row.to_dict()
+        row["motion_duration"] = row.pop("duration")
+        row["motion_intervals"] = row.pop("intervals")
+        parent = cells.parent(number)
+        own = {
+            "cell": number,
+            "key": key.decode(),
+            "parent": None if parent is None else keys[parent].decode(),
+            "scene": cells.template.hash,
+        }
+        rows.append(row | own | _parameters(cells, number, parameters))
+        if len(rows) == ROWS:
+            yield rows
+            rows = []
+    yield rows
+
+
+def _parameters(cells: Cells, number: int, columns: tuple[Parameter, ...]) -> dict[str, Any]:
+    values = dict(cells.values(number))
+    return {column.name: column.of(values[column.field]) for column in columns}
+
+
+def _run_schema() -> pa.Schema:
+    import pyarrow as pa
+
+    return pa.schema(
+        [
+            pa.field("key", pa.string()),
+            pa.field("attempt", pa.int64()),
+            pa.field("outcome", pa.string()),
+            pa.field("began", pa.timestamp("us", tz="UTC")),
+            pa.field("seconds", pa.float64()),
+            pa.field("processor_seconds", pa.float64()),
+            pa.field("host", pa.string()),
+            pa.field("process", pa.int64()),
+            pa.field("version", pa.string()),
+        ]
+    )
+
+
+def _run_rows(index: Index) -> Iterator[list[dict[str, Any]]]:
+    from datetime import datetime
+
+    rows: list[dict[str, Any]] = []
+    for run in index.runs():
+        began = run.get("began")
+        rows.append(run | {"began": None if began is None else datetime.fromisoformat(began)})
+        if len(rows) == ROWS:
+            yield rows
+            rows = []
+    yield rows
+
+
+def _sample_schema() -> pa.Schema:
+    import pyarrow as pa
+
+    names = ("q", "v", "a", "tau")
+    lists = [pa.field(name, pa.list_(pa.float64())) for name in names]
+    return pa.schema(
+        [
+            pa.field("cell", pa.int64()),
+            pa.field("key", pa.string()),
+            pa.field("t", pa.float64()),
+            *lists,
+        ]
+    )
+
+
+def _sample_rows(folder: Path, keys: Keys, index: Index) -> Iterator[list[dict[str, Any]]]:
+    """A row for each time of each minimum."""
+    rows: list[dict[str, Any]] = []
+    plans = 0
+    for number, key in enumerate(keys):
+        done = index.done(key.decode())
+        if done is None or done.samples is None or not done.row.success:
+            continue
+        sampled = Samples.from_bytes(done.samples.read(folder))
+        columns = [x.tolist() for x in (sampled.t, sampled.q, sampled.v, sampled.a, sampled.tau)]
+        names = ("t", "q", "v", "a", "tau")
+        for values in zip(*columns, strict=True):
+            rows.append(
+                {"cell": number, "key": key.decode(), **dict(zip(names, values, strict=True))}
+            )
+        plans += 1
+        if plans % SAMPLED_PLANS == 0:
+            yield rows
+            rows = []
+    yield rows
+
+
+def _write(path: Path, schema: pa.Schema, groups: Iterator[list[dict[str, Any]]]) -> None:
+    """Write a table of groups of rows."""
+    import pyarrow as pa
+
+    with _table_writer(path, schema) as writer:
+        for rows in groups:
+            if rows:
+                writer.write_table(pa.Table.from_pylist(rows, schema), row_group_size=len(rows))
+
+
+@contextmanager
+def _table_writer(path: Path, schema: pa.Schema) -> Iterator[Any]:
+    import pyarrow.parquet as pq
+
+    try:
+        with whole_file(path) as stream, pq.ParquetWriter(stream, schema, compression="zstd") as to:
+            yield to
+    except OSError as refused:
+        raise StudyError(
+            f"{path} cannot be written: {reason(refused)}; make room and start the study again."
+        ) from None

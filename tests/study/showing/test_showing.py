@@ -1,0 +1,124 @@
+"""What a study shows: the command line, summaries, pictures and the page of the worst motions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hovi.cli.application import main
+from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
+from hovi.study.showing.plans import Plans
+from hovi.study.showing.summary import summary
+from hovi.study.showing.worst_page import write_worst
+from hovi.study.study import Study
+
+pytest.importorskip("pyarrow")
+pytest.importorskip("pandas")
+
+STUDY = """
+scene = "two_link_reach"
+
+[[vary]]
+field = "goal.q[0]"
+grid = { lower = 0.0, upper = 0.6, count = 3 }
+
+[[vary]]
+field = "goal.q[1]"
+grid = { lower = 0.2, upper = 0.8, count = 3 }
+
+[[vary]]
+field = "limits"
+values = ["none", { base = "none", tau = 0.5 }]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    at = tmp_path_factory.mktemp("shown")
+    (at / "study.toml").write_text(STUDY)
+    code = main(["study", str(at / "study.toml"), "--out", str(at / "out"), "--workers", "1"])
+    assert code == 0
+    return at / "out"
+
+
+def test_the_command_tells_failures_and_resumes(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["study", "run", str(folder.parent / "study.toml"), "--out", str(folder)]
+    assert main(command) == 0
+    told = capsys.readouterr()
+    assert "18 of 18 done, 0 of them now" in told.out
+    assert main([*command[:-1], str(folder.parent / "again")]) == 0
+    told = capsys.readouterr()
+    assert "failed   9 infeasible" in told.out
+    lines = [line for line in told.err.splitlines() if line.startswith("cell")]
+    assert len(lines) == 9
+    assert all(", infeasible: " in line for line in lines)
+
+
+def test_the_summary_is_that_of_the_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows, found = Study.load(folder), summary(Plans.read(folder))
+    minima = rows[rows["success"]]
+    assert found["status"] == {"minimum": 9, "infeasible": 9}
+    assert found["quantiles"]["cost"] == pytest.approx(
+        np.quantile(minima["cost"], [0, 0.25, 0.5, 0.75, 1])
+    )
+    assert [each["cell"] for each in found["worst"]] == minima.sort_values("cost", ascending=False)[
+        "cell"
+    ].tolist()
+    assert main(["study", "show", str(folder), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == found
+
+
+def test_pictures_and_a_motion_are_written(folder: Path, tmp_path: Path) -> None:
+    names = [tmp_path / name for name in ("h.png", "m.svg", "a.png", "m.npz")]
+    show = ["study", "show", str(folder), "--value", "nit"]
+    assert main([*show, "--histograms", str(names[0]), "--map", str(names[1])]) == 0
+    assert main([*show, "--against", "goal.q[1]", "--map", str(names[2])]) == 0
+    assert main(["study", "motion", str(folder), "0", "--out", str(names[3])]) == 0
+    assert all(path.stat().st_size > 5_000 for path in names)
+    assert "infeasible" not in names[1].read_text()  # where another plan of a place is a minimum
+
+
+def test_of_plans_at_one_place_the_map_has_the_best(folder: Path, tmp_path: Path) -> None:
+    plans = Plans.read(folder)
+    assert plans.varying == ("goal.q[0]", "goal.q[1]")
+    draw_map(plans, tmp_path / "map.svg")
+    draw_histograms(plans, tmp_path / "h.pdf")
+    draw_against(plans, "goal.q[0]", tmp_path / "a.svg")
+
+
+def test_the_page_of_the_worst_motions_has_a_replay_of_each(folder: Path, tmp_path: Path) -> None:
+    page = tmp_path / "worst.html"
+    assert write_worst(Plans.read(folder), page, count=2) == 2
+    text = page.read_text()
+    assert text.count("<iframe") == 2
+    worst = Plans.read(folder).worst(1)[0]
+    assert f"cell {Study.load(folder)['cell'][worst]}:" in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["show", "missing"], "there is no plans.parquet in missing"),
+        (["show", "FOLDER", "--map", "a.png", "--value", "cots"], "did you mean 'cost'?"),
+        (["show", "FOLDER", "--map", "a.png", "--value", "status"], "has no numbers"),
+        (["show", "FOLDER", "--map", "a.png", "--over", "cost"], "two parameters"),
+        (["show", "FOLDER", "--map", "a.txt"], "must end in .png"),
+        (["motion", "FOLDER", "99", "--out", "a.npz"], "no plan of cell 99"),
+        (["missing.toml", "--out", "FOLDER"], "missing.toml."),
+        (["STUDY", "--out", "FOLDER", "--workers", "0"], "workers must be from 1"),
+        (["STUDY", "--out", "FOLDER", "--scheduler", "x"], "scheduler must be"),
+    ],
+)
+def test_bad_input_is_one_sentence(
+    folder: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], what: str
+) -> None:
+    places = {"FOLDER": str(folder), "STUDY": str(folder.parent / "study.toml")}
+    assert main(["study", *(places.get(each, each) for each in arguments)]) == 2
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert error.startswith("error: ")
+    assert what in error
