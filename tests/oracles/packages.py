@@ -32,7 +32,7 @@ FLOORS = [
 INSIDE = {
     "robot": [{"space", "urdf"}, {""}],
     "effects": [{"expressions"}, {""}],
-    "discrete": [{""}, {"measures"}],
+    "discrete": [{"output"}, {""}, {"measures"}],
     "flows": [{""}, {"execution"}],
     "planning": [
         {"obstacles"},
