@@ -18,6 +18,7 @@ from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
+from hovi.discrete.output.export_methods import ExportMethods
 from hovi.discrete.output.interpolant import interpolant_rows
 from hovi.discrete.output.path_sampler import PathSampler
 from hovi.discrete.stored_torque import StoredTorque
@@ -63,7 +64,7 @@ class Sample(NamedTuple):
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(ExportMethods):
     """A motion of a scene's robot on a grid, with its costates.
 
     grid: the intervals, each with its step and scheme.

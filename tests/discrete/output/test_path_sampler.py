@@ -99,7 +99,7 @@ def scenes_of_all_kinds() -> dict[str, hovi.Scene]:
     load = hovi.load_robot
     return {
         "friction": hovi.Scene(load("ur5"), [gravity, hovi.effects.ViscousFriction(0.3)]),
-        "mimic joints": hovi.Scene(load("panda"), [gravity]),
+        "mimic joints": hovi.Scene(load("panda", mimic=True), [gravity]),
         "moving base": hovi.Scene(load(hovi.example("two_link.urdf")), [gravity, base]),
         "continuous joints": hovi.Scene(load("kinova"), [gravity]),
         "free flyer": hovi.Scene(load(hovi.example("two_link.urdf"), free_flyer=True)),
