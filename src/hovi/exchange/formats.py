@@ -56,6 +56,7 @@ FORMATS = (
         100.0,
         f"{_EXCHANGE}.joint_trajectory:write_joint_trajectory",
     ),
+    ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
     ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
 )
 

@@ -38,6 +38,10 @@ class ExportMethods:
         """
         _export(self, path, "joint-trajectory", rate, **({"efforts": True} if efforts else {}))
 
+    def to_mcap(self, path: Path, rate: float | None = None) -> None:
+        """Write an MCAP file of ROS 2 messages: joint states, efforts, TF and the URDF."""
+        _export(self, path, "mcap", rate)
+
 
 def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
     """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
