@@ -57,6 +57,7 @@ FORMATS = (
         f"{_EXCHANGE}.joint_trajectory:write_joint_trajectory",
     ),
     ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
+    ExportFormat("mujoco", (".xml",), 50.0, f"{_EXCHANGE}.mujoco_keyframes:write_mujoco"),
     ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
 )
 

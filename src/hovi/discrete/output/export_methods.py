@@ -42,6 +42,10 @@ class ExportMethods:
         """Write an MCAP file of ROS 2 messages: joint states, efforts, TF and the URDF."""
         _export(self, path, "mcap", rate)
 
+    def to_mujoco(self, path: Path, rate: float | None = None) -> None:
+        """Write a MuJoCo model with a keyframe of positions, velocities and controls a sample."""
+        _export(self, path, "mujoco", rate)
+
 
 def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
     """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
