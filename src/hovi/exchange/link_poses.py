@@ -66,11 +66,15 @@ def _parents(robot: Robot) -> dict[str, str]:
     }
 
 
-def link_poses(robot: Robot, links: tuple[Link, ...], q: Array) -> Array:
-    """(x, y, z, qx, qy, qz, qw) of each link in its parent, at q (M, nq), shape (M, links, 7)."""
+def link_poses(robot: Robot, links: tuple[Link, ...], q: Array, in_world: bool = False) -> Array:
+    """(x, y, z, qx, qy, qz, qw) of each link, at q (M, nq), shape (M, links, 7).
+
+    in_world: in the world, instead of in the link that it hangs on.
+    """
     data, poses = robot.model.createData(), np.empty((len(q), len(links), 7))
     for m, configuration in enumerate(q):
         pin.framesForwardKinematics(robot.model, data, configuration)
         for i, link in enumerate(links):
-            poses[m, i] = pin.SE3ToXYZQUAT(data.oMf[link.above].actInv(data.oMf[link.frame]))
+            pose = data.oMf[link.frame]
+            poses[m, i] = pin.SE3ToXYZQUAT(pose if in_world else data.oMf[link.above].actInv(pose))
     return poses

@@ -46,6 +46,10 @@ class ExportMethods:
         """Write a MuJoCo model with a keyframe of positions, velocities and controls a sample."""
         _export(self, path, "mujoco", rate)
 
+    def to_rerun(self, path: Path, rate: float | None = None) -> None:
+        """Write a recording of the Rerun viewer: curves of the joints and the moving robot."""
+        _export(self, path, "rerun", rate)
+
 
 def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
     """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
