@@ -45,6 +45,7 @@ INSIDE = {
         {"task_file"},
     ],
     "accuracy": [{""}, {"effect_study", "peers"}],
+    "exchange": [{""}, {"film"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }
 

@@ -59,6 +59,8 @@ FORMATS = (
     ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
     ExportFormat("mujoco", (".xml",), 50.0, f"{_EXCHANGE}.mujoco_keyframes:write_mujoco"),
     ExportFormat("rerun", (".rrd",), 100.0, f"{_EXCHANGE}.rerun_recording:write_rerun"),
+    ExportFormat("video", (".mp4",), 30.0, f"{_EXCHANGE}.film.film:write_video"),
+    ExportFormat("gif", (".gif",), 15.0, f"{_EXCHANGE}.film.film:write_gif"),
     ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
 )
 

@@ -29,7 +29,7 @@ def export(
 ) -> None:
     """Export a motion for other programs.
 
-    Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun.
+    Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
     """
     from hovi.cli.arguments.files import check_output, load_trajectory
     from hovi.exchange.formats import export_format

@@ -50,6 +50,14 @@ class ExportMethods:
         """Write a recording of the Rerun viewer: curves of the joints and the moving robot."""
         _export(self, path, "rerun", rate)
 
+    def to_video(self, path: Path, rate: float | None = None) -> None:
+        """Write an MP4 video of the replay."""
+        _export(self, path, "video", rate)
+
+    def to_gif(self, path: Path, rate: float | None = None) -> None:
+        """Write a GIF of the replay."""
+        _export(self, path, "gif", rate)
+
 
 def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
     """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
