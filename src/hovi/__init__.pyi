@@ -15,6 +15,9 @@ from .discrete.state import Periodic as Periodic
 from .discrete.state import State as State
 from .discrete.trajectory import Trajectory as Trajectory
 from .errors import HoviError as HoviError
+from .exchange.formats import export as export
+from .exchange.mujoco_check import MujocoReplay as MujocoReplay
+from .exchange.mujoco_check import replay_in_mujoco as replay_in_mujoco
 from .flows.charted_lagrangian import ChartedLagrangian as ChartedLagrangian
 from .flows.euler_lagrange import discrete_hamiltonian_flow as discrete_hamiltonian_flow
 from .flows.euler_lagrange import discrete_lagrangian_map as discrete_lagrangian_map

@@ -422,6 +422,28 @@ def test_an_export_format_is_given_by_name_or_option(
     assert target.read_text().startswith("t,q_")
 
 
+def test_every_format_has_a_file_name_of_its_own(run: Run, motion: Path, tmp_path: Path) -> None:
+    saved = tmp_path / "reach.npz"
+    saved.write_bytes(motion.read_bytes())
+    for name, target in (("numpy", "reach_samples.npz"), ("joint-trajectory", "reach.yaml")):
+        code, out, _ = run("export", saved, "--format", name)
+        assert code == 0
+        assert str(tmp_path / target) in out
+    assert saved.read_bytes() == motion.read_bytes()
+    refused = run("export", saved, "--format", "numpy", "--out", saved)
+    assert_refused(refused, "the motion itself")
+
+
+def test_a_motion_is_checked_in_mujoco(run: Run, motion: Path) -> None:
+    assert_refused(run("check", motion, "--in", "mujko"), "'mujko'", "'mujoco'")
+    pytest.importorskip("mujoco")
+    code, out, _ = run("check", motion, "--in", "mujoco", "--json")
+    report = only_object(out)
+    assert (code, report["success"]) == (0, True)
+    assert max(report["error"].values()) < 1e-3
+    assert "follows the plan" in run("check", motion)[1]
+
+
 def test_plot_writes_a_figure(run: Run, motion: Path, tmp_path: Path) -> None:
     code, out, _ = run("plot", motion, "--out", tmp_path)
     assert code == 0

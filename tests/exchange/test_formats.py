@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +12,33 @@ import hovi
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, InputError
 from hovi.exchange.formats import FORMATS, ExportFormat, export_format
+from hovi.exchange.libraries import library
+from samples.cubic_motion import cubic_motion
 
 each_format = pytest.mark.parametrize("chosen", FORMATS, ids=lambda each: each.name)
+FILM = ("video", "gif")
+MODULES = {
+    "parquet": "pyarrow",
+    "mcap": "mcap",
+    "rerun": "rerun",
+    "video": "imageio_ffmpeg",
+    "gif": "PIL",
+}
 
 
 @pytest.fixture(scope="module")
 def motion(arm_scene: hovi.Scene) -> Trajectory:
-    return hovi.plan(arm_scene, [-np.pi / 2, 0.0], [0.3, 0.7], 1.0, limits="none").trajectory
+    return cubic_motion(arm_scene, duration=0.4, schemes=["galerkin-2"] * 3)[0]
+
+
+def require_library(chosen: ExportFormat) -> None:
+    if chosen.name in MODULES:
+        pytest.importorskip(MODULES[chosen.name])
 
 
 def test_names_and_suffixes_are_distinct() -> None:
-    assert len({each.name for each in FORMATS}) == len({each.suffix for each in FORMATS})
+    suffixes = [suffix for each in FORMATS for suffix in each.suffixes]
+    assert len(set(suffixes)) == len(suffixes)
     assert len({each.name for each in FORMATS}) == len(FORMATS)
 
 
@@ -31,18 +48,27 @@ def test_a_format_is_found_by_its_name(chosen: ExportFormat) -> None:
 
 
 @each_format
-def test_a_motion_is_written(chosen: ExportFormat, motion: Trajectory, tmp_path: Path) -> None:
-    path = tmp_path / f"motion{chosen.suffix}"
-    chosen.write(motion, path, 100.0)
-    assert path.stat().st_size > 0
+def test_a_motion_has_a_method_for_every_format(
+    chosen: ExportFormat, motion: Trajectory, tmp_path: Path
+) -> None:
+    require_library(chosen)
+    if chosen.name in FILM:
+        assert hasattr(motion, f"to_{chosen.name}")  # filmed by the tests of films
+        return
+    for suffix in chosen.suffixes:
+        path = tmp_path / f"motion{suffix}"
+        getattr(motion, f"to_{chosen.name.replace('-', '_')}")(path, 20.0)
+        again = tmp_path / f"again{suffix}"
+        hovi.export(motion, again, rate=20.0)
+        assert path.stat().st_size == pytest.approx(again.stat().st_size, rel=0.02)
 
 
 @each_format
-@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan])
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf, 1e300])
 def test_an_invalid_rate_raises_and_writes_nothing(
     chosen: ExportFormat, rate: float, motion: Trajectory, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match="positive number of samples per second"):
+    with pytest.raises(InputError, match=r"positive number of samples per second|choose a lower"):
         chosen.write(motion, tmp_path / f"motion{chosen.suffix}", rate)
     assert not list(tmp_path.iterdir())
 
@@ -51,10 +77,27 @@ def test_an_invalid_rate_raises_and_writes_nothing(
 def test_an_unwritable_path_raises(
     chosen: ExportFormat, motion: Trajectory, tmp_path: Path
 ) -> None:
+    require_library(chosen)
     with pytest.raises(DisplayError, match="cannot write"):
-        chosen.write(motion, tmp_path / "no" / f"motion{chosen.suffix}", 100.0)
+        chosen.write(motion, tmp_path / "no" / f"motion{chosen.suffix}", 10.0)
 
 
-def test_an_unknown_format_raises_with_a_suggestion() -> None:
+def test_an_unknown_format_raises_with_a_suggestion(motion: Trajectory, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no export format 'cvs': did you mean 'csv'"):
         export_format("cvs")
+    with pytest.raises(InputError, match=r"extension of no export format: did you mean '\.csv'"):
+        hovi.export(motion, tmp_path / "motion.cvs")
+    with pytest.raises(InputError, match=r"must end in \.yaml or \.yml or \.json, not 'm\.csv'"):
+        hovi.export(motion, tmp_path / "m.csv", "joint-trajectory")
+    with pytest.raises(InputError, match="`efforts` is for the format 'joint-trajectory'"):
+        hovi.export(motion, tmp_path / "m.csv", efforts=True)
+
+
+def test_a_missing_library_is_named_with_the_command_that_installs_it(
+    motion: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(DisplayError, match=r"needs the package pyarrow: run pip install 'hovi\[ex"):
+        hovi.export(motion, tmp_path / "motion.parquet")
+    assert not list(tmp_path.iterdir())
+    assert library("json", "json", "this").loads("1") == 1

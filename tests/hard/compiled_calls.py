@@ -317,6 +317,67 @@ def _tree_fits(arguments: Arguments, sizes: Sizes) -> bool:
     return placed and ordered and based and 0 <= nq <= 2 * n
 
 
+_SAMPLED = {
+    **{"q": _in("N+1 n"), "v": _in("N+1 n"), "higher": _in("N+1 e n"), "z": _in("N k n")},
+    **{"inner": _in("N r n"), "times": _in("N+1"), "steps": _in("N"), "series": _in("d 3 k+r")},
+    **{"used": _in("N", "int64"), "ends": _in("s", "int64")},
+}
+
+
+@cache
+def arm_kernel() -> dynamics.InverseDynamicsKernel:
+    """Of a UR5."""
+    return read_joint_tree(load_robot("ur5").model).compiled()
+
+
+def _sampler_values(arguments: Arguments, sizes: Sizes) -> None:
+    """Two segments, where there are as many intervals."""
+    N, segments = sizes["N"], min(2, sizes["N"])
+    arguments["higher"] = np.zeros((N + 1, max(0, sizes["k"] - 2), sizes["n"]))
+    arguments["ends"] = np.arange(N - segments + 1, N + 1)
+    arguments["kernels"] = [arm_kernel()] * segments
+
+
+def _sampler_fits(arguments: Arguments, sizes: Sizes) -> bool:
+    ends, kernels = arguments["ends"].tolist(), arguments["kernels"]
+    whole = not ends or (ends == sorted(set(ends)) and ends[0] > 0 and ends[-1] == sizes["N"])
+    used = all(0 <= modes <= sizes["r"] for modes in arguments["used"].tolist())
+    derivatives = 1 <= sizes["k"] <= 20 and sizes["e"] == max(0, sizes["k"] - 2)
+    known = len(ends) == len(kernels) and (not kernels or sizes["n"] == 6)
+    return sizes["N"] > 0 and whole and used and derivatives and known and sizes["d"] <= 4096
+
+
+@cache
+def sampler() -> dynamics.PathSampler:
+    """Of three intervals of 1 s on a UR5."""
+    numbers = np.random.default_rng(0).uniform(-1.0, 1.0, 600)
+    shapes = {"q": (4, 6), "v": (4, 6), "z": (3, 2, 6), "inner": (3, 1, 6), "series": (5, 3, 3)}
+    arrays = {name: np.resize(numbers, shape) for name, shape in shapes.items()}
+    return dynamics.PathSampler(
+        **arrays,
+        higher=np.zeros((4, 0, 6)),
+        times=np.arange(4.0),
+        steps=np.ones(3),
+        used=np.array([1, 0, 1]),
+        kernels=[arm_kernel()],
+        ends=np.array([3]),
+    )
+
+
+_SLACK = 7 * 2.0**-52 * 3.0
+
+
+def _times_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    t = arguments["t"]
+    return bool(((t >= -_SLACK) & (t <= 3.0 + _SLACK)).all())
+
+
+def _positions_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    k, s = arguments["intervals"], arguments["positions"]
+    inside = ((k >= 0) & (k < 3) & (s >= 0) & (s <= 1)).all()
+    return sizes["n"] == 6 and bool(inside)
+
+
 # Kinematics
 
 MAX_SEEDS = 100_000
@@ -702,6 +763,30 @@ ENTRIES: dict[str, Entry] = {
         fits=lambda arguments, sizes: (
             _keeps_a_share(arguments, sizes) and arguments["mu"] >= 0 and arguments["ratio"] >= 1
         ),
+    ),
+    "sampling.PathSampler": Entry(
+        dynamics.PathSampler,
+        _SAMPLED,
+        {"kernels": []},
+        letters={"N": (1, 4), "n": (6, 6), "k": (1, 4), "r": (1, 3)},
+        values=_sampler_values,
+        fits=_sampler_fits,
+    ),
+    "sampling.sample": Entry(
+        lambda **arguments: sampler().sample(**arguments),
+        {
+            **{"intervals": _in("M", "int64"), "positions": _in("M")},
+            **{"q": _out("M n"), "v": _out("M n"), "a": _out("M n"), "tau": _out("M n")},
+        },
+        optional=("tau",),
+        letters={"n": (6, 6), "M": (0, 9)},
+        fits=_positions_fit,
+    ),
+    "sampling.locate": Entry(
+        lambda **arguments: sampler().locate(**arguments),
+        {"t": _in("M"), "intervals": Kind("M", "int64", output=True), "positions": _out("M")},
+        letters={"M": (0, 9)},
+        fits=_times_fit,
     ),
     "dynamics.torque": Entry(
         lambda **arguments: kernel().torque(**arguments),

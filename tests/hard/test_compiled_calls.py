@@ -114,7 +114,11 @@ def test_every_compiled_function_is_among_the_entries() -> None:
         for name in dir(module)
         if callable(getattr(module, name)) and not name.startswith("_")
     }
-    classes = {"dynamics": dynamics.InverseDynamicsKernel, "distances": distances.PairDistances}
+    classes = {
+        "dynamics": dynamics.InverseDynamicsKernel,
+        "sampling": dynamics.PathSampler,
+        "distances": distances.PairDistances,
+    }
     methods = {
         f"{module}.{name}"
         for module, each in classes.items()

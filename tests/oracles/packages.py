@@ -30,9 +30,9 @@ FLOORS = [
 ]
 # The folders inside a package, in the same order; "" stands for the files of the package itself.
 INSIDE = {
-    "robot": [{"space", "urdf"}, {""}],
+    "robot": [{"formats", "space", "urdf"}, {""}],
     "effects": [{"expressions"}, {""}],
-    "discrete": [{""}, {"measures"}],
+    "discrete": [{"output"}, {""}, {"measures"}],
     "flows": [{""}, {"execution"}],
     "planning": [
         {"obstacles"},
@@ -47,6 +47,7 @@ INSIDE = {
     ],
     "accuracy": [{""}, {"effect_study", "peers"}],
     "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {""}, {"showing"}],
+    "exchange": [{""}, {"film"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }
 

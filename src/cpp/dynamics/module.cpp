@@ -7,6 +7,7 @@
 
 #include "inverse_dynamics_kernel.hpp"
 #include "joint_arrays.hpp"
+#include "sampling/binding.hpp"
 #include "simd/arrays.hpp"
 
 namespace nb = nanobind;
@@ -92,4 +93,6 @@ NB_MODULE(dynamics, m) {
       .def("linearize", &linearize, "q"_a, "v"_a, "a"_a, "tau"_a, "jacobian"_a, "threads"_a)
       .def("expand", &expand, "q"_a, "v"_a, "a"_a, "weight"_a, "curvature"_a.none(), "tau"_a,
            "jacobian"_a, "hessian"_a, "threads"_a);
+
+  hovi::sampling::bind(m);
 }

@@ -1,3 +1,5 @@
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -44,6 +46,32 @@ class InverseDynamicsKernel:
         jacobian: Array,
         hessian: Array,
         threads: int,
+    ) -> None: ...
+
+class PathSampler:
+    def __init__(
+        self,
+        q: Array,
+        v: Array,
+        higher: Array,
+        z: Array,
+        inner: Array,
+        times: Array,
+        steps: Array,
+        series: Array,
+        used: Index,
+        kernels: Sequence[InverseDynamicsKernel],
+        ends: Index,
+    ) -> None: ...
+    def locate(self, t: Array, intervals: Index, positions: Array) -> None: ...
+    def sample(
+        self,
+        intervals: Index,
+        positions: Array,
+        q: Array,
+        v: Array,
+        a: Array,
+        tau: Array | None,
     ) -> None: ...
 
 def ignore_leaks() -> None: ...

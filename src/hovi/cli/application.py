@@ -14,6 +14,7 @@ import typer
 from typer.exceptions import TyperException
 
 from hovi.cli.commands import accuracy as accuracy_command
+from hovi.cli.commands import check as check_command
 from hovi.cli.commands import effects as effects_command
 from hovi.cli.commands import export as export_command
 from hovi.cli.commands import info as info_command
@@ -67,6 +68,7 @@ app.add_typer(study_command.app, name="study")
 app.command("replay")(replay_command.replay)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)
+app.command("check")(check_command.check)
 app.command("schema")(schema_command.schema)
 app.command("info")(info_command.info)
 

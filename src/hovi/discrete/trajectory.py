@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib.metadata
 import io
 import itertools
-import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -22,13 +19,18 @@ from hovi.checks.shapes import numbers_of, require_shape
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import scaled_data
 from hovi.discrete.node_continuity import require_continuous
+from hovi.discrete.output.export_methods import ExportMethods
+from hovi.discrete.output.interpolant import interpolant_rows
+from hovi.discrete.output.path_sampler import PathSampler
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory_file import (
+    digest,
     read_arrays,
     require_known_name,
     require_names,
     require_unchanged,
     schemes_of,
+    versions,
     write_arrays,
 )
 from hovi.errors import HoviError, InputError, TrajectoryFileError
@@ -37,8 +39,6 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.scene import Scene
 from hovi.scene.segment_scenes import SegmentScenes
-from hovi.schemes import Scheme
-from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -46,8 +46,6 @@ Index = npt.NDArray[np.intp]
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
 _PATH = ("q", "v", "z", "inner", "higher")
 _TORQUE, _HIGHER = "tau", "higher"
-FEW_SAMPLES = 64
-"""Number of samples up to which repeated positions are not looked for."""
 
 
 class Sample(NamedTuple):
@@ -67,7 +65,7 @@ class Sample(NamedTuple):
 
 @check_arguments
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(ExportMethods):
     """A motion of a scene's robot on a grid, with its costates.
 
     grid: the intervals, each with its step and scheme.
@@ -143,11 +141,13 @@ class Trajectory:
             torques jump at a node, the limit from the right is returned; at T, from the left.
         Raises InputError for a time outside the motion.
         """
-        return self.sample_intervals(*self._locate(t))
+        found = None if self._sampler is None else self._sampler.at_times(t)
+        return self._sampled(*self._locate(t)) if found is None else self._complete(*found)
 
     def configurations(self, t: npt.ArrayLike) -> Array:
         """q of `sample`, shape (M, nq), without computing torques."""
-        return self._interpolate(*self._locate(t), 0)[0]
+        found = None if self._curve is None else self._curve.at_times(t)
+        return self._interpolate(*self._locate(t), 0)[0] if found is None else found[2]
 
     def jet(self, t: npt.ArrayLike, order: int = 2) -> tuple[Array, ...]:
         """(q, v, a) of `sample`, without computing torques.
@@ -167,9 +167,17 @@ class Trajectory:
 
         k: interval numbers, shape (M,). s: positions in [0, 1] in the interval, shape (M,).
         """
-        k, s = self._checked(k, s)
-        q, v, a = self._interpolate(k, s, 2)
-        return Sample(q, v, a, self.torques(k, s, (q, v, a)))
+        return self._sampled(*self._checked(k, s))
+
+    def _sampled(self, k: Index, s: Array) -> Sample:
+        if self._sampler is not None:
+            return self._complete(*self._sampler.in_intervals(k, s))
+        return self._complete(k, s, *self._interpolate(k, s, 2))
+
+    def _complete(
+        self, k: Index, s: Array, q: Array, v: Array, a: Array, tau: Array | None = None
+    ) -> Sample:
+        return Sample(q, v, a, self.torques(k, s, (q, v, a)) if tau is None else tau)
 
     def torques(self, k: Index, s: Array, jet: tuple[Array, Array, Array]) -> Array:
         """tau in given intervals where (q, v, a) is known, shape (M, nv), in [N m] or [N].
@@ -183,6 +191,28 @@ class Trajectory:
             return self.segments.inverse_dynamics(k, jet, t)
         assert self.scene is not None
         return self.scene.inverse_dynamics(*jet, t)
+
+    @cached_property
+    def _curve(self) -> PathSampler | None:
+        """Compiled samples of q, v and a; None on groups."""
+        grid = self.grid
+        path = vars(self.path), grid.t, grid.steps, grid.groups
+        return None if self.space is not None else PathSampler(*path)
+
+    @cached_property
+    def _sampler(self) -> PathSampler | None:
+        """The same with tau, where that is RNEA alone."""
+        scenes = [] if self.scene is None else [self.scene]
+        ends = [self.grid.intervals]
+        if self.segments is not None:
+            scenes, ends = list(self.segments.scenes), np.cumsum(self.segments.intervals).tolist()
+        if self._curve is None or self.torque is not None:
+            return self._curve
+        return self._curve.with_torques([scene.torques for scene in scenes], ends)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but the compiled samplers, which cannot be pickled."""
+        return {k: value for k, value in vars(self).items() if k not in ("_curve", "_sampler")}
 
     def _checked(self, k: npt.ArrayLike, s: npt.ArrayLike) -> tuple[Index, Array]:
         """Interval numbers and relative positions as arrays, (M,) each. Raises InputError."""
@@ -216,6 +246,8 @@ class Trajectory:
 
     def _interpolate(self, k: Index, s: Array, order: int) -> tuple[Array, ...]:
         """(q, v, ..., q^(order)), each (M, n): rows(s) @ (h v0, Z, c) in the interval's chart."""
+        if self._curve is not None and 0 <= order <= 2:
+            return self._curve.in_intervals(k, s)[2 : order + 3]  # type: ignore[return-value]
         most = max(2 if self.space is not None else 3, self.grid.order)
         if not 0 <= order <= most:
             raise InputError(f"this motion has derivatives up to {most}, not {order}.")
@@ -225,7 +257,7 @@ class Trajectory:
         for scheme, members in self.grid.groups:
             here = np.isin(k, members)
             data = scaled_data(path, k[here], h[here], scheme.inner_modes)
-            scaled[here] = _rows(scheme, s[here], top) @ data
+            scaled[here] = interpolant_rows(scheme, s[here], top) @ data
         x, *rates = (scaled[:, j] / h**j for j in range(top + 1))
         if self.space is None:
             return (path.q[k] + x, *rates)[: order + 1]
@@ -252,7 +284,7 @@ class Trajectory:
         }
         if self.path.higher.size:
             arrays[_HIGHER] = self.path.higher
-        metadata = {"versions": _versions(), **self.metadata}
+        metadata = {"versions": dict(versions()), **self.metadata}
         scene, segments = None, {}
         if self.robot is not None and self.robot.source.kind != "model":
             scene = None if self.scene is None else self.scene.to_dict()
@@ -266,7 +298,7 @@ class Trajectory:
             "schemes": [[name, len(list(run))] for name, run in itertools.groupby(self._names())],
             "metadata": metadata,
             "scene": scene,
-            "scene_sha256": _digest(scene),
+            "scene_sha256": digest(scene),
             **segments,
         }
         write_arrays(path, header, arrays)
@@ -355,20 +387,6 @@ def _check_shapes(trajectory: Trajectory) -> None:
         raise InputError(f"nq is {nq} and nv is {nv}; the configuration space has {sizes}.")
 
 
-def _rows(scheme: Scheme, s: Array, top: int) -> Array:
-    """The interpolant of a scheme at s up to the derivative `top`, (M, top + 1, 2 k - 1 + r).
-
-    Samples of many intervals mostly have the same positions s, of which each is evaluated once.
-    """
-    if len(s) > FEW_SAMPLES:
-        known, index = np.unique(s, return_inverse=True)
-        if len(known) < len(s) / 2:
-            return _rows(scheme, known, top)[index]
-    if scheme.derivatives >= top:
-        return scheme.rows(s)
-    return jet_rows(s, scheme.derivatives, scheme.inner_modes, top)
-
-
 def _span(values: Array) -> str:
     return f"{values.min():g} to {values.max():g}" if values.size else "none"
 
@@ -376,23 +394,6 @@ def _span(values: Array) -> str:
 def _scene(description: Any, sha256: Any) -> Scene | None:
     if description is None:
         return None
-    if _digest(description) != sha256:
+    if digest(description) != sha256:
         raise InputError("its scene does not match the stored SHA-256")
     return Scene.from_dict(description)
-
-
-def _digest(description: Any) -> str:
-    """SHA-256 of a scene as canonical JSON, in hexadecimal."""
-    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()
-
-
-@cache
-def _versions() -> Mapping[str, str]:
-    """Versions of hovi and the libraries that computed the motion."""
-    versions = {}
-    for name in ("hovi", "pin", "casadi"):
-        try:
-            versions[name] = importlib.metadata.version(name)
-        except importlib.metadata.PackageNotFoundError:
-            versions[name] = "not installed"
-    return versions

@@ -10,6 +10,7 @@ or by hand; it is no signature.
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import io
 import json
 import math
@@ -17,6 +18,7 @@ import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -268,3 +270,20 @@ def _decode_doubles(raw: bytes, label: str) -> Array:
     if not np.isfinite(array).all():
         raise TrajectoryFileError(f"{label}: holds numbers that are not finite.")
     return array
+
+
+@cache
+def versions() -> Mapping[str, str]:
+    """Versions of hovi and the libraries that computed the motion."""
+    found = {}
+    for name in ("hovi", "pin", "casadi"):
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def digest(description: Any) -> str:
+    """SHA-256 of a scene as canonical JSON, in hexadecimal."""
+    return hashlib.sha256(json.dumps(description, sort_keys=True).encode()).hexdigest()

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi._native import dynamics as native
 from hovi.checks.shapes import numbers_of
 from hovi.dynamics.joint_tree import JointTree, read_joint_tree
 from hovi.errors import InputError, ModelError
@@ -69,6 +70,11 @@ class InverseDynamicsKernel:
         self._compiled = tree.compiled()
         self._nq = int(self._compiled.nq)
         self._n = int(self._compiled.n)
+
+    @property
+    def compiled(self) -> native.InverseDynamicsKernel:
+        """The compiled object, for other compiled code."""
+        return self._compiled
 
     @property
     def n(self) -> int:

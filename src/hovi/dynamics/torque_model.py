@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from hovi._native import dynamics as native
 from hovi.dynamics.inverse_dynamics_kernel import InverseDynamicsKernel
 from hovi.dynamics.mimic_kernel import MimicKernel
 from hovi.dynamics.point_function import PointFunction, default_threads
@@ -203,6 +204,12 @@ class SummedTorque:
         if self.added.has_curvature:
             hessian += self.added.curvature(q, v, a, t, curvature)
         return tau + more, J + dmore, hessian
+
+
+def compiled_rnea(model: TorqueModel) -> native.InverseDynamicsKernel | None:
+    """The compiled RNEA that all torques of a model come from; None where there is more to them."""
+    kernel = model.kernel if isinstance(model, AnalyticTorque) else None
+    return kernel.compiled if isinstance(kernel, InverseDynamicsKernel) else None
 
 
 def times(t: Array | None, points: int) -> Array:

@@ -2,31 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import importlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import InputError, nearest
-from hovi.viewing.csv_table import write_csv
+from hovi.errors import InputError, expect, nearest
 
 
 @dataclass(frozen=True)
 class ExportFormat:
     """A file format that other programs read.
 
-    name: on the command line. suffix: file name extension, such as ".csv".
-    write: takes the motion, the path and a rate in samples per second; writes the file completely
-        or not at all. Raises InputError for an invalid rate, DisplayError when the file cannot be
-        written.
+    name: on the command line. suffixes: file name extensions, the default one first.
+    rate: samples per second by default. writer: module and function that writes it, imported when
+        it is used.
     """
 
     name: str
-    suffix: str
-    write: Callable[[Trajectory, Path, float], None]
+    suffixes: tuple[str, ...]
+    rate: float
+    writer: str
+
+    @property
+    def suffix(self) -> str:
+        """The default extension."""
+        return self.suffixes[0]
+
+    def write(
+        self, trajectory: Trajectory, path: Path, rate: float | None = None, **options: Any
+    ) -> None:
+        """Write a motion, completely or not at all.
+
+        rate: samples per second; that of the format when None. options: of the writer.
+        Raises InputError for an invalid rate and for a motion that the format cannot hold,
+        DisplayError when the file cannot be written or an optional library is missing.
+        """
+        module, name = self.writer.split(":")
+        write = getattr(importlib.import_module(module), name)
+        write(trajectory, path, self.rate if rate is None else rate, **options)
 
 
-FORMATS = (ExportFormat("csv", ".csv", write_csv),)
+_EXCHANGE = "hovi.exchange"
+FORMATS = (
+    ExportFormat("csv", (".csv",), 1000.0, "hovi.viewing.csv_table:write_csv"),
+    ExportFormat("numpy", (".npz",), 1000.0, f"{_EXCHANGE}.numpy_archive:write_numpy"),
+    ExportFormat(
+        "joint-trajectory",
+        (".yaml", ".yml", ".json"),
+        100.0,
+        f"{_EXCHANGE}.joint_trajectory:write_joint_trajectory",
+    ),
+    ExportFormat("mcap", (".mcap",), 100.0, f"{_EXCHANGE}.mcap_bag:write_mcap"),
+    ExportFormat("mujoco", (".xml",), 50.0, f"{_EXCHANGE}.mujoco_keyframes:write_mujoco"),
+    ExportFormat("rerun", (".rrd",), 100.0, f"{_EXCHANGE}.rerun_recording:write_rerun"),
+    ExportFormat("video", (".mp4",), 30.0, f"{_EXCHANGE}.film.film:write_video"),
+    ExportFormat("gif", (".gif",), 15.0, f"{_EXCHANGE}.film.film:write_gif"),
+    ExportFormat("parquet", (".parquet",), 1000.0, f"{_EXCHANGE}.parquet_table:write_parquet"),
+)
 
 
 def export_format(name: str) -> ExportFormat:
@@ -35,3 +71,44 @@ def export_format(name: str) -> ExportFormat:
     if name not in by_name:
         raise InputError(f"there is no export format {name!r}: {nearest(name, by_name)}")
     return by_name[name]
+
+
+@check_arguments_except("trajectory")
+def export(
+    trajectory: Trajectory,
+    path: str | os.PathLike[str],
+    format: str | None = None,
+    rate: float | None = None,
+    *,
+    efforts: bool = False,
+) -> None:
+    """Write a motion in the file format of another program, completely or not at all.
+
+    path: the file. format: csv, numpy, joint-trajectory, parquet, mcap, mujoco, rerun, video or
+        gif; by the extension of the file when None.
+    rate: samples per second, or pictures of a film; that of the format when None.
+    efforts: fill in the field `effort` of a joint-trajectory.
+    Raises InputError for an unknown format or extension, an invalid rate and a motion that the
+    format cannot hold, DisplayError when the file cannot be written or an optional library is
+    missing.
+    """
+    expect(trajectory, Trajectory, "the trajectory of a solution")
+    suffix = Path(path).suffix.lower()
+    if format is None:
+        by_suffix = {each: chosen for chosen in FORMATS for each in chosen.suffixes}
+        if suffix not in by_suffix:
+            raise InputError(
+                f"the file {Path(path).name!r} has the extension of no export format: "
+                f"{nearest(suffix, by_suffix)}"
+            )
+        chosen = by_suffix[suffix]
+    else:
+        chosen = export_format(format)
+        if suffix not in chosen.suffixes:
+            raise InputError(
+                f"a file of the format {format!r} must end in {' or '.join(chosen.suffixes)}, not "
+                f"{Path(path).name!r}."
+            )
+    if efforts and chosen.name != "joint-trajectory":
+        raise InputError("`efforts` is for the format 'joint-trajectory'; the others have them.")
+    chosen.write(trajectory, Path(path), rate, **({"efforts": True} if efforts else {}))

@@ -13,6 +13,10 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.checks.kinds import is_number
 from hovi.errors import InputError, ModelError, expect
 from hovi.robot.example_robots import BUILT_IN_CODE, build_in_code, example_robot, rotor_armature
+from hovi.robot.formats.descriptions import description_of
+from hovi.robot.formats.mjcf import model_of_mjcf
+from hovi.robot.formats.recognized import format_of
+from hovi.robot.formats.xacro import urdf_of_xacro
 from hovi.robot.mimic_model import Coupling
 from hovi.robot.mimic_tags import held_values, read_couplings
 from hovi.robot.model import build_full_model, build_model, locked_model
@@ -27,7 +31,8 @@ Locked = tuple[str, ...] | Mapping[str, float]
 
 def is_path(text: str) -> bool:
     """Whether a string is a file path rather than the name of an example."""
-    return text.lower().endswith((".urdf", ".xml", ".xacro")) or "/" in text or "\\" in text
+    suffixes = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
+    return text.lower().endswith(suffixes) or "/" in text or "\\" in text
 
 
 def as_names(values: Iterable[Any]) -> tuple[Any, ...]:
@@ -51,8 +56,12 @@ def file_source(
     srdf: Path | None = None,
     mimic: bool = False,
 ) -> RobotSource:
-    """The source of a URDF file and an SRDF file. Raises ModelError if one cannot be read."""
-    text = read_urdf(path)
+    """The source of a URDF or xacro file and an SRDF file.
+
+    Raises ModelError if one cannot be read.
+    """
+    is_xacro = format_of(path) == "xacro"
+    text = urdf_of_xacro(path, package_dirs) if is_xacro else read_urdf(path)
     return RobotSource(
         kind="urdf",
         reference=path.name,
@@ -142,8 +151,9 @@ def load_robot(
 ) -> Robot:
     """Load a robot. Models that do not support planning load as well; the problem refuses them.
 
-    x: path of a URDF file; or a name of example-robot-data, such as "panda"; or a
-        pinocchio.Model, which is copied. A string with a separator or ending in .urdf is a path.
+    x: path of a URDF, xacro or MJCF file; or a name of example-robot-data, such as "panda", or of
+        robot_descriptions, such as "ur10_description"; or a pinocchio.Model, which is copied. A
+        string with a separator or ending in .urdf is a path. See docs/robots.md.
     package_dirs: folders in which `package://` meshes are looked up.
     free_flyer: whether the base floats; by default it is fixed, or as the example's loader says.
     locked: joints to fix at the neutral configuration, or a single name; or a mapping from joints
@@ -165,11 +175,22 @@ def load_robot(
         return _from_model(x, x.name, held, (visual, collision), semantics)
     if not isinstance(x, str | Path):
         raise ModelError(f"a robot is a path, a name or a pinocchio.Model, not {type(x).__name__}.")
+    form = format_of(x)
+    if form == "description":
+        found = description_of(str(x))
+        x, folders = found.path, (*folders, *found.package_dirs)
+        form = format_of(x)
+    if form == "sdf":
+        raise ModelError(f"{str(x)!r} is SDF, which Pinocchio's wheel does not read: save a URDF.")
+    if form == "mjcf":
+        model, shapes = model_of_mjcf(Path(x), bool(free_flyer))
+        given = (visual or shapes[0], collision or shapes[1])
+        return _from_model(model, model.name, held, given, semantics)
     if isinstance(x, Path) or is_path(x):
         source = file_source(Path(x), folders, held, bool(free_flyer), semantics, mimic)
     elif x in BUILT_IN_CODE:
-        model, *shapes = build_in_code(x)
-        return _from_model(model, x, held, (shapes[0], shapes[1]), semantics)
+        model, *both = build_in_code(x)
+        return _from_model(model, x, held, (both[0], both[1]), semantics)
     else:
         source = example_source(x, folders, held, free_flyer, semantics, mimic)
     model = build_model(source)

@@ -117,13 +117,13 @@ def jet_rows(s: Array, k: int, inner_modes: int, highest: int | None = None) -> 
     s, top = np.asarray(s, dtype=np.float64), k if highest is None else highest
     taylor = [_taylor_column(s, top, i) for i in range(1, k)]
     first = np.stack(taylor, axis=2) if taylor else np.zeros((len(s), top + 1, 0))
-    series = _series(k, inner_modes, top)
+    series = curve_series(k, inner_modes, top)
     modes = legendre(2 * s - 1, len(series) - 1).T @ series.reshape(len(series), -1)
     return np.concatenate([first, modes.reshape(len(s), *series.shape[1:])], axis=2)
 
 
 @cache
-def _series(k: int, inner_modes: int, top: int) -> Array:
+def curve_series(k: int, inner_modes: int, top: int) -> Array:
     """Legendre coefficients of the columns of (Z, c) in each derivative, (D, top + 1, k + r)."""
     degrees = end_degrees(k)
     columns = [

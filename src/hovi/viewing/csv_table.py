@@ -35,10 +35,10 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
     Raises InputError for an invalid rate, DisplayError when the file cannot be written.
     """
     expect(trajectory, Trajectory, "the trajectory of a solution")
-    times = _times(trajectory.duration, rate)
+    times = sample_times(trajectory.duration, rate)
     try:
         with whole_file(path) as stream:
-            stream.write((",".join(_columns(trajectory)) + "\n").encode())
+            stream.write(_header(trajectory).encode())
             for t, sample in _batches(trajectory, times):
                 table = np.column_stack([t, *sample])
                 lines = (",".join(map(repr, row)) for row in table.tolist())
@@ -47,8 +47,11 @@ def write_csv(trajectory: Trajectory, path: str | os.PathLike[str], rate: float 
         raise DisplayError(f"cannot write the table {str(path)!r}: {reason(error)}.") from error
 
 
-def _times(duration: float, rate: float) -> Array:
-    """Multiples of 1/rate below T, and T."""
+def sample_times(duration: float, rate: float) -> Array:
+    """Multiples of 1/rate below T, and T, shape (M,), in [s]. Raises InputError for a bad rate.
+
+    duration: T in [s]. rate: samples per second, positive.
+    """
     if not (math.isfinite(rate) and rate > 0):
         raise InputError(f"the rate must be a positive number of samples per second, got {rate}.")
     if duration * rate > MAX_ROWS:
@@ -62,11 +65,25 @@ def _times(duration: float, rate: float) -> Array:
     return np.append(earlier, duration)
 
 
-def _columns(trajectory: Trajectory) -> list[str]:
-    names = [name.replace(",", "_").replace('"', "_") for name in trajectory.coordinate_names]
-    q_names = names if trajectory.space is None else trajectory.space.names(names)
-    columns = ["t", *(f"q_{name}" for name in q_names)]
-    return columns + [f"{letter}_{name}" for letter in ("v", "a", "tau") for name in names]
+def q_names(trajectory: Trajectory) -> list[str]:
+    """Names of the entries of q, (nq,)."""
+    names = list(trajectory.coordinate_names)
+    return names if trajectory.space is None else list(trajectory.space.names(names))
+
+
+def column_names(trajectory: Trajectory) -> list[str]:
+    """Names of the columns t, q, v, a and tau: the kind and the coordinate, as in q_elbow."""
+    columns = ["t", *(f"q_{name}" for name in q_names(trajectory))]
+    names, stored = trajectory.coordinate_names, trajectory.torque
+    without = stored is not None and stored.values.shape[2] == 0  # of a Lagrangian without torques
+    kinds = ("v", "a") if without else ("v", "a", "tau")
+    return columns + [f"{kind}_{name}" for kind in kinds for name in names]
+
+
+def _header(trajectory: Trajectory) -> str:
+    """The first line; commas and quotes in names become underscores."""
+    names = (each.replace(",", "_").replace('"', "_") for each in column_names(trajectory))
+    return ",".join(names) + "\n"
 
 
 def _batches(trajectory: Trajectory, times: Array) -> Iterator[tuple[Array, Sample]]:

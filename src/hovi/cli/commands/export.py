@@ -23,16 +23,22 @@ def export(
         ),
     ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="Short for --format csv.")] = False,
-    rate: Annotated[float, typer.Option(help="Samples per second.")] = 1000.0,
+    rate: Annotated[
+        float | None, typer.Option(help="Samples per second; default: that of the format.")
+    ] = None,
 ) -> None:
-    """Export a motion: t, q, v, a and tau as comma-separated values (csv)."""
+    """Export a motion for other programs.
+
+    Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
+    """
     from hovi.cli.arguments.files import check_output, load_trajectory
     from hovi.exchange.formats import export_format
 
     chosen = export_format(_format_name(format_, csv))
     target = check_output(
-        _output(positional, out) or file.with_suffix(chosen.suffix), chosen.suffix
+        _output(positional, out) or _beside(file, chosen.suffix), *chosen.suffixes
     )
+    _require_other_file(target, file)
     chosen.write(load_trajectory(file), target, rate)
     print(f"wrote {target}")
 
@@ -45,6 +51,19 @@ def _format_name(name: str | None, csv: bool) -> str:
     if csv and name not in (None, "csv"):
         raise InputError(f"two formats were given; use --csv or --format {name}.")
     return name or "csv"
+
+
+def _beside(file: Path, suffix: str) -> Path:
+    """The file with another extension, and another name where it has that one itself."""
+    other = file.with_suffix(suffix)
+    return file.with_name(f"{file.stem}_samples{suffix}") if other == file else other
+
+
+def _require_other_file(target: Path, file: Path) -> None:
+    from hovi.errors import InputError
+
+    if target.exists() and file.exists() and target.samefile(file):
+        raise InputError(f"{str(target)!r} is the motion itself; choose another output file.")
 
 
 def _output(positional: Path | None, out: Path | None) -> Path | None:

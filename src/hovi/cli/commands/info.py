@@ -26,12 +26,13 @@ def info(
     from hovi.errors import InputError, nearest
     from hovi.robot.bundled_models import example_scenes
     from hovi.robot.example_robots import example_names
+    from hovi.robot.formats.recognized import format_of
     from hovi.robot.loading import is_path
 
     robots, scenes = example_names(), example_scenes()
     if what.lower().endswith(".toml") or what in scenes:
         print(_scene(what))
-    elif is_path(what) or what in robots:
+    elif is_path(what) or what in robots or format_of(what) == "description":
         print(_robot(what, mimic, free_flyer))
     else:
         raise InputError(

@@ -13,6 +13,7 @@ from hovi.errors import InputError, ModelError
 from hovi.planning.obstacles.mesh import Mesh
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.primitives import Box, Cylinder, Sphere
+from hovi.robot.formats.recognized import require_untrusted
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.robot.urdf.check import checked_urdf
@@ -30,6 +31,7 @@ def obstacles_of_urdf(
     frame: pose of its root link. joints: positions by name; the others are at their neutral one.
     Raises ModelError for an invalid URDF, and InputError for one without usable shapes.
     """
+    require_untrusted(path)
     model = load_robot(path, package_dirs=package_dirs, locked=dict(joints))
     geometry = model.collision
     if model.collision_problem or geometry is None or not geometry.ngeoms:

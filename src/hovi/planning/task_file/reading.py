@@ -33,6 +33,7 @@ from hovi.planning.task_file.scene_cache import (
 from hovi.planning.task_file.schema import PLAIN, SchemeTable, ShapedTable, TaskTable
 from hovi.planning.task_file.segment_tables import check_keys, read_segments
 from hovi.planning.task_file.task import Task
+from hovi.robot.formats.recognized import require_untrusted
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
@@ -212,6 +213,7 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
     folder = toml.path.parent
     is_file = table.robot.endswith(".urdf")
     try:
+        require_untrusted(table.robot)
         return load_robot(
             folder / table.robot if is_file else table.robot,
             package_dirs=tuple(folder / each for each in table.package_dirs),

@@ -1,0 +1,1 @@
+"""What comes out of a motion: samples at any time, and files for other programs."""

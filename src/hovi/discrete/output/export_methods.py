@@ -1,0 +1,64 @@
+"""Methods of a motion that write it for other programs."""
+
+from __future__ import annotations
+
+import os
+from importlib import import_module
+from typing import Any
+
+Path = str | os.PathLike[str]
+
+
+class ExportMethods:
+    """`to_...` for every export format, as `hovi.export` writes it.
+
+    path: the file, which is written completely or not at all. rate: samples per second, or pictures
+    of a film; that of the format when None. Raises InputError for an invalid rate, extension or
+    motion, DisplayError when the file cannot be written or an optional library is missing.
+    """
+
+    def to_csv(self, path: Path, rate: float | None = None) -> None:
+        """Write t, q, v, a and tau as comma-separated values in full precision."""
+        _export(self, path, "csv", rate)
+
+    def to_numpy(self, path: Path, rate: float | None = None) -> None:
+        """Write an npz archive of plain arrays."""
+        _export(self, path, "numpy", rate)
+
+    def to_parquet(self, path: Path, rate: float | None = None) -> None:
+        """Write a Parquet table."""
+        _export(self, path, "parquet", rate)
+
+    def to_joint_trajectory(
+        self, path: Path, rate: float | None = None, *, efforts: bool = False
+    ) -> None:
+        """Write a ROS 2 trajectory_msgs/JointTrajectory, as YAML or JSON by the extension.
+
+        efforts: fill in the field `effort` too, which many joint_trajectory_controllers refuse.
+        """
+        _export(self, path, "joint-trajectory", rate, **({"efforts": True} if efforts else {}))
+
+    def to_mcap(self, path: Path, rate: float | None = None) -> None:
+        """Write an MCAP file of ROS 2 messages: joint states, efforts, TF and the URDF."""
+        _export(self, path, "mcap", rate)
+
+    def to_mujoco(self, path: Path, rate: float | None = None) -> None:
+        """Write a MuJoCo model with a keyframe of positions, velocities and controls a sample."""
+        _export(self, path, "mujoco", rate)
+
+    def to_rerun(self, path: Path, rate: float | None = None) -> None:
+        """Write a recording of the Rerun viewer: curves of the joints and the moving robot."""
+        _export(self, path, "rerun", rate)
+
+    def to_video(self, path: Path, rate: float | None = None) -> None:
+        """Write an MP4 video of the replay."""
+        _export(self, path, "video", rate)
+
+    def to_gif(self, path: Path, rate: float | None = None) -> None:
+        """Write a GIF of the replay."""
+        _export(self, path, "gif", rate)
+
+
+def _export(motion: Any, path: Path, format: str, rate: float | None, **options: Any) -> None:
+    """By name, as plug-ins are: formats draw and simulate, on floors above motions."""
+    import_module("hovi.exchange.formats").export(motion, path, format, rate, **options)

@@ -1,0 +1,42 @@
+"""Bars in space, drawn by matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+Array = npt.NDArray[np.float64]
+
+_COLOR = "#0072b2"
+
+
+class Bars:
+    """A picture with room for all points of a motion.
+
+    points: shape (..., 3), in [m]. size: width and height, in pixels.
+    """
+
+    def __init__(self, points: Array, size: tuple[int, int]) -> None:
+        figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100)
+        self._canvas: Any = FigureCanvasAgg(figure)
+        self._axes: Any = figure.add_axes((0.0, 0.05, 1.0, 0.95), projection="3d")
+        low, high = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
+        half = max(0.55 * float((high - low).max()), 1e-3)
+        middle = 0.5 * (low + high)
+        limits = [(c - half, c + half) for c in middle.tolist()]
+        self._axes.set(xlim=limits[0], ylim=limits[1], zlim=limits[2])
+        self._lines: list[Any] = []
+
+    def draw(self, bars: Sequence[Array]) -> npt.NDArray[np.uint8]:
+        """The picture of some bars, each from one point to another, (2, 3)."""
+        for line in self._lines:
+            line.remove()
+        style = {"color": _COLOR, "linewidth": 4, "solid_capstyle": "round"}
+        self._lines = [self._axes.plot(*bar.T, **style)[0] for bar in bars]
+        self._canvas.draw()
+        return np.asarray(self._canvas.buffer_rgba(), dtype=np.uint8)[:, :, :3].copy()

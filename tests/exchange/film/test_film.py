@@ -1,0 +1,111 @@
+"""Films of a motion, read back by Pillow and ffmpeg."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import hovi
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import DisplayError, HoviWarning, InputError
+from hovi.exchange.film import headless_browser
+from hovi.exchange.film.pictures import SIZE
+from samples.cubic_motion import cubic_motion
+
+with_browser = pytest.mark.skipif(headless_browser.browser() is None, reason="needs Chromium")
+
+
+@pytest.fixture(scope="module")
+def motion(arm_scene: hovi.Scene) -> Trajectory:
+    return cubic_motion(arm_scene, duration=0.8, schemes=["galerkin-2"] * 3)[0]
+
+
+@pytest.fixture
+def no_browser(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(headless_browser, "NAMES", ())
+
+
+def pictures_of(path: Path) -> tuple[list[Any], list[int]]:
+    """The pictures of a GIF, and how long each lasts, in [ms]."""
+    with Image.open(path) as film:
+        found, times = [], []
+        for i in range(film.n_frames):
+            film.seek(i)
+            found.append(np.asarray(film.convert("RGB"), dtype=float))
+            times.append(film.info["duration"])
+    return found, times
+
+
+def changed(one: Any, other: Any) -> float:
+    """The share of pixels that differ visibly."""
+    return float((np.abs(one - other).max(axis=2) > 40).mean())
+
+
+@with_browser
+def test_a_gif_shows_the_replay_page_without_its_controls(
+    motion: Trajectory, tmp_path: Path
+) -> None:
+    motion.to_gif(tmp_path / "motion.gif", 4.0)
+    found, times = pictures_of(tmp_path / "motion.gif")
+    assert len(found) == 5  # at 0, 0.25, 0.5, 0.75 and 0.8 s
+    assert set(times) == {250}
+    assert found[0].shape == (SIZE[1], SIZE[0], 3)
+    assert changed(found[0], found[2]) > 0.002
+    assert changed(found[2], found[-1]) > 0.002
+    dark = found[0][:, SIZE[0] * 2 // 3 :, :].max(axis=2) < 60  # the page's panel is dark
+    assert dark.mean() < 0.05
+
+
+def test_without_a_browser_the_robot_is_drawn_by_bars(
+    motion: Trajectory, no_browser: None, tmp_path: Path
+) -> None:
+    with pytest.warns(HoviWarning, match="cannot be filmed, as there is no Chromium: the robot is"):
+        motion.to_gif(tmp_path / "motion.gif", 4.0)
+    found, _ = pictures_of(tmp_path / "motion.gif")
+    assert len(found) == 5
+    assert changed(found[0], found[-1]) > 0.002
+
+
+def test_a_browser_that_does_not_start_is_told(
+    motion: Trajectory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(headless_browser, "NAMES", ("false",))
+    with pytest.warns(HoviWarning, match="as Chromium does not start"):
+        motion.to_gif(tmp_path / "motion.gif", 4.0)
+    assert (tmp_path / "motion.gif").exists()
+
+
+# imageio-ffmpeg's reader leaves its pipes to the garbage collector
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_video_has_its_rate_and_pictures(
+    motion: Trajectory, no_browser: None, tmp_path: Path
+) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    with pytest.warns(HoviWarning, match="cannot be filmed"):
+        motion.to_video(tmp_path / "motion.mp4", 10.0)
+    reader = ffmpeg.read_frames(str(tmp_path / "motion.mp4"))
+    about = next(reader)
+    read = [np.frombuffer(data, np.uint8).reshape(SIZE[1], SIZE[0], 3) for data in reader]
+    assert about["fps"] == 10.0
+    assert about["size"] == SIZE
+    assert len(read) == 9
+    assert changed(read[0].astype(float), read[-1].astype(float)) > 0.002
+
+
+def test_a_gif_is_at_most_as_fast_as_viewers_play_it(motion: Trajectory, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="at most 50 pictures per second"):
+        motion.to_gif(tmp_path / "motion.gif", 60.0)
+    with pytest.raises(InputError, match="choose a lower rate"):
+        motion.to_gif(tmp_path / "motion.gif", 1e6)
+
+
+def test_a_motion_without_its_robot_cannot_be_drawn(tmp_path: Path) -> None:
+    robot = hovi.load_robot(hovi.load_robot(hovi.example("two_link.urdf")).model)
+    cubic_motion(hovi.Scene(robot))[0].save(tmp_path / "m.npz")
+    with pytest.raises(DisplayError, match="saved without its robot"):
+        Trajectory.load(tmp_path / "m.npz").to_gif(tmp_path / "m.gif")
+    assert not (tmp_path / "m.gif").exists()
