@@ -44,6 +44,7 @@ INSIDE = {
         {"sequence"},
         {"task_file"},
     ],
+    "viewing": [{"curves"}, {"panel"}, {""}],
     "accuracy": [{""}, {"effect_study", "peers"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }

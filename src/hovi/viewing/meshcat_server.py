@@ -71,6 +71,11 @@ class ServedPage(Page):
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._broadcast, message)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the page is still served."""
+        return not self._loop.is_closed()
+
     def wait(self, seconds: float) -> bool:
         """Wait until a browser shows the page; False when none connects within that time [s]."""
         return self._connected.wait(seconds)
