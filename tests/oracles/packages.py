@@ -44,7 +44,7 @@ INSIDE = {
         {"sequence"},
         {"task_file"},
     ],
-    "viewing": [{"curves"}, {"panel"}, {""}],
+    "viewing": [{"curves"}, {"panel"}, {""}, {"documents"}],
     "accuracy": [{""}, {"effect_study", "peers"}],
     "cli": [{"arguments", "reports"}, {"commands"}, {""}],
 }

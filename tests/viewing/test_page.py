@@ -60,28 +60,45 @@ def motion(arm: Robot) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
-    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
 def page(motion: Trajectory, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("page") / "arm.html"
     replay(motion, html=path)
     return path
 
 
-def show(tab: Tab, page: Path, size: tuple[int, int]) -> None:
-    """Open a page in a window of a given size, with the motion stopped at its start."""
-    tab.requests.clear()
-    tab.errors.clear()
-    width, height = size
-    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 500}
-    tab.call("Emulation.setDeviceMetricsOverride", **metrics)
-    tab.open(page.as_uri())
-    tab.until("viewer.animator.actions.length > 0")
-    seek(tab, 0.0)
+@pytest.fixture(scope="module", params=[DESKTOP, PHONE], ids=["desktop", "phone"])
+def tab(
+    request: pytest.FixtureRequest, page: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Tab]:
+    """The page in a window of each size."""
+    width, height = request.param
+    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1}
+        opened.call("Emulation.setDeviceMetricsOverride", mobile=width < 500, **metrics)
+        opened.open(page.as_uri())
+        opened.until("viewer.animator.actions.length > 0")
+        yield opened
+        assert not opened.errors
+
+
+@pytest.fixture(scope="module")
+def other_tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+    """A window for other pages."""
+    with headless_browser(tmp_path_factory.mktemp("profile")) as opened:
+        yield opened
+
+
+def press(tab: Tab, chip: str, on: bool = True) -> None:
+    """Switch one of the buttons below the scene on or off."""
+    button = f"document.getElementById('chip-{chip}')"
+    tab.value(
+        f"if ({button}.getAttribute('aria-pressed') != '{on}'.toLowerCase()) {button}.click(); 1"
+    )
+
+
+def window(tab: Tab) -> list[int]:
+    """Width and height."""
+    return list(tab.value("[innerWidth, innerHeight]"))
 
 
 def seek(tab: Tab, t: float) -> None:
@@ -98,6 +115,17 @@ def boxes(tab: Tab, selector: str) -> dict[str, Array]:
     return {name: np.array(box) for name, box in found}
 
 
+def boxes_after(tab: Tab, change: str, selector: str) -> dict[str, Array]:
+    """The boxes right after a change, before the page draws again."""
+    list_boxes = (
+        f"[...document.querySelectorAll('{selector}')].map((e, i) => {{"
+        "const b = e.getBoundingClientRect();"
+        "return [`${i}`, [b.left, b.top, b.right, b.bottom]]; })"
+    )
+    found = tab.value(f"(() => {{ {change} return {list_boxes}; }})()")
+    return {name: np.array(box) for name, box in found}
+
+
 def overlapping(shown: dict[str, Array]) -> list[tuple[str, str]]:
     pairs = itertools.combinations(shown.items(), 2)
     return [
@@ -108,18 +136,16 @@ def overlapping(shown: dict[str, Array]) -> list[tuple[str, str]]:
 
 
 @needs_chromium
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
 def test_pixels_of_the_scene_and_of_the_strips_change_as_it_plays(
-    motion: Trajectory, page: Path, tab: Tab, size: tuple[int, int]
+    motion: Trajectory, tab: Tab
 ) -> None:
-    show(tab, page, size)
     pictures = []
     for t in (0.0, 0.5 * motion.duration, motion.duration):
         seek(tab, t)
         pictures.append(tab.screenshot())
-    for part in ("#scene", "#torque", "#joints"):
+    for part in ("#scene", "#torque", "#joints"):  # the strip at the lower edge of a phone
         (box,) = boxes(tab, part).values()
-        left, top, right, bottom = np.clip(box, 0, [*size, *size]).astype(int)
+        left, top, right, bottom = np.clip(box, 0, [*window(tab), *window(tab)]).astype(int)
         crops = [picture[top:bottom, left:right] for picture in pictures]
         assert crops[0].size > 0, part
         for before, after in itertools.pairwise(crops):
@@ -127,12 +153,8 @@ def test_pixels_of_the_scene_and_of_the_strips_change_as_it_plays(
 
 
 @needs_chromium
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_labels_do_not_overlap(
-    motion: Trajectory, page: Path, tab: Tab, size: tuple[int, int]
-) -> None:
-    show(tab, page, size)
-    tab.value("document.getElementById('chip-names').click(); 1")
+def test_labels_do_not_overlap(motion: Trajectory, tab: Tab) -> None:
+    press(tab, "names")
     names = {f"{name}" for name in motion.coordinate_names}
     for t in np.linspace(0.0, motion.duration, 5):
         seek(tab, float(t))
@@ -154,9 +176,8 @@ def test_labels_do_not_overlap(
 
 
 @needs_chromium
-def test_two_labels_at_the_same_place_are_found(page: Path, tab: Tab) -> None:
-    show(tab, page, DESKTOP)
-    tab.value("document.getElementById('chip-names').click(); 1")
+def test_two_labels_at_the_same_place_are_found(tab: Tab) -> None:
+    press(tab, "names")
     tab.value(
         "for (const e of document.querySelectorAll('#names .label')) e.style.transform = ''; 1"
     )
@@ -164,11 +185,7 @@ def test_two_labels_at_the_same_place_are_found(page: Path, tab: Tab) -> None:
 
 
 @needs_chromium
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_the_robot_and_its_path_are_inside_the_view(
-    motion: Trajectory, page: Path, tab: Tab, size: tuple[int, int]
-) -> None:
-    show(tab, page, size)
+def test_the_robot_and_its_path_are_inside_the_view(motion: Trajectory, tab: Tab) -> None:
     for t in np.linspace(0.0, motion.duration, 4):
         seek(tab, float(t))
         corners = tab.value(
@@ -187,46 +204,42 @@ def test_the_robot_and_its_path_are_inside_the_view(
 
 
 @needs_chromium
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_everything_on_a_page_can_be_reached(page: Path, tab: Tab, size: tuple[int, int]) -> None:
+def test_everything_on_a_page_can_be_reached(tab: Tab) -> None:
     """Controls are inside the window; what is beside the scene may scroll, but not sideways."""
-    show(tab, page, size)
     for name, box in boxes(tab, "#bar button, #bar select, #bar input, #clock").items():
         assert (box >= 0).all(), name
-        assert (box[2:] <= size).all(), name
+        assert (box[2:] <= window(tab)).all(), name
         assert min(box[2:] - box[:2]) >= 15, name
     side = "document.getElementById('side')"
     assert tab.value(f"{side}.scrollWidth <= {side}.clientWidth")
 
 
 @needs_chromium
-def test_no_request_leaves_a_page(page: Path, tab: Tab) -> None:
-    show(tab, page, PHONE)
-    tab.value("for (const e of document.querySelectorAll('#chips button')) e.click(); 1")
+def test_no_request_leaves_a_page(tab: Tab) -> None:
+    for _ in range(2):
+        tab.value("for (const e of document.querySelectorAll('#chips button')) e.click(); 1")
     assert all(url.startswith(("file:", "data:", "blob:")) for url in tab.requests), tab.requests
     assert not tab.errors
 
 
 @needs_chromium
 def test_a_click_plays_from_where_the_slider_is_and_another_stops(
-    motion: Trajectory, page: Path, tab: Tab
+    motion: Trajectory, tab: Tab
 ) -> None:
-    show(tab, page, DESKTOP)
     half = 0.5 * motion.duration
+    tab.value("controls.speed.value = '0.1'; controls.speed.onchange(); 1")
     seek(tab, half)
     tab.value("document.getElementById('play').click(); 1")
     tab.until(f"controls.t > {half} + 0.02")
     tab.value("document.getElementById('play').click(); 1")
+    assert not tab.value("viewer.animator.playing")
     stopped = tab.value("[controls.t, Number(document.getElementById('time').value)]")
     assert stopped[0] == pytest.approx(stopped[1], abs=1e-9)
     assert half < stopped[0] <= motion.duration
 
 
 @needs_chromium
-def test_numbers_beside_the_scene_are_those_of_the_motion(
-    motion: Trajectory, page: Path, tab: Tab
-) -> None:
-    show(tab, page, DESKTOP)
+def test_numbers_beside_the_scene_are_those_of_the_motion(motion: Trajectory, tab: Tab) -> None:
     t = 0.37 * motion.duration
     seek(tab, t)
     shown = tab.value(
@@ -243,9 +256,8 @@ def test_numbers_beside_the_scene_are_those_of_the_motion(
 
 
 @needs_chromium
-def test_frames_follow_the_joints(motion: Trajectory, page: Path, tab: Tab) -> None:
-    show(tab, page, DESKTOP)
-    tab.value("document.getElementById('chip-frames').click(); 1")
+def test_frames_follow_the_joints(motion: Trajectory, tab: Tab) -> None:
+    press(tab, "frames")
     t = 0.5 * motion.duration
     seek(tab, t)
     robot = motion.robot
@@ -257,12 +269,14 @@ def test_frames_follow_the_joints(motion: Trajectory, page: Path, tab: Tab) -> N
 
 @needs_chromium
 def test_a_compared_motion_is_a_translucent_robot(
-    motion: Trajectory, tmp_path: Path, tab: Tab
+    motion: Trajectory, tmp_path: Path, other_tab: Tab
 ) -> None:
+    tab = other_tab
     other = cubic_motion(Scene(motion.robot, [Gravity(9.81)]), seed=5)[0]  # type: ignore[arg-type]
     shown = replay(motion, compare=[other], html=tmp_path / "two.html")
     assert len(shown.ghosts) == 1
-    show(tab, tmp_path / "two.html", DESKTOP)
+    tab.open((tmp_path / "two.html").as_uri())
+    tab.until("viewer.animator.actions.length > 0")
     seek(tab, 0.5 * motion.duration)
     both = tab.screenshot()
     tab.value("viewer.set_property(['meshcat', 'ghost 1'], 'visible', false); viewer.render(); 1")
@@ -270,8 +284,7 @@ def test_a_compared_motion_is_a_translucent_robot(
     labels = boxes(tab, ".motion")
     assert len(labels) == 2
     assert not overlapping(labels)
-    curves = tab.value("document.querySelectorAll('#torque .other').length")
-    assert curves == 5
+    assert tab.value("document.querySelectorAll('#torque .other').length") == 5
 
 
 def test_a_payload_is_drawn_where_it_is_carried(motion: Trajectory) -> None:
@@ -297,14 +310,14 @@ def test_what_is_compared_must_be_motions(motion: Trajectory, wrong: Any) -> Non
 
 
 @needs_chromium
-def test_the_slider_follows_when_python_moves_the_robot(two_link: Robot, tab: Tab) -> None:
+def test_the_slider_follows_when_python_moves_the_robot(two_link: Robot, other_tab: Tab) -> None:
     motion = cubic_motion(Scene(two_link), seed=4)[0]
     with serve(motion, announce=lambda address: None) as shown:
-        tab.call("Emulation.clearDeviceMetricsOverride")
-        tab.open(shown.url)
-        tab.until("viewer.animator.actions.length > 0")
+        other_tab.open(shown.url)
+        other_tab.until("viewer.animator.actions.length > 0")
         shown.play(speed=20.0)
-        tab.until(f"Math.abs(controls.t - {motion.duration}) < 1e-9 && !viewer.animator.playing")
+        at_the_end = f"Math.abs(controls.t - {motion.duration}) < 1e-9"
+        other_tab.until(f"{at_the_end} && !viewer.animator.playing")
 
 
 # Scripts

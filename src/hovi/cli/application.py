@@ -14,12 +14,14 @@ import typer
 from typer.exceptions import TyperException
 
 from hovi.cli.commands import accuracy as accuracy_command
+from hovi.cli.commands import demo as demo_command
 from hovi.cli.commands import effects as effects_command
 from hovi.cli.commands import export as export_command
 from hovi.cli.commands import info as info_command
 from hovi.cli.commands import plan as plan_command
 from hovi.cli.commands import plot as plot_command
 from hovi.cli.commands import replay as replay_command
+from hovi.cli.commands import report as report_command
 from hovi.cli.commands import schema as schema_command
 from hovi.cli.commands import simulate as simulate_command
 from hovi.errors import HoviError, HoviWarning
@@ -63,10 +65,12 @@ app.command("accuracy")(accuracy_command.accuracy)
 app.command("simulate")(simulate_command.simulate)
 app.command("effects")(effects_command.effects)
 app.command("replay")(replay_command.replay)
+app.command("report")(report_command.report)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)
 app.command("schema")(schema_command.schema)
 app.command("info")(info_command.info)
+app.command("demo")(demo_command.demo)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

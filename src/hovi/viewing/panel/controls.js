@@ -61,6 +61,7 @@ class Controls {
         this.viewer.set_property = (path, name, value) => {
             if (path[0] !== "hovi") { return set(path, name, value); }
             this.animator.pause(); // Python moves the robot
+            this.animator.display_progress(value);
             this.show(value);
         };
     }
@@ -156,7 +157,7 @@ class Controls {
             this.play.firstChild.firstChild.setAttribute("d", playing ? ICONS.pause : ICONS.play);
             this.play.setAttribute("aria-label", playing ? "pause" : "play");
         }
-        if (playing && this.animator.time !== this.t) { this.show(this.animator.time); }
+        if (this.animator.time !== this.t) { this.show(this.animator.time); }
         else if (this.stage.shown.names) { this.stage.place(this.t); }
     }
 
@@ -305,6 +306,10 @@ MeshCat.Viewer.prototype.set_object = function (path, object) {
         object.material = object.material.map(m => Array.isArray(m) ? m[0] : m);
     }
     if (object.isPoints) { object.castShadow = false; }
+    if (path.some(part => part.startsWith("ghost")) && object.material) {
+        object.castShadow = false;
+        Object.assign(object.material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 });
+    }
     return drawObject.call(this, path, object);
 };
 var viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));

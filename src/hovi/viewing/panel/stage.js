@@ -29,11 +29,11 @@ class Stage {
         for (const name of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "FillLight"]) {
             this.node(["Lights", name]).visible = false;
         }
-        this.node(["Lights", "AmbientLight", "<object>"]).intensity = 0.38;
+        this.node(["Lights", "AmbientLight", "<object>"]).intensity = 0.3;
         const group = this.node(["Stage"]);
-        const sky = new T.HemisphereLight(0xffffff, 0xc4ccd6, 0.42);
+        const sky = new T.HemisphereLight(0xffffff, 0xb8c2ce, 0.36);
         sky.position.set(0, 0, 1);
-        const sun = new T.DirectionalLight(0xffffff, 0.46);
+        const sun = new T.DirectionalLight(0xffffff, 0.42);
         sun.position.set(0.55 * size, -0.75 * size, 1.6 * size);
         sun.castShadow = true;
         sun.shadow.mapSize.set(1024, 1024);
@@ -64,7 +64,7 @@ class Stage {
         const alphaMap = new T.CanvasTexture(canvas);
         const disc = new T.Mesh(
             new T.PlaneGeometry(2 * radius, 2 * radius),
-            new T.MeshLambertMaterial({ color: 0xf4f6f8, alphaMap, transparent: true }),
+            new T.MeshLambertMaterial({ color: 0xe6ebf0, alphaMap, transparent: true }),
         );
         disc.receiveShadow = true;
         disc.position.z = -2e-3 * size;
