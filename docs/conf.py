@@ -42,7 +42,6 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
 
-
 def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
     """The curves of each motion of an example, below the code that plans it; its thumbnail, too."""
     from sphinx_gallery.scrapers import figure_rst
