@@ -10,7 +10,6 @@ import math
 import re
 import socket
 import threading
-import time
 import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
@@ -483,27 +482,17 @@ def test_meshes_with_several_materials_are_drawn(tmp_path: Path, tab: Tab) -> No
 
 @needs_chromium
 def test_a_live_replay_moves_in_the_browser(motion: Trajectory, tab: Tab) -> None:
-    page: list[str] = []
-    shown: list[Replay] = []
-
-    def play() -> None:
-        shown.append(replay(motion, speed=0.4, trace=False, announce=page.append))
-
-    player = threading.Thread(target=play)
-    player.start()
-    while not page:
-        time.sleep(0.01)
-    tab.open(page[0])
-    pictures = [tab.screenshot().astype(float)]
-    time.sleep(1.0)
-    pictures.append(tab.screenshot().astype(float))
-    player.join()
-    with shown[0]:
+    with replay(motion, speed=0.1, trace=False, announce=quiet) as shown:
+        tab.open(shown.url)
+        tab.until("viewer.animator.playing && controls.t > 0")
+        pictures = [tab.screenshot().astype(float)]
+        tab.until(f"controls.t > {0.1 * motion.duration} + {tab.value('controls.t')}")
         pictures.append(tab.screenshot().astype(float))
+        pictures.append(seek(tab, motion.duration))
         for before, after in itertools.pairwise(pictures):
             assert colored(before).mean() > 0.002
             assert (colored(before) != colored(after)).mean() > 0.001
-        tab.open(page[0])  # browsers opened later play the motion, too
+        tab.open(shown.url)  # browsers opened later play the motion, too
         tab.until("viewer.animator.playing")
     assert not tab.errors
 
