@@ -293,7 +293,7 @@ def test_a_payload_is_drawn_where_it_is_carried(motion: Trajectory) -> None:
     assert [item[:2] for item in payloads.items] == [(robot.tip_frame, 1.0)]
     visual = payloads.added_to(skeleton(robot.model), robot)
     radius = visual.geometryObjects[-1].geometry.radius
-    assert 4 / 3 * np.pi * radius**3 * 2_000.0 == pytest.approx(1.0)
+    assert 4 / 3 * np.pi * radius**3 * 500.0 == pytest.approx(1.0)
 
 
 def test_a_panel_has_no_markup_of_its_text() -> None:
