@@ -1,9 +1,11 @@
-"""Sphinx: the pages of this folder, the examples as a gallery, docstrings shown verbatim."""
+"""Sphinx: the pages of this folder, the examples as a gallery, and the reference by topic."""
 
 from __future__ import annotations
 
 import inspect
 import re
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +13,13 @@ from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 
 import hovi
+from hovi.viewing.plotting import motion_figure
 
 TOP = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(TOP / "docs"))
+
+from docstrings import as_rst  # noqa: E402
+from topics import TOPICS  # noqa: E402
 
 project = "hovi"
 author = copyright = "the hovi developers"
@@ -34,7 +41,29 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
+
+def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
+    """The curves of each motion of an example, below the code that plans it; its thumbnail, too."""
+    from sphinx_gallery.scrapers import figure_rst
+
+    seen = variables.setdefault("hovi_seen", set())
+    names = variables["example_globals"]
+    motions = [getattr(each, "trajectory", each) for each in list(names.values())]
+    new = [m for m in motions if isinstance(m, hovi.Trajectory) and id(m) not in seen]
+    seen.update(map(id, motions))
+    if not new:
+        return ""
+    path = next(variables["image_path_iterator"])
+    try:
+        motion_figure(new[-1]).savefig(path, dpi=80)
+    except hovi.HoviError:  # a motion without torques between its nodes
+        return ""
+    return str(figure_rst([path], gallery["src_dir"]))
+
+
 sphinx_gallery_conf = {
+    "image_scrapers": ("matplotlib", scrape_motion),
+    "reset_modules": ("matplotlib",),
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"/\d\d_",
@@ -60,12 +89,16 @@ def check_references(app: Sphinx) -> None:
                 raise SphinxError(f"{path.name} cites [{key}]: add it to docs/references.md")
 
 
-def show_verbatim(
+def format_docstring(
     app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
 ) -> None:
-    """Docstrings are prose with formulas, not reStructuredText: show them verbatim."""
-    if lines:
-        lines[:] = [".. code-block:: none", "", *(f"   {line}" for line in lines)]
+    """Docstrings are prose with formulas: show parameters as a table and link public names."""
+    try:
+        parameters = set(inspect.signature(obj).parameters) if callable(obj) else set()
+    except (TypeError, ValueError):
+        parameters = set()
+    parameters |= set(getattr(obj, "__dataclass_fields__", ()))
+    lines[:] = as_rst("\n".join(lines), parameters, hovi.__all__)
 
 
 def escape_norms(app: Sphinx, docname: str, source: list[str]) -> None:
@@ -76,21 +109,29 @@ def escape_norms(app: Sphinx, docname: str, source: list[str]) -> None:
 
 
 def list_public_names(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Append one entry for each public class and function to the reference page."""
-    if docname != "api":
-        return
-    entries = []
-    for name in hovi.__all__:
-        value = getattr(hovi, name)
-        if inspect.isclass(value):
-            entries += [f".. autoclass:: hovi.{name}", "   :members:", ""]
-        elif inspect.isfunction(value):
-            entries += [f".. autofunction:: hovi.{name}", ""]
-    source[0] += "\n".join(["\n```{eval-rst}", *entries, "```\n"])
+    """Append one entry for each public class and function to the reference page, by topic."""
+    if docname == "api":
+        source[0] += "\n".join(_reference())
+
+
+def _reference() -> Iterator[str]:
+    listed = {name for names in TOPICS.values() for name in names}
+    topics = {**TOPICS, "More": [name for name in hovi.__all__ if name not in listed]}
+    for topic, names in topics.items():
+        entries = [line for name in names for line in _entry(name)]
+        if entries:
+            yield from ("", f"## {topic}", "", "```{eval-rst}", *entries, "```", "")
+
+
+def _entry(name: str) -> list[str]:
+    value = getattr(hovi, name, None)
+    if inspect.isclass(value):
+        return [f".. autoclass:: hovi.{name}", "   :members:", ""]
+    return [f".. autofunction:: hovi.{name}", ""] if inspect.isfunction(value) else []
 
 
 def setup(app: Sphinx) -> None:
     app.connect("builder-inited", check_references)
     app.connect("source-read", escape_norms)
     app.connect("source-read", list_public_names)
-    app.connect("autodoc-process-docstring", show_verbatim)
+    app.connect("autodoc-process-docstring", format_docstring)

@@ -95,5 +95,6 @@ from .scene.standard_lagrangians import spline as spline
 from .study.study import Study as Study
 from .version import __version__ as __version__
 from .viewing.csv_table import write_csv as write_csv
+from .viewing.documents.report import write_report as write_report
 from .viewing.plotting import plot as plot
 from .viewing.replay_session import replay as replay

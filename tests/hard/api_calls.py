@@ -845,8 +845,9 @@ def _files() -> list[Call]:
             hovi.replay,
             trajectory,
             **{"speed": 1.0, "loop": False, "trace": False, "open_browser": False},
-            **{"html": folder() / "motion.html", "announce": print},
+            **{"html": folder() / "motion.html", "announce": print, "compare": [trajectory]},
         ),
+        call(hovi.write_report, trajectory, folder() / "report.html"),
     ]
 
 

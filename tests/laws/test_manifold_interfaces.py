@@ -34,8 +34,8 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from hovi.viewing.csv_table import write_csv
+from hovi.viewing.curves.unwrapped_angles import unwrapped
 from hovi.viewing.plotting import motion_figure
-from hovi.viewing.unwrapped_angles import unwrapped
 from samples.manifold_robots import configurations, with_arm
 
 Array = npt.NDArray[np.float64]

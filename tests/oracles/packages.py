@@ -45,6 +45,7 @@ INSIDE = {
         {"sequence"},
         {"task_file"},
     ],
+    "viewing": [{"curves"}, {"panel"}, {""}, {"documents"}],
     "accuracy": [{""}, {"effect_study", "peers"}],
     "study": [{"cells"}, {"axes"}, {"storage"}, {"running"}, {""}, {"showing"}],
     "exchange": [{""}, {"film"}],

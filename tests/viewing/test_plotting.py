@@ -22,8 +22,8 @@ from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.viewing import plotting
+from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.figures import align_zeros
-from hovi.viewing.scheme_torque import scheme_torque
 from samples.cubic_motion import cubic_motion
 
 Picture = Callable[[Trajectory, Path], None]

@@ -15,12 +15,14 @@ from typer.exceptions import TyperException
 
 from hovi.cli.commands import accuracy as accuracy_command
 from hovi.cli.commands import check as check_command
+from hovi.cli.commands import demo as demo_command
 from hovi.cli.commands import effects as effects_command
 from hovi.cli.commands import export as export_command
 from hovi.cli.commands import info as info_command
 from hovi.cli.commands import plan as plan_command
 from hovi.cli.commands import plot as plot_command
 from hovi.cli.commands import replay as replay_command
+from hovi.cli.commands import report as report_command
 from hovi.cli.commands import schema as schema_command
 from hovi.cli.commands import simulate as simulate_command
 from hovi.cli.commands import study as study_command
@@ -66,11 +68,13 @@ app.command("simulate")(simulate_command.simulate)
 app.command("effects")(effects_command.effects)
 app.add_typer(study_command.app, name="study")
 app.command("replay")(replay_command.replay)
+app.command("report")(report_command.report)
 app.command("plot")(plot_command.plot)
 app.command("export")(export_command.export)
 app.command("check")(check_command.check)
 app.command("schema")(schema_command.schema)
 app.command("info")(info_command.info)
+app.command("demo")(demo_command.demo)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

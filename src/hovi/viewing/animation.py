@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.viewing.highlights import Highlights, node_name
+from hovi.viewing.highlights import node_name
 from hovi.viewing.recorded_limits import MovingObjects
 
 with warnings.catch_warnings():
@@ -47,29 +48,31 @@ def frame_times(trajectory: Trajectory) -> Array:
 
 
 def animation_of(
-    trajectory: Trajectory,
-    visualizer: MeshcatVisualizer,
+    motions: Sequence[tuple[Trajectory, MeshcatVisualizer]],
     loop: bool,
-    highlights: Highlights | None,
+    visible: Mapping[str, tuple[Array, npt.NDArray[np.bool_]]],
 ) -> dict[str, object]:
-    """The message that makes a page play the motion: keyframe tracks by drawn object, in [s]."""
-    times = frame_times(trajectory)
-    visible = {} if highlights is None else highlights.changes(visualizer)
-    placements = placements_at(visualizer, trajectory, times)
+    """The message that makes a page play motions: keyframe tracks by drawn object, in [s].
+
+    visible: times and flags of the objects that are not always shown, by node name.
+    """
     animation = meshcat.animation.Animation()
-    for number, item in enumerate(visualizer.visual_model.geometryObjects):
-        poses = [frame[number] for frame in placements]
-        rotations = [pin.Quaternion(pose.rotation).coeffs() for pose in poses]
-        tracks = {
-            "position": _track("position", "vector3", times, [p.translation for p in poses]),
-            "quaternion": _track("quaternion", "quaternion", times, rotations),
-        }
-        name = node_name(visualizer, item)
-        if name in visible:
-            keys, flags = visible[name]
-            tracks["visible"] = _track("visible", "bool", keys, list(flags))
-        node = visualizer.viewer[name]
-        animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
+    for trajectory, visualizer in motions:
+        times = frame_times(trajectory)
+        placements = placements_at(visualizer, trajectory, times)
+        for number, item in enumerate(visualizer.visual_model.geometryObjects):
+            poses = [frame[number] for frame in placements]
+            rotations = [pin.Quaternion(pose.rotation).coeffs() for pose in poses]
+            tracks = {
+                "position": _track("position", "vector3", times, [p.translation for p in poses]),
+                "quaternion": _track("quaternion", "quaternion", times, rotations),
+            }
+            name = node_name(visualizer, item)
+            if name in visible:
+                keys, flags = visible[name]
+                tracks["visible"] = _track("visible", "bool", keys, list(flags))
+            node = visualizer.viewer[name]
+            animation.clips[node.path] = meshcat.animation.AnimationClip(tracks, fps=1)
     repetitions = math.inf if loop else 1
     command = meshcat.commands.SetAnimation(animation, play=True, repetitions=repetitions)
     message: dict[str, object] = command.lower()

@@ -13,10 +13,14 @@ import importlib.util
 import json
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from string import Template
 from typing import Any, NamedTuple, Protocol
 
 import umsgpack
+
+from hovi.viewing.panel.panel import Panel
 
 _MESHCAT = importlib.util.find_spec("meshcat")
 assert _MESHCAT is not None
@@ -25,39 +29,7 @@ VIEWER_FOLDER = Path(_MESHCAT.origin).parent / "viewer" / "dist"
 
 _UUID = re.compile(rb"[0-9a-f]{8}-[0-9a-f]{4}-1[0-9a-f]{3}-[0-9a-f]{4}-[0-9a-f]{12}")
 
-# meshcat's script merges the parts of a Collada file; a part with several materials gets a list
-# where one material is expected, and is hidden (the UR5's shoulder, for instance).
-_PAGE = """<!DOCTYPE html>
-<html>
-<head>
-<meta charset="utf-8">{policy}
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-body {{ margin: 0; font: 13px system-ui, sans-serif; }}
-#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#caption {{ position: fixed; left: 12px; bottom: 10px; color: #333; pointer-events: none; }}
-</style>
-</head>
-<body>
-<div id="meshcat-pane"></div>
-<div id="caption">{title}<br>{note}</div>
-{meshcat}
-<script>
-const drawObject = MeshCat.Viewer.prototype.set_object;
-MeshCat.Viewer.prototype.set_object = function (path, object) {{
-    if (Array.isArray(object.material)) {{
-        object.material = object.material.map(m => Array.isArray(m) ? m[0] : m);
-    }}
-    return drawObject.call(this, path, object);
-}};
-var viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
-viewer.gui.__folders["Scene"].close();
-{start}
-</script>
-</body>
-</html>
-"""
+_PARTS = Path(__file__).parent / "panel"
 
 # With this policy the browser itself blocks every network access but to the server of a live page.
 _POLICY = """
@@ -68,8 +40,7 @@ style-src 'unsafe-inline'; img-src data: blob:; connect-src data: blob:{socket}"
 _PLAY = """for (const message of {messages}) {{
     viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
 }}
-viewer.animator.mixer.timeScale = {speed};
-viewer.gui.open();"""
+viewer.animator.mixer.timeScale = {speed};"""
 
 
 class Command(Protocol):
@@ -129,11 +100,13 @@ class Page:
 
     title: of the browser's window, and a line in the page's corner.
     note: a second line there, such as a sentence about meshes that were not found.
+    panel: what is shown beside the scene; empty at first.
     """
 
     def __init__(self, title: str, note: str = "") -> None:
         """An empty page."""
         self.title, self.note = title, note
+        self.panel = Panel()
         self.web_url = ""
         self.messages = Messages()
         self._uuids: dict[bytes, bytes] = {}
@@ -170,10 +143,25 @@ class Page:
         return self._fill(policy, '<script src="main.min.js"></script>', "viewer.connect();")
 
     def _fill(self, policy: str, meshcat: str, start: str) -> str:
-        title, note = html.escape(self.title), html.escape(self.note)
-        return _PAGE.format(policy=policy, title=title, note=note, meshcat=meshcat, start=start)
+        parts = {
+            "policy": policy,
+            "title": html.escape(self.title),
+            "note": html.escape(self.note),
+            "style": _part("page.css"),
+            "meshcat": meshcat,
+            "panel": self.panel.to_json(),
+            "script": _part("stage.js") + _part("controls.js"),
+            "start": start,
+        }
+        return Template(_part("page.html")).substitute(parts)
 
     def _stable_uuid(self, match: re.Match[bytes]) -> bytes:
         """Replace meshcat's identifiers, which contain time and MAC address, by a counter."""
         number = len(self._uuids)
         return self._uuids.setdefault(match[0], b"%08x-0000-4000-8000-000000000000" % number)
+
+
+@cache
+def _part(name: str) -> str:
+    """The text of a file of the page."""
+    return (_PARTS / name).read_text(encoding="utf-8")

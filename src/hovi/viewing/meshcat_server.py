@@ -14,6 +14,7 @@ import threading
 
 import tornado.httpserver
 import tornado.iostream
+import tornado.routing
 import tornado.web
 import tornado.websocket
 
@@ -47,16 +48,7 @@ class ServedPage(Page):
     def __init__(self, title: str, note: str = "", port: int = 0) -> None:
         """Start serving an empty page."""
         super().__init__(title, note)
-        if not 0 <= port < 2**16:
-            raise DisplayError(f"a port is a number from 0 to 65535, not {port}.")
-        try:
-            listener = socket.create_server((_HOST, port), backlog=128)
-        except OSError as error:
-            raise DisplayError(
-                f"cannot serve a page on port {port} of {_HOST}: {error}; "
-                "another program may use it: choose another port, or 0 for any free one."
-            ) from error
-        listener.setblocking(False)
+        listener = open_listener(port)
         self.web_url = f"http://{_HOST}:{listener.getsockname()[1]}/view/"
         self._browsers: set[_Browser] = set()
         self._connected = threading.Event()
@@ -70,6 +62,11 @@ class ServedPage(Page):
         message = self.keep(command.lower())
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._broadcast, message)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the page is still served."""
+        return not self._loop.is_closed()
 
     def wait(self, seconds: float) -> bool:
         """Wait until a browser shows the page; False when none connects within that time [s]."""
@@ -97,25 +94,12 @@ class ServedPage(Page):
 
     def _listen(self, listener: socket.socket) -> None:
         self._large = asyncio.Semaphore(_LARGE_AT_ONCE)
-        application = tornado.web.Application(
-            [(r".*", _OtherHost)],
-            log_function=lambda handler: None,
-            websocket_max_message_size=_MAX_HEADER,
-        )
-        application.add_handlers(
-            _HOST_NAMES,
+        self._server = limited_server(
             [
                 tornado.web.url(r"/view/", _LivePage, {"page": self}),
                 tornado.web.url(r"/view/(main.min.js)", _Script, {"path": str(VIEWER_FOLDER)}),
                 tornado.web.url(r"/", _Browser, {"page": self}),
             ],
-        )
-        self._server = _Server(
-            application,
-            idle_connection_timeout=_IDLE_SECONDS,
-            body_timeout=_IDLE_SECONDS,
-            max_header_size=_MAX_HEADER,
-            max_body_size=_MAX_BODY,
         )
         self._server.add_socket(listener)
 
@@ -136,12 +120,48 @@ class ServedPage(Page):
         self._browsers.discard(browser)
 
 
-class _Server(tornado.httpserver.HTTPServer):
+def open_listener(port: int) -> socket.socket:
+    """A socket that listens on the loopback interface; on any free port for 0.
+
+    Raises DisplayError when the port is not available.
+    """
+    if not 0 <= port < 2**16:
+        raise DisplayError(f"a port is a number from 0 to 65535, not {port}.")
+    try:
+        listener = socket.create_server((_HOST, port), backlog=128)
+    except OSError as error:
+        raise DisplayError(
+            f"cannot serve a page on port {port} of {_HOST}: {error}; "
+            "another program may use it: choose another port, or 0 for any free one."
+        ) from error
+    listener.setblocking(False)
+    return listener
+
+
+def limited_server(handlers: list[tornado.routing.URLSpec]) -> LimitedServer:
+    """A server of pages that answers requests for this machine only, with limited resources."""
+    application = tornado.web.Application(
+        [(r".*", OtherHost)],
+        log_function=lambda handler: None,
+        websocket_max_message_size=_MAX_HEADER,
+    )
+    application.add_handlers(_HOST_NAMES, list(handlers))
+    return LimitedServer(
+        application,
+        idle_connection_timeout=_IDLE_SECONDS,
+        body_timeout=_IDLE_SECONDS,
+        max_header_size=_MAX_HEADER,
+        max_body_size=_MAX_BODY,
+    )
+
+
+class LimitedServer(tornado.httpserver.HTTPServer):
     """A server with a limited number of open connections, without those that became WebSockets."""
 
     _open = 0
 
     def handle_stream(self, stream: tornado.iostream.IOStream, address: tuple[object, ...]) -> None:
+        """Take a connection, or close it if there are too many."""
         if self._open >= _MAX_CONNECTIONS:
             stream.close()
             return
@@ -149,14 +169,16 @@ class _Server(tornado.httpserver.HTTPServer):
         super().handle_stream(stream, address)
 
     def on_close(self, server_conn: object) -> None:
+        """Count a connection that ended."""
         self._open -= 1
         super().on_close(server_conn)
 
 
-class _OtherHost(tornado.web.RequestHandler):
+class OtherHost(tornado.web.RequestHandler):
     """The answer to a request for another host."""
 
     def prepare(self) -> None:
+        """Refuse it."""
         self.set_status(403)
         self.finish(f"This page is served to {_HOST} and localhost only.\n")
 

@@ -30,13 +30,13 @@ from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.viewing.curves.scheme_torque import scheme_torque
+from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 from hovi.viewing.distance_panel import draw_distances
 from hovi.viewing.figures import align_zeros, write_figure
 from hovi.viewing.limit_bands import Curve, draw_limits, legend_entries
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
-from hovi.viewing.scheme_torque import scheme_torque
 from hovi.viewing.segment_marks import draw_segments
-from hovi.viewing.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

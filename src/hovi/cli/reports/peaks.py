@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.viewing.unwrapped_angles import shown_names, unwrapped
+from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 

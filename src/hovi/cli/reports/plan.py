@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
-
-from rich.table import Table
+from typing import TYPE_CHECKING, Any
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
@@ -24,6 +22,9 @@ from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
 from hovi.system.files import finite
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 
 def as_json(

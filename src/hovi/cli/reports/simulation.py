@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.table import Table
 
 from hovi.cli.reports.terminal_table import terminal_table
 from hovi.planning.problem.limits import urdf_limits
-from hovi.viewing.unwrapped_angles import shown_names, unwrapped
+from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 if TYPE_CHECKING:
     from hovi.flows.simulator import Simulation

@@ -1,0 +1,1 @@
+"""Curves over time as numbers: torques of a scheme, and angles without jumps."""

@@ -1,0 +1,224 @@
+"""A report of a motion in one file: replay, curves, certificate, effects, scene and versions."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import html
+import io
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from string import Template
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+
+from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.measures.motion_effort import effort_of
+from hovi.discrete.measures.motion_extremes import extremes
+from hovi.discrete.trajectory import Trajectory
+from hovi.errors import DisplayError, HoviError, expect
+from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
+from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.problem.limit_violation import closeness
+from hovi.planning.problem.limits import KINDS
+from hovi.scene.scene import Scene
+from hovi.system.deadline import Deadline, OutOfTimeError
+from hovi.system.files import reason, whole_file
+from hovi.version import __version__
+from hovi.viewing.plotting import motion_figure
+from hovi.viewing.recorded_limits import imposed_limits, kept_distances
+from hovi.viewing.replay_session import page_of
+
+Array = npt.NDArray[np.float64]
+Row = tuple[str, ...]
+
+_FRAME = Path(__file__).with_name("report.html")
+_SAMPLES = 401
+_SECONDS = 30.0
+_HASH_SALT = "hovi"  # so that the same motion gives the same picture
+_MAX_SCENE = 60_000  # [characters]
+
+
+@check_arguments_except("trajectory")
+def write_report(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
+    """Write one HTML file about a motion that needs no network, for somebody without hovi.
+
+    It replays the motion, and shows its curves, what was recorded of its solution, what is checked
+    now (a simulation of its torques, its margins), what each effect of the scene contributes to the
+    torques, the scene, and the versions. The same motion gives the same bytes.
+
+    path: the file; it is written completely or not at all. Raises DisplayError.
+    """
+    expect(trajectory, Trajectory, "the trajectory of a solution")
+    text = report_html(trajectory)
+    try:
+        with whole_file(path) as stream:
+            stream.write(text.encode())
+    except OSError as error:
+        raise DisplayError(f"cannot write the report {str(path)!r}: {reason(error)}.") from error
+
+
+def report_html(trajectory: Trajectory) -> str:
+    """The text of the report."""
+    page = page_of(trajectory)
+    versions = trajectory.metadata.get("versions")
+    planned = (
+        "" if not isinstance(versions, dict) else ", ".join(f"{k} {v}" for k, v in versions.items())
+    )
+    footer = f"Written by hovi {__version__}." + (f" Planned with {planned}." if planned else "")
+    return Template(_FRAME.read_text(encoding="utf-8")).substitute(
+        title=html.escape(page.title),
+        summary=html.escape(_summary(trajectory)),
+        page=html.escape(page.offline_html()),
+        curves=_curves(trajectory),
+        certificate=_table(tuple(_certificate(trajectory))),
+        effects=_effects(trajectory),
+        scene=html.escape(_scene(trajectory)),
+        footer=html.escape(footer),
+    )
+
+
+def _summary(trajectory: Trajectory) -> str:
+    data, robot, grid = trajectory.metadata, trajectory.robot, trajectory.grid
+    name = "a robot" if robot is None else robot.name
+    schemes = " and ".join(dict.fromkeys(scheme.name for scheme, _ in grid.groups))
+    parts = [
+        f"A motion of {name} in {trajectory.duration:g} s, by {schemes} on {grid.intervals} "
+        f"{'interval' if grid.intervals == 1 else 'intervals'}."
+    ]
+    if "status" in data:
+        parts.append(f"Status: {data['status']}.")
+    return " ".join(parts)
+
+
+def _curves(trajectory: Trajectory) -> str:
+    stream = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": _HASH_SALT}):
+        motion_figure(trajectory).savefig(stream, format="svg", metadata={"Date": None})
+    return base64.b64encode(stream.getvalue()).decode()
+
+
+def _certificate(trajectory: Trajectory) -> Iterator[Row]:
+    """What was recorded when the motion was planned, and what is checked now."""
+    data = trajectory.metadata
+    recorded = {
+        "cost": "cost (discrete action)",
+        "error_estimate": "estimated error of the cost, relative",
+        "n_neg": "negative eigenvalues of the Hessian (0 at a minimum)",
+    }
+    for key, label in recorded.items():
+        value = data.get(key)
+        if isinstance(value, int | float):
+            yield label, f"{value:.10g}"
+    effort = effort_of(trajectory)
+    if effort is not None:
+        yield "effort, 1/2 integral of the squared torques", f"{effort:.10g}"
+    yield "torques simulated again", _replayed(trajectory)
+    found = extremes(trajectory)
+    for name, each in (("acceleration", found.acceleration), ("jerk", found.jerk)):
+        yield f"largest {name}", f"{each.value:.4g} {each.unit} at {each.joint}, {each.t:.3g} s"
+    yield from _margins(trajectory)
+
+
+def _replayed(trajectory: Trajectory) -> str:
+    """What a simulation of the torques from each node misses at the next one."""
+    try:
+        with Deadline(_SECONDS).in_force():
+            replay: DynamicsReplay = replay_dynamics(trajectory)
+    except (HoviError, OutOfTimeError) as error:
+        return f"none: {str(error).removesuffix('.')}"
+    misses = f"{replay.frame} by {1e3 * replay.largest_tip:.1e} mm"
+    if not replay.sliding.all():
+        misses = f"{replay.angle:.1e} rad, {misses}"
+    return (
+        "SciPy's DOP853 on Pinocchio's ABA, from every node, misses the next by "
+        f"{misses}: this certifies dynamics and torques, not optimality"
+    )
+
+
+def _margins(trajectory: Trajectory) -> Iterator[Row]:
+    limits, kept = imposed_limits(trajectory), kept_distances(trajectory)
+    if limits is None:
+        yield "limits", "none were imposed"
+    else:
+        margin = closeness(trajectory, limits)
+        for k, kind in enumerate(KINDS[: len(margin)]):
+            if np.isfinite(margin[k]).any():
+                joint = int(np.argmin(margin[k]))
+                share = f"{100 * float(margin[k, joint]):.2g} % of the range"
+                yield (
+                    f"margin to the limits on {kind}",
+                    (f"{share}, at {trajectory.coordinate_names[joint]}"),
+                )
+    if kept is not None:
+        clearance, distances = kept
+        found = approach_along(trajectory, distances, clearance.margin)
+        least = float((found.distance - distances.allowance).min())
+        yield "least distance", f"{least:.4g} m (margin {clearance.margin:g} m)"
+
+
+def _effects(trajectory: Trajectory) -> str:
+    """What each effect adds to the torques along the motion; the description for segments."""
+    scene = trajectory.scene
+    if scene is None:
+        parts = trajectory.segments
+        texts = [] if parts is None else [_description(each) for each in parts.scenes]
+        return "".join(f"<pre>{html.escape(each)}</pre>" for each in dict.fromkeys(texts))
+    rows: list[Row] = [("effect", "root mean square of its torques", "largest", "at")]
+    for each in scene.effects:
+        rows.append((each.key, *_contribution(trajectory, scene, each.key)))
+    description = f"<pre>{html.escape(_description(scene))}</pre>"
+    note = (
+        "<p>The torques of the motion less those that the same motion would take without the "
+        "effect.</p>"
+    )
+    return (note + _table(tuple(rows), True) if scene.effects else "") + description
+
+
+def _description(scene: Scene) -> str:
+    """What a scene simulates and leaves out, without measured times."""
+    return scene.describe().partition("\nderivatives:")[0]
+
+
+def _contribution(trajectory: Trajectory, scene: Scene, key: str) -> Row:
+    """Root mean square, largest value, and where it is, of the torques of one effect."""
+    t = np.linspace(0.0, trajectory.duration, _SAMPLES)
+    others = [each for each in scene.effects if each.key != key]
+    try:
+        without = Scene(scene.robot, others, passive=scene.passive)
+        bare = dataclasses.replace(trajectory, scene=without)
+        difference: Array = trajectory.sample(t).tau - bare.sample(t).tau
+    except HoviError as error:
+        return "", "", str(error)
+    k, joint = np.unravel_index(np.argmax(np.abs(difference)), difference.shape)
+    name = trajectory.coordinate_names[int(joint)]
+    unit = "N" if scene.robot.sliding[int(joint)] else "N m"
+    return (
+        f"{np.sqrt(np.mean(difference**2)):.4g}",
+        f"{abs(difference[k, joint]):.4g} {unit}",
+        f"{name}, {t[k]:.3g} s",
+    )
+
+
+def _scene(trajectory: Trajectory) -> str:
+    scene, parts = trajectory.scene, trajectory.segments
+    scenes = [scene] if scene is not None else [] if parts is None else list(parts.scenes)
+    shown = []
+    for each in scenes:
+        data = each.to_dict()
+        data["robot"] = each.robot.name  # its file has a section of its own in the motion
+        shown.append(json.dumps(data, indent=2, default=str))
+    return "\n".join(dict.fromkeys(shown))[:_MAX_SCENE]
+
+
+def _table(rows: tuple[Row, ...], head: bool = False) -> str:
+    lines = []
+    for k, row in enumerate(rows):
+        tag = "th" if head and k == 0 else "td"
+        cells = "".join(f"<{tag}>{html.escape(each)}</{tag}>" for each in row)
+        lines.append(f"<tr>{cells}</tr>")
+    return "\n".join(lines) if not head else f"<table>{''.join(lines)}</table>"

@@ -1,0 +1,1 @@
+"""What a replay page shows around its scene: bars, strips, names and controls."""

@@ -1,0 +1,51 @@
+"""The code of the how-tos and of the README runs as it stands there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import hovi
+
+TOP = Path(__file__).resolve().parents[1]
+PAGES = sorted((TOP / "docs" / "howto").glob("*.md"))
+CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_code_of_a_page_runs(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for block in CODE.findall(page.read_text()):
+        exec(compile(block, page.name, "exec"), names)
+
+
+def test_every_page_but_the_index_has_code() -> None:
+    without = [page.stem for page in PAGES if not CODE.search(page.read_text())]
+    assert without == ["index"]
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (TOP / "docs" / "howto" / "index.md").read_text()
+    for page in PAGES:
+        assert page.stem == "index" or f"({page.name})" in index
+
+
+def test_the_readme_begins_with_ten_lines_that_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    block = CODE.findall((TOP / "README.md").read_text())[0]
+    assert len(block.splitlines()) <= 10
+    names: dict[str, object] = {}
+    shown: list[object] = []
+    monkeypatch.setattr(hovi, "replay", shown.append)
+    exec(compile(block, "README.md", "exec"), names)
+    (motion,) = shown
+    assert isinstance(motion, hovi.Trajectory)
+    assert names["solution"].success  # type: ignore[attr-defined]
+
+
+def test_the_first_picture_is_small() -> None:
+    assert (TOP / "docs" / "images" / "first_motion.gif").stat().st_size < 1.5e6

@@ -1,0 +1,93 @@
+"""The menu of demonstrations."""
+
+from __future__ import annotations
+
+import http.client
+import re
+import threading
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from hovi.planning.task_file.reading import load_task
+from hovi.robot.bundled_models import example
+from hovi.viewing.documents.demo import MOTIONS, DemoServer, menu_html
+from oracles.headless_browser import CHROMIUM, Tab, headless_browser
+
+needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+QUICK = "spacecraft_reorients"
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[DemoServer]:
+    server = DemoServer()
+    planner = threading.Thread(target=server.plan_what_is_chosen, args=(lambda line: None,))
+    planner.start()
+    yield server
+    server.close()
+    planner.join()
+
+
+def test_there_are_eight_motions_and_their_scenes_load() -> None:
+    assert len({each.scene for each in MOTIONS}) == 8
+    for each in MOTIONS:
+        load_task(example(f"{each.scene}.toml"))
+
+
+def test_the_menu_has_every_scene_file_to_copy() -> None:
+    menu = menu_html()
+    for each in MOTIONS:
+        assert f'id="{each.scene}"' in menu
+    assert menu.count('class="copy"') == 8
+    assert "default-src 'none'" in menu
+    assert not re.search(r"(src|href)=\"(?!data:)", menu)
+
+
+def test_a_motion_is_planned_when_it_is_asked_for(demo: DemoServer) -> None:
+    with urllib.request.urlopen(f"{demo.url}motion/{QUICK}", timeout=120) as answer:
+        page = answer.read().decode()
+    assert "const PANEL" in page
+
+
+def test_other_names_and_other_hosts_are_refused(demo: DemoServer) -> None:
+    address = urlsplit(demo.url).netloc
+    for path, host, status in (
+        ("/motion/no_such_scene", address, 404),
+        ("/motion/..%2fsecret", address, 403),
+        ("/", "example.org", 403),
+        ("/", address, 200),
+    ):
+        connection = http.client.HTTPConnection(address, timeout=30)
+        connection.request("GET", path, headers={"Host": host})
+        assert connection.getresponse().status == status
+        connection.close()
+
+
+@needs_chromium
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
+def test_a_click_on_a_card_shows_its_motion(
+    demo: DemoServer, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    with headless_browser(tmp_path / "profile") as tab:
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1}
+        tab.call("Emulation.setDeviceMetricsOverride", mobile=size[0] < 500, **metrics)
+        tab.call("Page.navigate", url=demo.url)
+        tab.until("document.querySelectorAll('.card').length == 8")
+        _copies_the_scene_file(tab)
+        tab.value(f"document.querySelector('#{QUICK} .play').click(); 1")
+        tab.until(
+            "document.querySelector('iframe')?.contentWindow?.viewer?.animator?.actions?.length > 0"
+        )
+        shown = tab.value("document.querySelector('iframe').getBoundingClientRect().width")
+        assert shown >= 0.6 * size[0]
+        assert all(url.startswith((demo.url, "data:", "blob:")) for url in tab.requests)
+        assert not tab.errors
+
+
+def _copies_the_scene_file(tab: Tab) -> None:
+    """The text that is marked where the clipboard is not available is the scene file."""
+    shown = tab.value(f"document.querySelector('#{QUICK} pre').textContent")
+    assert shown == example(f"{QUICK}.toml").read_text()
