@@ -519,6 +519,7 @@ def _hulls_fit(lists: dict[str, list[Any]]) -> bool:
 _CHOSEN = {
     **{"q": _in("P q"), "chosen": _in("k", "int64")},
     **{"distances": _out("P k"), "known": Kind("P k", "int64", output=True)},
+    "wanted": _in("P k", "bool"),
 }
 _PAIRS = {
     "letters": {"P": (0, 9)},
@@ -854,7 +855,11 @@ ENTRIES: dict[str, Entry] = {
         fits=_pairs_fit,
     ),
     "distances.values": Entry(
-        lambda **arguments: pair_distances().values(**arguments), _CHOSEN, {"reach": 0.5}, **_PAIRS
+        lambda **arguments: pair_distances().values(**arguments),
+        _CHOSEN,
+        {"reach": 0.5},
+        optional=("wanted",),
+        **_PAIRS,
     ),
     "distances.expand": Entry(
         lambda **arguments: pair_distances().expand(**arguments),
@@ -863,7 +868,7 @@ ENTRIES: dict[str, Entry] = {
             **{"jacobian": _out("P k n"), "curvature": _out("P n n")},
         },
         {"reach": 0.5},
-        optional=("force",),
+        optional=("force", "wanted"),
         **_PAIRS,
     ),
     "symbolic.frame_placement": Entry(

@@ -71,7 +71,8 @@ struct Model {
 enum class Known : std::int64_t { exactly, far, not_at_all };
 
 // points: configurations, (P, nq). pairs: numbers of k pairs. force: weights of the second
-// derivatives, (P, k), or null.
+// derivatives, (P, k), or null. wanted: which distances are, (P, k), or null for all; others count
+// as far.
 struct Request {
   std::size_t points;
   const double* q;
@@ -79,6 +80,7 @@ struct Request {
   const std::int64_t* pair;
   double reach;
   const double* force;
+  const bool* wanted;
 };
 
 // distance, known: (P, k). jacobian: (P, k, nv), or null; zero where the distance is not known

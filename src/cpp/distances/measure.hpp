@@ -247,8 +247,11 @@ void measure(const Model& model, const Request& request, const Answer& answer, d
       const Pair& pair = model.pair[request.pair[k]];
       Contact contact;
       const std::size_t at = p * K + k;
-      const Known known = measure_pair(model, pair, work, request.reach, work.memory[k], contact,
-                                       answer.distance[at]);
+      Known known = Known::far;
+      answer.distance[at] = request.reach;
+      if (!request.wanted || request.wanted[at])
+        known = measure_pair(model, pair, work, request.reach, work.memory[k], contact,
+                             answer.distance[at]);
       answer.known[at] = static_cast<std::int64_t>(known);
       if (!answer.jacobian) continue;
       double* const slope = answer.jacobian + at * nv;

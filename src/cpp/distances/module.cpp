@@ -20,6 +20,7 @@ namespace {
 
 using Index2 = Array<const std::int64_t, 2>;
 using IndexOut2 = Array<std::int64_t, 2>;
+using Mask2 = Array<const bool, 2>;
 
 std::size_t natural(const char* name, std::int64_t value, std::int64_t end) {
   if (value < 0 || value >= end)
@@ -164,12 +165,14 @@ Request request_of(const PairDistances& self, const Input<2>& q, const Index& ch
   const std::size_t pairs = chosen.shape(0);
   for (std::size_t k = 0; k < pairs; ++k)
     natural("chosen", chosen.data()[k], static_cast<std::int64_t>(self.size()));
-  return {points, q.data(), pairs, chosen.data(), reach, nullptr};
+  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr};
 }
 
 void values(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
-            const Output<2>& distances, const IndexOut2& known) {
-  const Request request = request_of(self, q, chosen, reach);
+            const Output<2>& distances, const IndexOut2& known,
+            const std::optional<Mask2>& wanted) {
+  Request request = request_of(self, q, chosen, reach);
+  request.wanted = data_or_null("wanted", wanted, {request.points, request.pairs});
   distances.require("distances", {request.points, request.pairs});
   known.require("known", {request.points, request.pairs});
   const nb::gil_scoped_release released;
@@ -178,10 +181,12 @@ void values(const PairDistances& self, const Input<2>& q, const Index& chosen, d
 
 void expand(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const std::optional<Input<2>>& force, const Output<2>& distances,
-            const IndexOut2& known, const Output<3>& jacobian, const Output<3>& curvature) {
+            const IndexOut2& known, const Output<3>& jacobian, const Output<3>& curvature,
+            const std::optional<Mask2>& wanted) {
   Request request = request_of(self, q, chosen, reach);
   const std::size_t P = request.points, K = request.pairs, nv = self.nv();
   request.force = data_or_null("force", force, {P, K});
+  request.wanted = data_or_null("wanted", wanted, {P, K});
   distances.require("distances", {P, K});
   known.require("known", {P, K});
   jacobian.require("jacobian", {P, K, nv});
@@ -202,7 +207,8 @@ NB_MODULE(distances, m) {
       .def_prop_ro("nq", &PairDistances::nq)
       .def_prop_ro("nv", &PairDistances::nv)
       .def_prop_ro("size", &PairDistances::size)
-      .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a)
+      .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a,
+           "wanted"_a = nb::none())
       .def("expand", &expand, "q"_a, "chosen"_a, "reach"_a, "force"_a.none(), "distances"_a,
-           "known"_a, "jacobian"_a, "curvature"_a);
+           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none());
 }

@@ -3,6 +3,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 class PairDistances:
     def __init__(
@@ -36,7 +37,13 @@ class PairDistances:
     @property
     def size(self) -> int: ...
     def values(
-        self, q: Array, chosen: Index, reach: float, distances: Array, known: Index
+        self,
+        q: Array,
+        chosen: Index,
+        reach: float,
+        distances: Array,
+        known: Index,
+        wanted: Mask | None = None,
     ) -> None: ...
     def expand(
         self,
@@ -48,4 +55,5 @@ class PairDistances:
         known: Index,
         jacobian: Array,
         curvature: Array,
+        wanted: Mask | None = None,
     ) -> None: ...

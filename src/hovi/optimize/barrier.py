@@ -156,6 +156,11 @@ class Barrier:
         zl, zu = (np.where(known, z[chosen], 0.0) for z in (self.zl, self.zu))
         return dataclasses.replace(self, bounds=some, s=self.s[chosen], zl=zl, zu=zu)
 
+    def outside(self, y: Array) -> Array:
+        """How far outputs are outside their bounds, 0 inside, shape (R,)."""
+        beyond = np.maximum(self.bounds.lower - y, y - self.bounds.upper)
+        return np.maximum(beyond, 0.0)
+
     @property
     def multipliers(self) -> Array:
         """zu - zl."""

@@ -50,6 +50,10 @@ class BoundedObjective(ABC, Generic[X]):
     """An objective with bounded outputs."""
 
     bounds: Bounds
+    blocked: bool = False
+    """Whether refining found outputs so far from their bounds that the iteration is to end."""
+    reopens: bool = False
+    """Whether new outputs may be outside their bounds, which an iteration then recovers from."""
 
     @abstractmethod
     def outputs(self, x: X) -> Outputs:
@@ -84,6 +88,10 @@ class BoundedObjective(ABC, Generic[X]):
         Returns None if nothing changed.
         level: mean product z gap at x, relative to the mean density of the objective.
         """
+        return None
+
+    def refine_at_once(self, x: X) -> Refinement | None:
+        """The same after any step, for outputs that cannot wait for a smaller product."""
         return None
 
 

@@ -32,6 +32,7 @@ from hovi.optimize.bounded_objective import (
     FEASIBILITY_TOLERANCE,
     BoundedObjective,
     BoundedOutcome,
+    Refinement,
 )
 from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -52,6 +53,12 @@ FIRST_REFINEMENT = 1e-2
 """Mean product z gap, relative to the mean density, below which outputs are first refined."""
 NEXT_REFINEMENT = 0.1
 """The next one, relative to the last."""
+REOPENED, MOST_REOPENED = 0.1, 1e-2
+"""Least barrier parameter after a refinement with outputs outside their bounds, relative to how far
+they are and to the mean density, and its largest value, relative to the mean density."""
+LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
+"""Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
+slacks are moved away from their bounds instead of ending as diverged, and how many times."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 SHORT_SHARE = 0.1
@@ -69,7 +76,7 @@ MAX_FORCE = 1e12
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
 MAX_SLOW_STEPS = 40
-"""Steps after which it ends as diverged if |y - s| is still large and has hardly fallen."""
+"""Steps after which it ends as diverged if |y - s| was large in all and has hardly fallen."""
 SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
 """The least relative decrease of |y - s| in these steps, and the |y - s| above which it counts."""
 
@@ -129,7 +136,7 @@ class _Iteration(BoundedSteps[X]):
         self.stalled = 0
         self.violations: list[float] = []
         self.level = FIRST_REFINEMENT
-        self.refinements = 0
+        self.refinements = self.reopenings = 0
         self.marks = outcome.marks
 
     def run(self) -> None:
@@ -144,13 +151,17 @@ class _Iteration(BoundedSteps[X]):
             accepted = self._try(step, model)
             finished = self._finished(step, accepted)
             refined = (accepted or finished) and self._refined(at_end=finished)
+            if self.objective.blocked:
+                return
             if finished and not refined:
                 self.outcome.stop = Stop.STATIONARY
                 self.outcome.model = self.model()
                 return
             if self._is_hopeless():
-                self.outcome.stop = Stop.DIVERGED
-                return
+                if not self._reopened():
+                    self.outcome.stop = Stop.DIVERGED
+                    return
+                refined = True
             if accepted or refined:
                 model = self.model()
 
@@ -202,10 +213,27 @@ class _Iteration(BoundedSteps[X]):
         """Whether the bounds seem impossible to meet from here."""
         slow = False
         if len(self.violations) > MAX_SLOW_STEPS:
-            before, now = self.violations[-MAX_SLOW_STEPS - 1], self.violations[-1]
-            slow = now > max(LARGE_VIOLATION, (1 - SLOW_DECREASE) * before)
+            last = self.violations[-MAX_SLOW_STEPS - 1 :]
+            slow = min(last) > LARGE_VIOLATION and last[-1] > (1 - SLOW_DECREASE) * last[0]
         stalled = self.stalled >= MAX_STALLED_STEPS
         return stalled or slow or self.penalty > MAX_FORCE * self.density
+
+    def _reopened(self) -> bool:
+        """Whether the slacks were moved away from their bounds again, to go on from there."""
+        outcome, objective = self.outcome, self.objective
+        outside = float(outcome.violation.max(initial=0.0))
+        if not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED:
+            return False
+        self.reopenings += 1
+        share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED)
+        mu, margin = share * self.density, max(REOPENED * outside, LEAST_REOPENED)
+        bounds, y = objective.bounds, outcome.outputs.y
+        outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
+        self.product = outcome.barrier.mean_product()
+        self.penalty, self.shift, self.radius = 0.0, 0.0, max(self.radius, 1.0)
+        self.stalled, self.cautious = 0, self.plain
+        self.violations.clear()
+        return True
 
     def _finished(self, step: BoundedStep, accepted: bool) -> bool:
         """Whether the last step, of the last mu, predicts next to nothing for its whole length."""
@@ -236,17 +264,28 @@ class _Iteration(BoundedSteps[X]):
         """Whether outputs were replaced by others, which bound less."""
         level, outcome = self.product / self.density, self.outcome
         early = level > self.level or outcome.violation.max(initial=0.0) > level
-        if self.refinements >= MAX_REFINEMENTS or (early and not at_end):
+        if early and not at_end:
+            return self._replaced(self.objective.refine_at_once(outcome.x))
+        if self.refinements >= MAX_REFINEMENTS:
             return False
         self.level = NEXT_REFINEMENT * min(level, self.level)
-        found = self.objective.refine(outcome.x, level)
+        found = self._replaced(self.objective.refine(outcome.x, level))
+        self.refinements += int(found)
+        return found
+
+    def _replaced(self, found: Refinement | None) -> bool:
+        """Whether outputs were replaced; then their slacks and multipliers are, too."""
         if found is None:
             return False
-        self.refinements += 1
+        outcome = self.outcome
         outcome.outputs = self.objective.outputs(outcome.x)
         barrier = outcome.barrier.refined(
             self.objective.bounds, outcome.outputs.y, found.kept, found.origin
         )
+        outside = float(barrier.outside(outcome.outputs.y)[len(found.kept) :].max(initial=0.0))
+        mu = min(REOPENED * outside, MOST_REOPENED) * self.density
+        if mu > barrier.mu:  # room for the others to move
+            barrier = barrier.warm(barrier.bounds, outcome.outputs.y, mu, REOPENED * outside)
         self.product = barrier.mean_product()
         outcome.barrier = barrier.with_mu(max(barrier.mu, self.product))
         self.penalty, self.radius = 0.0, max(self.radius, 1.0)

@@ -285,6 +285,25 @@ def test_chosen_pairs_are_those_columns(panda: Robot) -> None:
     np.testing.assert_array_equal(part[2], whole[2][:, some])
 
 
+def test_distances_that_are_not_wanted_are_far(panda: Robot) -> None:
+    geometry = geometry_of(panda.model, [SHAPES[name] for name in ("sphere", "capsule", "box")])
+    compiled, pairs = CompiledDistances(panda, geometry), everything(geometry)
+    q = configurations(panda, 6)
+    wanted = np.random.default_rng(2).uniform(size=(len(q), len(pairs))) < 0.3
+    force = np.ones(wanted.shape)
+    whole = compiled.expand(q, pairs, 2.0, np.where(wanted, force, 0.0))
+    part = compiled.expand(q, pairs, 2.0, force, wanted)
+    for all_of_them, some in zip(whole[:3], part[:3], strict=True):
+        np.testing.assert_allclose(some[wanted], all_of_them[wanted], atol=1e-9)
+    np.testing.assert_allclose(part[3], whole[3], atol=1e-6)
+    assert (part[0][~wanted] == 2.0).all()
+    assert (part[1][~wanted] == FAR).all()
+    assert (part[2][~wanted] == 0.0).all()
+    values, known = compiled.values(q, pairs, 2.0, wanted)
+    np.testing.assert_allclose(values[wanted], whole[0][wanted], atol=1e-9)
+    assert (known[~wanted] == FAR).all()
+
+
 def test_other_shapes_are_not_known_and_other_joints_refused() -> None:
     robot = robot_of(chain([pin.JointModelRX()]))
     geometry = geometry_of(robot.model, [coal.Cone(0.1, 0.2), coal.Sphere(0.1)])

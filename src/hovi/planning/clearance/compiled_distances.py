@@ -24,6 +24,7 @@ from hovi.robot.space.joint_kinds import kind_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 AXIS = 0
 POINTS, CYLINDER, OTHER = range(3)
@@ -59,28 +60,44 @@ class CompiledDistances:
         arguments = arguments_of(model, list(geometry.geometryObjects), pairs, moving or {})
         self._kernel = native.PairDistances(**arguments, portable=portable)
 
-    def values(self, q: Array, chosen: Index, reach: float) -> tuple[Array, Index]:
+    def values(
+        self, q: Array, chosen: Index, reach: float, wanted: Mask | None = None
+    ) -> tuple[Array, Index]:
         """Distances of chosen pairs at configurations (P, nq), and how each is known, (P, k).
 
         reach: distance in [m], beyond which a lower bound of at least that is enough.
+        wanted: which distances are, (P, k), all if None; others count as FAR at the reach.
         """
         distances = np.empty((len(q), len(chosen)))
         known = np.empty(distances.shape, dtype=np.int64)
-        self._kernel.values(self._coordinates(q), chosen, reach, distances, known)
+        self._kernel.values(self._coordinates(q), chosen, reach, distances, known, wanted)
         return distances, known
 
     def expand(
-        self, q: Array, chosen: Index, reach: float, force: Array | None = None
+        self,
+        q: Array,
+        chosen: Index,
+        reach: float,
+        force: Array | None = None,
+        wanted: Mask | None = None,
     ) -> tuple[Array, Index, Array, Array]:
         """As values, with d' (P, k, nv) and the sum of force d'' (P, nv, nv), where exact.
 
-        force: shape (P, k).
+        force: shape (P, k). wanted: as for values.
         """
         P, k, nv = len(q), len(chosen), self._nv + 6 * self._paths
         distances, known = np.empty((P, k)), np.empty((P, k), dtype=np.int64)
         jacobian, curvature = np.empty((P, k, nv)), np.empty((P, nv, nv))
         self._kernel.expand(
-            self._coordinates(q), chosen, reach, force, distances, known, jacobian, curvature
+            self._coordinates(q),
+            chosen,
+            reach,
+            force,
+            distances,
+            known,
+            jacobian,
+            curvature,
+            wanted,
         )
         if self._paths:
             jacobian = np.ascontiguousarray(jacobian[:, :, : self._nv])

@@ -21,6 +21,7 @@ from hovi.planning.obstacles.obstacle_path import ObstaclePath
 from hovi.robot.robot import Robot
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -137,13 +138,14 @@ class Distances:
             raise InputError("distances to obstacles that move need times: see Distances.at.")
         return np.concatenate([q[:, :nq], *(path.poses(q[:, nq]) for path in self.paths)], axis=1)
 
-    def values(self, q: Array, reach: float = np.inf) -> Array:
+    def values(self, q: Array, reach: float = np.inf, wanted: Mask | None = None) -> Array:
         """Signed distances with allowances at configurations (P, nq), shape (P, K), in [m].
 
         Configurations along a motion take less time than others.
         reach: distance beyond which a lower bound of at least that is returned, in [m].
+        wanted: which distances are, shape (P, K), all if None; of others the reach is returned.
         """
-        distances = self._measured.values(self._placed(q), self._chosen, reach)
+        distances = self._measured.values(self._placed(q), self._chosen, reach, wanted)
         return distances + self.allowance if self.allowance.any() else distances
 
     def expand(self, q: Array, reach: float = np.inf) -> tuple[Array, Array]:
@@ -162,15 +164,22 @@ class Distances:
         return self.expansion(q, force)[2]
 
     def expansion(
-        self, q: Array, force: Array | None, reach: float = np.inf
+        self,
+        q: Array,
+        force: Array | None,
+        reach: float = np.inf,
+        wanted: Mask | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives, and the sum of force d'': see `expand`, `curvature`.
+
+        wanted: as for `values`.
 
         Second derivatives are exact for one pair of nearest points, which moves along the vertices,
         edges, faces and round surfaces that it lies on; cylinders that overlap have none.
         """
         placed = self._placed(q)
-        distances, jacobian, curvature = self._measured.expand(placed, self._chosen, reach, force)
+        found = self._measured.expand(placed, self._chosen, reach, force, wanted)
+        distances, jacobian, curvature = found
         if self.allowance.any():
             distances = distances + self.allowance
         return distances, jacobian, curvature

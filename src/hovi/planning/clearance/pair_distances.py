@@ -15,6 +15,7 @@ from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 BATCH = 20_000
 """Number of distances in one compiled call, a few ms; the deadline is looked at between calls."""
@@ -44,24 +45,31 @@ class PairDistances:
         except NotImplementedError:
             self._compiled = None
 
-    def values(self, q: Array, pairs: Index, reach: float) -> Array:
+    def values(self, q: Array, pairs: Index, reach: float, wanted: Mask | None = None) -> Array:
         """Distances of pairs, by number, at configurations (P, nq), shape (P, k), in [m].
 
         reach: distance in [m], beyond which a lower bound of at least that is returned.
+        wanted: which distances are, (P, k), all if None; of others the reach is returned.
         """
         distances = np.empty((len(q), len(pairs)))
         self._coal.reset()
         for part in self._parts(len(q), len(pairs)):
-            distances[part] = self._part_values(q[part], pairs, reach)
+            some = None if wanted is None else np.ascontiguousarray(wanted[part])
+            distances[part] = self._part_values(q[part], pairs, reach, some)
         return distances
 
     def expand(
-        self, q: Array, pairs: Index, reach: float, force: Array | None
+        self,
+        q: Array,
+        pairs: Index,
+        reach: float,
+        force: Array | None,
+        wanted: Mask | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives (P, k, nv), and the sum of force d'', (P, nv, nv).
 
         Pairs beyond reach have no derivatives, and those that overlap by Coal no second ones.
-        force: shape (P, k); zero if None.
+        force: shape (P, k); zero if None. wanted: as for `values`.
         """
         P, k = len(q), len(pairs)
         distances = np.empty((P, k))
@@ -69,7 +77,8 @@ class PairDistances:
         self._coal.reset()
         for part in self._parts(P, k):
             weights = None if force is None else np.ascontiguousarray(force[part])
-            found = self._part_expanded(q[part], pairs, reach, weights)
+            some = None if wanted is None else np.ascontiguousarray(wanted[part])
+            found = self._part_expanded(q[part], pairs, reach, weights, some)
             distances[part], jacobian[part], curvature[part] = found
         return distances, jacobian, curvature
 
@@ -77,13 +86,13 @@ class PairDistances:
         size = max(1, BATCH // max(1, pairs))
         return [slice(first, first + size) for first in range(0, points, size)]
 
-    def _part_values(self, q: Array, pairs: Index, reach: float) -> Array:
+    def _part_values(self, q: Array, pairs: Index, reach: float, wanted: Mask | None) -> Array:
         raise_if_late()
         if self._compiled is None:
-            unknown = np.ones((len(q), len(pairs)), dtype=bool)
-            distances = np.empty(unknown.shape)
+            unknown = np.ones((len(q), len(pairs)), dtype=bool) if wanted is None else wanted
+            distances = np.full(unknown.shape, reach)
         else:
-            distances, known = self._compiled.values(q, pairs, reach)
+            distances, known = self._compiled.values(q, pairs, reach, wanted)
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):
             raise_if_late()
@@ -92,16 +101,22 @@ class PairDistances:
         return distances
 
     def _part_expanded(
-        self, q: Array, pairs: Index, reach: float, force: Array | None
+        self,
+        q: Array,
+        pairs: Index,
+        reach: float,
+        force: Array | None,
+        wanted: Mask | None,
     ) -> tuple[Array, Array, Array]:
         raise_if_late()
         P, k, nv = len(q), len(pairs), self._nv
         if self._compiled is None:
-            unknown = np.ones((P, k), dtype=bool)
-            distances, jacobian = np.empty((P, k)), np.zeros((P, k, nv))
+            unknown = np.ones((P, k), dtype=bool) if wanted is None else wanted
+            distances, jacobian = np.full((P, k), reach), np.zeros((P, k, nv))
             curvature = np.zeros((P, nv, nv))
         else:
-            distances, known, jacobian, curvature = self._compiled.expand(q, pairs, reach, force)
+            found = self._compiled.expand(q, pairs, reach, force, wanted)
+            distances, known, jacobian, curvature = found
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):
             raise_if_late()

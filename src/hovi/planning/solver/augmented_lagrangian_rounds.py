@@ -75,18 +75,19 @@ def minimize_constrained(
     path: DiscretePath,
     minimize: Callable[[Multipliers, DiscretePath, float], Result],
     known: Multipliers | None = None,
+    most: int = MAX_ROUNDS,
 ) -> ConstrainedResult[Result]:
     """Minimise subject to the problem's equality constraints.
 
     minimize: minimises the augmented Lagrangian with given multipliers, from a path, to a
         relative decrease.
-    known: multipliers of a nearby problem, for a warm start.
+    known: multipliers of a nearby problem, for a warm start. most: number of rounds.
     """
     multipliers = known or first_multipliers(problem, path)
     first = multipliers
     decrease = FIRST_DECREASE
     last = np.inf, np.inf
-    for _ in range(MAX_ROUNDS):
+    for _ in range(most):
         result = minimize(multipliers, path, decrease)
         path = result.x
         residuals = ActionObjective(problem, multipliers=multipliers).residuals(path)

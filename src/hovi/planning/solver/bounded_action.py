@@ -81,11 +81,12 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def _with_rows(self) -> None:
         """The bounds of the outputs at the points, then those of the rows."""
         lower, upper, weights = (part.ravel() for part in self._at_points)
-        rows = self.rows
+        rows, self._row_weights = self.rows, np.zeros(0)
         if rows is not None and rows.size > 0:
             low, high = rows.bounds
             lower, upper = np.append(lower, low), np.append(upper, high)
-            weights = np.append(weights, rows.weights)
+            self._row_weights = rows.weights
+            weights = np.append(weights, self._row_weights)
             self._row_columns = rows.columns(self.action.coordinates)
         self.bounds = Bounds(lower, upper, weights, self.problem.grid.duration)
 
@@ -128,8 +129,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         rows, J = self.rows, self._row_columns
         if rows is None or rows.size == 0:
             return None
-        first, weights = self._point_count, self.bounds.weights
-        slopes, curves = (weights[first:] * each[first:] for each in (rho, sigma))
+        here = slice(self._point_count, self._point_count + rows.size)
+        slopes, curves = (self._row_weights * each[here] for each in (rho, sigma))
 
         def add(expansion: Expansion) -> None:
             native.pull_rows(rows.intervals, rows.joints, J, slopes, expansion.gradient)
@@ -227,7 +228,8 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             local[:, : pulled.shape[1]] += own
         rows = self.rows
         if rows is not None and rows.size > 0:
-            weighted = (self.bounds.weights * forces)[self._point_count :]
+            first = self._point_count
+            weighted = self._row_weights * forces[first : first + rows.size]
             native.pull_rows(rows.intervals, rows.joints, self._row_columns, weighted, local)
         return model.scatter(local)
 

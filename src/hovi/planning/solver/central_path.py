@@ -11,6 +11,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.barrier import Barrier
 from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
 
 Array = npt.NDArray[np.float64]
 
@@ -26,12 +27,14 @@ class CentralPath:
     rows: bounded control points; None to build them anew.
     barrier: slacks and multipliers of the solution, at the points and in the rows; None for none.
     margins: by which its bounds are tightened at the points: see BoundedAction; None for none.
+    near: rows of distances; None to find them anew.
     """
 
     points: tuple[tuple[float, DiscretePath], ...]
     rows: LimitRows | None
     barrier: Barrier | None = None
     margins: Array | None = None
+    near: ClearanceRows | None = None
 
     @property
     def level(self) -> float:
@@ -55,10 +58,12 @@ class CentralPath:
     def on(self, grid: Grid, paths: tuple[DiscretePath, ...]) -> CentralPath:
         """The same with other paths, on a grid of the same intervals, and with its rows fixed."""
         rows = None if self.rows is None else self.rows.fixed_on(grid)
+        near = None if self.near is None else self.near.copied(fixed=True)
         levels = (level for level, _ in self.points)
-        return CentralPath(tuple(zip(levels, paths, strict=True)), rows)
+        return CentralPath(tuple(zip(levels, paths, strict=True)), rows, near=near)
 
     def freed(self) -> CentralPath:
         """The same with rows that may be refined."""
         rows = None if self.rows is None else self.rows.freed()
-        return CentralPath(self.points, rows)
+        near = None if self.near is None else self.near.copied(fixed=False)
+        return CentralPath(self.points, rows, near=near)

@@ -78,11 +78,11 @@ class ClearanceOutputs(PointOutputs):
 
     def values(self, q: Array) -> Array:
         """y, shape (P, K)."""
-        return _saturated(self._excess(q))[0]
+        return saturated(self._excess(q))[0]
 
     def expand(self, q: Array, force: Array) -> tuple[Array, Array]:
         """Derivatives and curvature: see PointOutputs."""
-        _, slope, bend = _saturated(self._excess(q))
+        _, slope, bend = saturated(self._excess(q))
         weights = force * slope / DISTANCE_SCALE
         _, jacobian, curvature = self.distances.expansion(q, weights, self.reach)
         jacobian /= DISTANCE_SCALE
@@ -98,7 +98,7 @@ class ClearanceOutputs(PointOutputs):
         return self._last[1]
 
 
-def _saturated(y: Array) -> tuple[Array, Array, Array]:
+def saturated(y: Array) -> tuple[Array, Array, Array]:
     """phi(y) and its two derivatives, in DISTANCE_SCALE.
 
     y up to the first CUTOFF, then width (x - x^3 + x^4/2) more with x in [0, 1], then constant.

@@ -85,7 +85,7 @@ class TimedSearch(BoundedSearch):
         """Solve for the problem's duration, roughly."""
         options = self.remaining_options()
         rough = dataclasses.replace(options, decrease=ROUGH_DECREASE, barrier=ROUGH_BARRIER)
-        return self._minimized(self.objective(None), path, rough, None)
+        return self.minimized(self.objective(None), path, rough, None)
 
     def _stretch(self, duration: float) -> None:
         """Move the problem and its guess to another duration, in [s]."""

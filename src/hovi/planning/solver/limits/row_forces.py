@@ -46,6 +46,27 @@ def forces_of(
     return instants, [PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))]
 
 
+def joined(
+    instants: Instants | None,
+    terms: list[PointTerms],
+    others: Instants,
+    more: list[PointTerms],
+) -> tuple[Instants, list[PointTerms]]:
+    """Forces at instants and at others, one batch each, as one batch."""
+    if instants is None:
+        return others, more
+    k = np.append(instants.intervals, others.intervals)
+    s = np.append(instants.positions, others.positions)
+    weights = np.append(instants.weights, others.weights)
+    both = terms[0], more[0]
+    jet = np.concatenate([each.jet_gradient for each in both])
+    output = np.concatenate([each.output_gradient for each in both])
+    order = np.lexsort((s, k))
+    jet, output = jet[order], output[order]
+    joint = PointTerms(jet, np.zeros_like(jet), output, np.zeros_like(output))
+    return Instants(k[order], s[order], weights[order]), [joint]
+
+
 def _values_in(table: Array, nodes: Array, grid: Grid, order: int) -> Array:
     """Rows of h^j q^(j), or q, over (h q0', ..., Z, c) as sums of its values at nodes, (E, M)."""
     values = jet_rows(nodes, grid.order, grid.inner_modes)[:, order]

@@ -12,13 +12,17 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import WARM_START_MARGIN, Barrier
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
-from hovi.planning.clearance.clearance_violation import approach_along, approach_sentence
+from hovi.planning.clearance.clearance_violation import (
+    approach_along,
+    approach_sentence,
+    near_pairs,
+)
 from hovi.planning.problem.limit_violation import excess_along, worst_sentence
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
@@ -29,9 +33,11 @@ from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
 from hovi.planning.solver.limits.limit_rows import LimitRows
-from hovi.planning.solver.limits.row_forces import forces_of
+from hovi.planning.solver.limits.row_forces import forces_of, joined
 from hovi.planning.solver.methods.method import Report
 from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.deadline import Deadline, raise_if_late
 
@@ -48,6 +54,9 @@ FINE_HALVINGS = 2, 3
 """The same where a motion within such limits was not found."""
 WARM_MU_RANGE = 1e-7, 1e-4
 """Range of the initial barrier parameter of a warm start, relative to the mean density."""
+
+LOOK_AROUND = 0.02
+"""Distance beyond the least one up to which pairs near a known motion get rows, in [m]."""
 
 
 @dataclass(eq=False)
@@ -78,6 +87,7 @@ class BoundedSearch:
     along: CentralPath | None = None
     level: float | None = None
     plain: bool = False
+    lazy: bool = False
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.options.time_limit)
@@ -85,10 +95,13 @@ class BoundedSearch:
         self.history: list[Iteration] = []
         distances = self.problem.distances
         self.clearance: ClearanceOutputs | None = None
+        self.near: ClearanceRows | None = None
         if distances is not None:
-            self.clearance = ClearanceOutputs(
-                distances, self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
-            )
+            least = self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
+            if self.lazy:
+                self.near = self.no_near_rows()
+            else:
+                self.clearance = ClearanceOutputs(distances, least)
         self.margins = self.no_margins()
         known = None if self.along is None else self.along.rows
         self.rows = self.coarse_rows() if known is None else known.copied()
@@ -121,10 +134,33 @@ class BoundedSearch:
         barrier = self.options.barrier
         return LimitRows(problem.grid, self.limits, space, given, halvings, barrier)
 
+    def no_near_rows(self) -> ClearanceRows:
+        """No rows of distances yet."""
+        assert self.problem.distances is not None
+        least = self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
+        return ClearanceRows(self.problem, self.problem.distances, least)
+
+    def keeps_distances(self, path: DiscretePath) -> bool:
+        """Whether a motion keeps the distances of rows."""
+        assert self.near is not None
+        return (
+            len(near_pairs(self.problem.trajectory(path), self.near.distances, self.near.least))
+            == 0
+        )
+
+    def look_around(self, path: DiscretePath) -> None:
+        """Add rows for pairs that are near along a motion that nearly is a solution."""
+        if self.near is not None:
+            self.near.extend(self.problem, path, LOOK_AROUND)
+
     def objective(
         self, known: Multipliers | None, algebra: LinearAlgebra | None = None
     ) -> BoundedAction:
         """The action with the tightened bounds. known: multipliers of the constraints."""
+        if self.near is not None:
+            return ClearedAction(
+                self.problem, self.limits, self.margins, algebra, known, self.rows, self.near
+            )
         return BoundedAction(
             self.problem, self.limits, self.margins, algebra, known, self.clearance, self.rows
         )
@@ -133,8 +169,8 @@ class BoundedSearch:
         """The points at which the barrier of a solve was larger, and its solution."""
         density = mean_density(outcome.outputs, self.objective(self.multipliers))
         points = (*self.points, (outcome.barrier.mu / density, outcome.x))
-        barrier = None if self.clearance is not None else outcome.barrier
-        return CentralPath(points, self.rows, barrier, self.margins)
+        barrier = outcome.barrier if self.problem.distances is None else None
+        return CentralPath(points, self.rows, barrier, self.margins, self.near)
 
     def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
@@ -160,26 +196,34 @@ class BoundedSearch:
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
         """Solve with bounds at the quadrature points, in rounds if there are constraints."""
         if not self.problem.constrained:
-            return self._minimized(self.objective(None), path, self.remaining_options(), start)
+            return self.minimized(self.objective(None), path, self.remaining_options(), start)
 
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
             nonlocal start
             objective, options = self.objective(known), self.remaining_options()
             decrease, mu = max(decrease, options.decrease), max(ROUND_BARRIER, options.barrier)
             options = dataclasses.replace(options, decrease=decrease, barrier=mu)
-            outcome = self._minimized(objective, x, options, start)
-            mu = WARM_MU_RANGE[1] * mean_density(outcome.outputs, objective)
+            outcome = self.minimized(objective, x, options, start)
+            share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
+            mu = share * mean_density(outcome.outputs, objective)
             y, barrier = outcome.outputs.y, outcome.barrier
-            start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
+            start = None
+            if len(y) == len(barrier.s):
+                start = barrier.warm(objective.bounds, y, mu, min(share, WARM_START_MARGIN))
             return outcome
 
         rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
         self.multipliers, self.unmet = rounds.multipliers, rounds.reason
         return rounds.result
 
-    def _minimized(
-        self, objective: BoundedAction, path: DiscretePath, options: Options, start: Barrier | None
+    def minimized(
+        self,
+        objective: BoundedAction,
+        path: DiscretePath,
+        options: Options,
+        start: Barrier | None = None,
     ) -> Bounded:
+        """One solve of an objective. start: see minimize_bounded."""
         raise_if_late()  # the outputs at the guess alone may take seconds
         if start is not None and len(start.s) != len(objective.bounds.lower):
             start = None  # rows were added in a solve that failed
@@ -197,8 +241,15 @@ class BoundedSearch:
         Those of limits and constraints, penalty terms of the constraints included.
         """
         multipliers = outcome.barrier.multipliers
-        rows = multipliers[len(multipliers) - self.rows.size :]
+        objective = self.objective(None)
+        if isinstance(objective, ClearedAction):
+            multipliers = objective.plain(multipliers)
+        limits = len(multipliers) - (0 if self.near is None else self.near.size)
+        rows = multipliers[limits - self.rows.size : limits]
         instants, further = forces_of(self.problem, self.rows, rows)
+        if self.near is not None and self.near.size > 0 and self.problem.ld.segments is None:
+            others, more = self.near.forces(outcome.x, multipliers[limits:])
+            instants, further = joined(instants, further, others, more)
         return instants, self._forces_at_points(outcome) + further
 
     def _forces_at_points(self, outcome: Bounded) -> list[PointTerms]:
@@ -236,6 +287,18 @@ class BoundedSearch:
         approach = approach_along(trajectory, self.clearance.distances, least)
         short = (least - approach.distance) / DISTANCE_SCALE
         return np.concatenate([sides, np.stack([short, np.full_like(short, -np.inf)])], axis=2)
+
+    def too_close(self, path: DiscretePath) -> str:
+        """Which pair comes closer than the margin where there are rows of distances; "" if none."""
+        if self.near is None:
+            return ""
+        trajectory, distances = self.problem.trajectory(path), self.near.distances
+        least = self.least_distance - self.limits.tolerance * DISTANCE_SCALE
+        pairs = near_pairs(trajectory, distances, least)
+        if len(pairs) == 0:
+            return ""
+        some = distances.restricted(pairs.tolist())
+        return approach_sentence(trajectory, some, approach_along(trajectory, some, least), least)
 
     def worst(self, path: DiscretePath) -> str:
         """The limit or distance that is violated most: joint or pair, and time."""

@@ -24,6 +24,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
+from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.penalized_action import PenalizedAction
 
@@ -72,7 +73,10 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if search.clearance is not None and path is search.guess:
         outcome = solved_from(search, path)  # on its side of the obstacles
     else:
-        outcome = _solved_nearby(search, path) or search.solve(path)
+        outcome = _solved_nearby(search, path) or _solved_at_all(search, path)
+    if search.near is not None:
+        failed = outcome.stop is Stop.DIVERGED and not outcome.feasible
+        return outcome, search.worst(outcome.x) if failed else ""
     if outcome.stop is Stop.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(path)
@@ -83,13 +87,21 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
 
 def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     """The solution near a guess that is taken to be near one; None if it is not, or that fails."""
-    if not search.options.near or search.clearance is not None or search.problem.constrained:
+    constrained = search.problem.constrained and search.near is None
+    if not search.options.near or search.clearance is not None or constrained:
         return None
     if search.along is None:
         outcome = solved_from(search, path)
     else:
         outcome = _solved_along(search, search.along)
     return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
+
+
+def _solved_at_all(search: BoundedSearch, path: DiscretePath) -> Bounded:
+    if search.near is None:
+        return search.solve(path)
+    search.near = search.no_near_rows()
+    return cleared_motion(search, path)
 
 
 def _is_found(outcome: Bounded) -> bool:
@@ -117,6 +129,8 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
     """Take over the rows and the tightened bounds of a similar problem on as many intervals."""
     if along.rows is not None:
         search.rows = along.rows.copied()
+    if along.near is not None and search.near is not None:
+        search.near = along.near.on(search.problem)
     if along.margins is not None and along.margins.shape == search.margins.shape:
         search.margins = along.margins
 
@@ -147,9 +161,10 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
 
 def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) -> Bounded:
     """Solve from the point of a central path with a barrier as large as a level."""
-    problem, objective = search.problem, search.objective(search.multipliers)
-    share, point = along.at(level)
+    problem, (share, point) = search.problem, along.at(level)
     path = problem.moved(point)
+    search.look_around(path)
+    objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
     density = mean_density(outputs, objective)
     margin = min(INITIAL_MARGIN, SHIFT_MARGIN * share)
@@ -159,6 +174,7 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
 
 def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     """Solve from a motion that nearly is a solution, with a small barrier from the beginning."""
+    search.look_around(path)
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
     mu = NEARBY_MU * mean_density(outputs, objective)

@@ -21,7 +21,7 @@ from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.torque_rates_last import with_torque_rates_last
 from hovi.planning.solver.non_finite import non_finite_sentence
 from hovi.planning.solver.status import Status, diverged, infeasible_sentence, unfinished
-from hovi.system.deadline import OutOfTimeError
+from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import record_interrupt
 
 
@@ -52,8 +52,29 @@ class InteriorPoint(Method):
         report: Report | None = None,
     ) -> MethodResult:
         """See Method.minimize; the guess may violate the limits, and intervals may be split."""
-        solve = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
+        solve = partial(self._solved, report=report)
         return with_torque_rates_last(solve, problem, path, options)
+
+    def _solved(
+        self,
+        problem: TrajectoryProblem,
+        path: DiscretePath,
+        options: Options,
+        report: Report | None,
+    ) -> MethodResult:
+        """With rows for distances where pairs come near; in rounds where that is not supported."""
+        rounds = partial(with_active_pairs, partial(self._minimize, report=report), report=report)
+        limited = problem.limits is not None and bool(problem.limits.bounded.any())
+        if problem.distances is None or problem.ld.chart is not None or not limited:
+            return rounds(problem, path, options)
+        deadline = Deadline(options.time_limit)
+        found = self._minimize(problem, path, options, report, lazy=True)
+        if found.status not in (Status.INFEASIBLE, Status.DIVERGED, Status.SADDLE):
+            return found
+        options = dataclasses.replace(options, time_limit=deadline.seconds_left)
+        again = rounds(problem, path, options)
+        history = [*found.history, *again.history]
+        return dataclasses.replace(again, nit=found.nit + again.nit, history=history)
 
     def _minimize(
         self,
@@ -61,6 +82,7 @@ class InteriorPoint(Method):
         path: DiscretePath,
         options: Options,
         report: Report | None,
+        lazy: bool = False,
     ) -> MethodResult:
         limits = problem.limits or no_limits(problem.coordinates)
         reason = contradiction(problem, limits)
@@ -70,7 +92,9 @@ class InteriorPoint(Method):
                 problem, path, value, Status.INFEASIBLE, infeasible_sentence(reason)
             )
         along, level = self.along, self.level
-        search = BoundedSearch(problem, limits, options, report, path, along=along, level=level)
+        search = BoundedSearch(
+            problem, limits, options, report, path, along=along, level=level, lazy=lazy
+        )
         try:
             return _searched(search)
         except KeyboardInterrupt:  # between two solves, which handle their own
@@ -86,7 +110,7 @@ def _searched(search: BoundedSearch) -> MethodResult:
     reason, excess = reason or search.unmet, 0.0
     if not reason and usable(outcome) and not search.rows.fixed:
         outcome, reason, excess = tightened(search, outcome)
-        reason = reason or search.unmet
+        reason = reason or search.unmet or search.too_close(outcome.x)
     problem, x, n_neg = search.problem, outcome.x, search.negative_eigenvalues(outcome)
     value, nit = problem.ld.action(x), search.iterations
     broken = "" if outcome.stop in STOPPED else _non_finite(search, x, value, excess)

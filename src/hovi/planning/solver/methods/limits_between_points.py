@@ -133,6 +133,8 @@ def _solved_on_halves(search: BoundedSearch, outcome: Bounded, sides: Array) -> 
     search.multipliers = None
     search.margins, search.tightened = search.no_margins(), None
     search.rows = search.coarse_rows()
+    if search.near is not None:
+        search.near = search.no_near_rows()
     if usable(outcome) and by_interval.max() <= WARM_EXCESS:
         again = solved_from(search, search.problem.path(motion))
         if usable(again) or again.stop in STOPPED:

@@ -1,0 +1,148 @@
+"""A motion that keeps its distances, from one that was found without them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.trust_region import Stop
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    first_multipliers,
+    minimize_constrained,
+)
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.methods.bounded_search import (
+    STOPPED,
+    Bounded,
+    BoundedSearch,
+    mean_density,
+)
+from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.near.push_out import pushed_out
+
+ROUGH_BARRIER = 1e-2
+"""Last barrier parameter of a rough motion, relative to the mean density of the cost."""
+ROUGH_DECREASE = 1e-3
+"""Predicted decrease at which it ends, relative to the cost."""
+AHEAD = 0.06
+"""Distance beyond the least one up to which pairs get rows at first, in [m]."""
+KEPT = 0.03
+"""Distance beyond the least one up to which they keep their rows after a rough motion, in [m]."""
+FIRST_MU = 0.1
+"""First barrier parameter from a motion that was moved, relative to the cost's mean density."""
+ROUGH_ROUNDS = 3
+"""Rounds of an augmented Lagrangian for a rough motion."""
+DETOUR = 1.05
+"""Cost of a rough motion, relative to that of one without distances, above which it is one."""
+
+
+def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
+    """A motion within limits that keeps its distances, from a guess that may keep neither.
+
+    It is solved without distances, until it can be seen whether it keeps them. If it is far from
+    that, it is moved out of the obstacles, and so is the guess if that takes a detour; the rough
+    motion with distances that costs least is solved to its end.
+    """
+    assert search.near is not None
+    if search.keeps_distances(guess) and search.near.extend(search.problem, guess, AHEAD) > 0:
+        beside = _rough_with_distances(search, guess)  # on its side of the obstacles
+        if beside is not None:
+            return beside.solved(search)
+    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
+    free = _without_distances(search, guess)
+    if not search.near.blocked:
+        return free
+    found = _rough_with_distances(search, free.x)
+    if found is None or found.cost > DETOUR * abs(free.outputs.value):
+        others = [_rough_with_distances(search, guess), found]
+        found = min((each for each in others if each), key=lambda each: each.cost, default=None)
+    if found is None:
+        return dataclasses.replace(free, stop=Stop.DIVERGED)
+    return found.solved(search)
+
+
+def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
+    """The solution, unless its distances are too small: then a rough motion without them."""
+    near = search.near
+    assert near is not None
+    near.probing = True
+    if not search.problem.constrained:
+        return search.solve(guess)
+
+    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
+        return _rough(search, x, known, None if x is guess else FIRST_MU)
+
+    search.near = None
+    rounds = minimize_constrained(search.problem, guess, minimize_round, most=ROUGH_ROUNDS)
+    search.near, rough = near, rounds.result
+    near.extend(search.problem, rough.x, AHEAD)
+    return rough if near.blocked or rough.stop in STOPPED else search.solve(rough.x)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rough:
+    """A rough motion with distances, its rows, and multipliers of constraints, if there are any."""
+
+    outcome: Bounded
+    multipliers: Multipliers | None
+    rows: LimitRows
+    near: ClearanceRows
+
+    @property
+    def cost(self) -> float:
+        """The action."""
+        return self.outcome.outputs.value
+
+    def solved(self, search: BoundedSearch) -> Bounded:
+        """The solve from there to the end, with rows of pairs that are near."""
+        x, barrier = self.outcome.x, self.outcome.barrier
+        near, kept = self.near.thinned(x, KEPT)
+        points = len(barrier.s) - len(self.near.order)
+        search.rows, search.near = self.rows, near
+        search.multipliers = self.multipliers
+        if self.outcome.stop in STOPPED:
+            return search.solve(x)
+        return search.solve(x, barrier.of(np.append(np.arange(points), points + kept)))
+
+
+def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough | None:
+    """A rough motion near a path that is moved out of obstacles; None if there is none."""
+    problem, distances = search.problem, search.problem.distances
+    assert distances is not None
+    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
+    moved = pushed_out(problem, path, distances, search.near.least)
+    if moved is None:
+        return None
+    search.near.extend(problem, moved, AHEAD)
+    known = first_multipliers(problem, moved) if problem.constrained else None
+    outcome = _rough(search, moved, known, FIRST_MU)
+    if outcome.stop not in (Stop.STATIONARY, *STOPPED) or not outcome.feasible:
+        return None
+    if known is not None:
+        residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
+        known = known.updated(residuals, problem.passive)
+    return _Rough(outcome, known, search.rows, search.near)
+
+
+def _rough(
+    search: BoundedSearch, path: DiscretePath, known: Multipliers | None, mu: float | None
+) -> Bounded:
+    """A solve up to a large barrier parameter.
+
+    known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
+    """
+    options = dataclasses.replace(
+        search.remaining_options(), barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE
+    )
+    objective, start = search.objective(known), None
+    if mu is not None:
+        outputs = objective.outputs(path)
+        density = mean_density(outputs, objective)
+        start = Barrier.central(objective.bounds, outputs.y, mu * density)
+    return search.minimized(objective, path, options, start)

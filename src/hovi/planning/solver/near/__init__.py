@@ -1,0 +1,1 @@
+"""Distances at all times: rows at the instants at which pairs of shapes come near."""

@@ -1,0 +1,162 @@
+"""Where pairs of shapes come near each other along a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath
+from hovi.discrete.instants import InstantBatch
+from hovi.discrete.interval_paths import scaled_data
+from hovi.discrete.state import State
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.clearance.distances import Distances
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+
+SAMPLES = 32
+"""Samples per interval at which distances are looked at."""
+SPREAD = 4
+"""Positions per interval that a near pair has rows at."""
+CLOSER, PASSES = 9, 4
+"""Samples around a least distance, and how many times they are taken, each time more closely."""
+CLOSE = 2e-3
+"""Distance beyond the least one below which a pair has a row where it is nearest, in [m]."""
+SPACING, WIDE_SPACING = 0.01, 0.1
+"""Distance of positions up to which one row is enough, relative to the interval, and the same while
+the motion moves from step to step."""
+LEAST_SPACING = 1e-4
+"""The same where a pair is too close by more than the extra clearance leaves."""
+USED = 0.7 * EXTRA_CLEARANCE * DISTANCE_SCALE
+"""What a motion may use up of the extra clearance between rows, in [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Approaches:
+    """Pairs near each other at positions of a motion.
+
+    at: number of the interval plus the position in it. pairs: their numbers. too_close: whether
+    they are by more than the extra clearance of rows leaves. All of shape (C,).
+    nearest: the least distance of any pair, in [m]; infinite if it is not known.
+    spacing: distance of positions up to which one row is enough, relative to the interval.
+    """
+
+    at: Array
+    pairs: Index
+    too_close: Mask
+    nearest: float = np.inf
+    spacing: float = SPACING
+
+    def other_than(self, at: Array, pairs: Index) -> Approaches:
+        """Those that are not at given positions of the same pairs, (E,) each."""
+        kept = np.ones(len(self.at), dtype=bool)
+        enough = np.where(self.too_close, LEAST_SPACING, self.spacing)
+        for pair in np.intersect1d(self.pairs, pairs):
+            own = np.flatnonzero(self.pairs == pair)
+            known = at[pairs == pair]
+            apart = np.abs(self.at[own, None] - known).min(axis=1)
+            kept[own] = apart > enough[own]
+        some = self.at[kept], self.pairs[kept], self.too_close[kept]
+        return Approaches(*some, self.nearest, self.spacing)
+
+
+def configurations(problem: TrajectoryProblem, path: DiscretePath, batch: InstantBatch) -> Array:
+    """q at instants, (M, nq), on vector spaces and commutative groups."""
+    steps = problem.grid.steps
+    data = scaled_data(path, np.arange(len(steps)), steps[:, None], batch.modes)[batch.numbers]
+    x = np.matmul(batch.table[:, :1], data)[:, 0]
+    return np.asarray(problem.coordinates.integrate(path.q[batch.numbers], x))
+
+
+def spread(problem: TrajectoryProblem, number: int) -> InstantBatch:
+    """A number of instants spread evenly over every interval, and the end of the motion."""
+    N = problem.grid.intervals
+    k, s = np.repeat(np.arange(N), number), np.tile(np.arange(number) / number, N)
+    k, s = np.append(k, N - 1), np.append(s, 1.0)
+    return InstantBatch(problem.grid, k, s, np.ones(len(k)))
+
+
+def free_ones(problem: TrajectoryProblem, number: int) -> Mask:
+    """Which of so many instants along a motion are not at an end that is given."""
+    free = np.ones(number, dtype=bool)
+    free[0], free[-1] = (not isinstance(end, State) for end in (problem.start, problem.goal))
+    return free
+
+
+def approaches_along(
+    problem: TrajectoryProblem,
+    path: DiscretePath,
+    distances: Distances,
+    least: float,
+    ahead: float,
+) -> Approaches:
+    """Where rows are needed: spread over the times at which pairs are near, and least distances.
+
+    least: bound of the rows, in [m]. ahead: distance beyond it up to which pairs are near.
+    """
+    batch = spread(problem, SAMPLES)
+    q = distances.at(configurations(problem, path, batch), batch.t)
+    reach = least + max(ahead, 0.0) + 0.5 * DISTANCE_SCALE
+    d = distances.values(q, reach)  # (M, K)
+    pairs = np.flatnonzero(d.min(axis=0) < least + ahead)
+    d = d[:, pairs]
+    chosen = (np.arange(len(d)) % (SAMPLES // SPREAD) == 0) & free_ones(problem, len(d))
+    rows, columns = np.nonzero(chosen[:, None] & (d < least + ahead))
+    lowest = _refined(problem, path, distances.restricted(pairs.tolist()), d, least + CLOSE)
+    at = np.concatenate([rows / SAMPLES, lowest[0]])
+    too_close = np.append(np.zeros(len(rows), dtype=bool), lowest[2] < least - USED)
+    nearest = float(d[free_ones(problem, len(d))].min(initial=np.inf))
+    return Approaches(at, pairs[np.append(columns, lowest[1])], too_close, nearest)
+
+
+def _refined(
+    problem: TrajectoryProblem, path: DiscretePath, distances: Distances, d: Array, below: float
+) -> tuple[Array, Index, Array]:
+    """As `_minima`, by closer samples around each: distances may have kinks there."""
+    at, column, value = _minima(d, below)
+    width, chosen = 1.0 / SAMPLES, np.arange(len(at))
+    for _ in range(PASSES if len(at) else 0):
+        around = at[:, None] + width * np.linspace(-1.0, 1.0, CLOSER)
+        around = np.clip(around, 0.0, float(problem.grid.intervals))
+        k = np.minimum(around.astype(np.intp), problem.grid.intervals - 1).ravel()
+        batch = InstantBatch(problem.grid, k, around.ravel() - k, np.ones(len(k)))
+        wanted = np.zeros((len(k), len(distances.pairs)), dtype=bool)
+        own = np.repeat(column, CLOSER)
+        wanted[np.arange(len(k)), own] = True
+        q = distances.at(configurations(problem, path, batch), batch.t)
+        near = distances.values(q, np.inf, wanted)[np.arange(len(k)), own].reshape(-1, CLOSER)
+        best = near.argmin(axis=1)
+        at, value = around[chosen, best], near[chosen, best]
+        width *= 2.0 / (CLOSER - 1)
+    return at, column, value
+
+
+def spread_approaches(d: Array, watched: Mask, least: float, guard: float) -> Approaches:
+    """Where pairs are near by their distances at spread positions, (M, K).
+
+    watched: of these, those without rows. guard: distance beyond the least one, in [m].
+    """
+    rows, columns = np.nonzero(watched & (d < least + guard))
+    at, pairs, _ = _minima(d, least + CLOSE, SPREAD)
+    at, pairs = np.append(rows / SPREAD, at), np.append(columns, pairs)
+    return Approaches(at, pairs, np.zeros(len(at), dtype=bool), spacing=WIDE_SPACING)
+
+
+def _minima(d: Array, below: float, samples: int = SAMPLES) -> tuple[Array, Index, Array]:
+    """Local minima of sampled distances (M, K) below a bound, by parabolas through three samples.
+
+    Returns where they are, of which columns, and the distances. samples: per interval.
+    """
+    before, here, after = d[:-2], d[1:-1], d[2:]
+    some = (here <= before) & (here <= after)
+    bend = before - 2.0 * here + after
+    shift = np.where(bend > 0, 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
+    value = here - 0.25 * (before - after) * shift
+    j, column = np.nonzero(some & (value < below))
+    return (j + 1 + shift[j, column]) / samples, column, value[j, column]

@@ -1,0 +1,224 @@
+"""Distances of pairs of shapes at instants of a motion, as rows of an interior point.
+
+Most pairs are far from each other at most times. A pair has rows where it is near: at positions
+spread over the interval, and where its distance is least along the motion. While the barrier falls
+the motion is looked at, and rows are added where pairs have come near: an exchange method for a
+semi-infinite program [HettichKortanek1993].
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.instants import InstantBatch, Instants
+from hovi.discrete.interval_batch import Coordinates
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.clearance.distances import Distances
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.clearance_outputs import CUTOFF, saturated
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.near.approaches import (
+    SPREAD,
+    Approaches,
+    approaches_along,
+    configurations,
+    free_ones,
+    spread,
+    spread_approaches,
+)
+from hovi.planning.solver.near.expanded_rows import ExpandedRows, RowSums
+from hovi.scene.lagrangian import PointTerms
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+WEIGHT = 0.1
+"""Weight of a row in a barrier, as a share of the interval."""
+GUARD = 0.05
+"""Distance beyond the least one below which pairs get rows at once, in [m]."""
+
+
+class ClearanceRows:
+    """Rows y >= 0 of pairs at instants: what their distances exceed the least one by.
+
+    They are as `ClearanceOutputs` measures them. None at first; `extend` adds some.
+
+    problem: with the grid and the ends. distances: of all pairs. least: lower bound, in [m].
+    """
+
+    def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
+        self.distances, self.least = distances, least
+        self.fixed, self.guard = False, GUARD
+        self.probing = self.blocked = False
+        self.order: Index = np.zeros(0, dtype=np.intp)
+        self._followed: LimitRows | None = None
+        self._seen: tuple[DiscretePath, Array] | None = None
+        self._set(problem, np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=np.intp))
+
+    def copied(self, fixed: bool = False) -> ClearanceRows:
+        """The same rows, to be extended on their own, or not at all."""
+        rows = copy.copy(self)
+        rows.fixed = fixed
+        return rows
+
+    def on(self, problem: TrajectoryProblem) -> ClearanceRows:
+        """The same rows of another problem, on as many intervals."""
+        rows = copy.copy(self)
+        rows._followed = None
+        rows._set(problem, self.intervals, self.positions, self.pairs)
+        return rows
+
+    @property
+    def size(self) -> int:
+        """E, the number of rows."""
+        return len(self.pairs)
+
+    @property
+    def weights(self) -> Array:
+        """Weights in a barrier, shape (E,), in [s]."""
+        return np.asarray(WEIGHT * self.grid.steps[self.intervals])
+
+    def values(self, path: DiscretePath) -> Array:
+        """y of every row, shape (E,)."""
+        if self.size == 0:
+            return np.zeros(0)
+        d = self._some.values(self._configurations(path), self._reach, self._wanted)
+        return saturated(self._excess(d))[0]
+
+    def expanded(self, path: DiscretePath, force: Array, coordinates: Coordinates) -> ExpandedRows:
+        """The rows with their derivatives. force: weights of their curvature, shape (E,)."""
+        weights = np.zeros(self._wanted.shape)
+        q, sums = self._configurations(path), self._sums
+        values = self._some.values(q, self._reach, self._wanted)
+        _, slope, bend = saturated(self._excess(values))
+        weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
+        found = self._some.expansion(q, weights, self._reach, self._wanted)
+        J = found[1][self._instant, self._column] / DISTANCE_SCALE
+        bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
+        table = np.ascontiguousarray(self._batch.tables[coordinates][:, 0])
+        return ExpandedRows(sums, table, slope[:, None] * J, found[2] + sums.by_instant(bent))
+
+    def forces(self, path: DiscretePath, multipliers: Array) -> tuple[Instants, list[PointTerms]]:
+        """The multipliers of the rows, (E,), as forces on q at their instants, one batch."""
+        none = np.zeros_like(multipliers)
+        J = self.expanded(path, none, "nodal").jacobian
+        nv, instants = J.shape[1], self._batch
+        slope = np.zeros((len(instants.s), (self.grid.order + 1) * nv))
+        slope[:, :nv] = self._sums.by_instant((self.weights * multipliers)[:, None] * J)
+        weights = WEIGHT * instants.h
+        outputs = np.zeros((len(slope), 0))
+        slope /= weights[:, None]
+        terms = PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))
+        return Instants(instants.numbers, instants.s, weights), [terms]
+
+    def stand_behind(self, rows: LimitRows) -> None:
+        """Take the place behind rows of limits, unless these are the ones that they have it behind.
+
+        order: of the outputs, numbers of rows of limits and then of these.
+        """
+        if self._followed is not rows or len(self.order) != rows.size + self.size:
+            self.order, self._followed = np.arange(rows.size + self.size), rows
+
+    def extend(self, problem: TrajectoryProblem, path: DiscretePath, ahead: float) -> int:
+        """Add rows where pairs come near along a motion; returns how many.
+
+        While they are `probing`, the first motion that does not keep its distances sets `blocked`.
+        ahead: distance beyond the least one up to which a pair counts as near, in [m].
+        """
+        if self.fixed:
+            return 0
+        found = approaches_along(problem, path, self.distances, self.least, ahead)
+        if self.probing and found.nearest < self.least:
+            self.blocked = True
+            return 0
+        self.probing = False
+        return self._add(problem, found)
+
+    def thinned(self, path: DiscretePath, within: float) -> tuple[ClearanceRows, Index]:
+        """The rows of pairs that are near along a motion alone; others get rows later from now on.
+
+        Returns them, and the numbers of what remains of the outputs of rows, those of limits first.
+        within: distance beyond the least one, in [m]; half of it counts as near from then on.
+        """
+        kept = self.values(path) <= within / DISTANCE_SCALE
+        rows = copy.copy(self)
+        rows._followed, rows.guard = None, 0.5 * within
+        rows._set(self._problem, self.intervals[kept], self.positions[kept], self.pairs[kept])
+        limits = len(self.order) - self.size
+        slots = np.empty(len(self.order), dtype=np.intp)
+        slots[self.order] = np.arange(len(self.order))
+        return rows, np.append(slots[:limits], slots[limits:][kept])
+
+    def hidden_depth(self, path: DiscretePath) -> float:
+        """How much too close pairs come where they have no rows, in [m]; negative if they do not.
+
+        At the positions that near pairs have rows at.
+        """
+        hidden = np.where(self._watched, self.least - self._spread_distances(path), -np.inf)
+        return float(hidden.max(initial=-np.inf))
+
+    def follow(self, path: DiscretePath) -> int:
+        """Add rows where pairs without rows have come near; returns how many."""
+        if self.fixed:
+            return 0
+        d = self._spread_distances(path)
+        found = spread_approaches(d, self._watched, self.least, self.guard)
+        return self._add(self._problem, found)
+
+    def _spread_distances(self, path: DiscretePath) -> Array:
+        """Distances of all pairs at positions spread over the motion, (N SPREAD + 1, K)."""
+        if self._seen is None or self._seen[0] is not path:
+            batch = spread(self._problem, SPREAD)
+            q = self.distances.at(configurations(self._problem, path, batch), batch.t)
+            self._seen = path, self.distances.values(q, self.least + self.guard)
+        return self._seen[1]
+
+    def _add(self, problem: TrajectoryProblem, found: Approaches) -> int:
+        """Add rows at approaches at which there are none yet."""
+        found = found.other_than(self.intervals + self.positions, self.pairs)
+        if len(found.pairs) == 0:
+            return 0
+        k = np.minimum(found.at.astype(np.intp), self.grid.intervals - 1)
+        both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
+        intervals, positions, pairs = (np.concatenate(each) for each in both)
+        self._set(problem, intervals, positions, pairs)
+        added = len(found.pairs)
+        self.order = np.append(self.order, len(self.order) + np.arange(added))
+        return added
+
+    def _set(
+        self, problem: TrajectoryProblem, intervals: Index, positions: Array, pairs: Index
+    ) -> None:
+        """Take rows: their intervals, positions in these, and numbers of their pairs, (E,)."""
+        self.grid: Grid = problem.grid
+        self._problem = problem
+        self.intervals, self.positions, self.pairs = intervals, positions, pairs
+        at, self._instant = np.unique(intervals + 1j * positions, return_inverse=True)
+        chosen, self._column = np.unique(pairs, return_inverse=True)
+        some = self.distances.restricted(chosen.tolist())
+        self._some, self._wanted = some, np.zeros((len(at), len(chosen)), dtype=bool)
+        self._wanted[self._instant, self._column] = True
+        self._sums = RowSums.of(at.real.astype(np.intp), self._instant)
+        number = problem.grid.intervals * SPREAD + 1
+        self._watched = np.tile(free_ones(problem, number)[:, None], (1, len(self.distances.pairs)))
+        self._watched[np.rint((intervals + positions) * SPREAD).astype(np.intp), pairs] = False
+        self._seen = None
+        k, s = at.real.astype(np.intp), np.ascontiguousarray(at.imag)
+        self._batch = InstantBatch(self.grid, k, s, np.ones(len(k)))
+
+    def _configurations(self, path: DiscretePath) -> Array:
+        """q at the instants, as distances take it."""
+        return self._some.at(configurations(self._problem, path, self._batch), self._batch.t)
+
+    def _excess(self, d: Array) -> Array:
+        """What distances at all instants exceed the least one by, for each row, (E,)."""
+        return np.asarray((d[self._instant, self._column] - self.least) / DISTANCE_SCALE)
+
+    @property
+    def _reach(self) -> float:
+        """Distance beyond which a row is constant, in [m]."""
+        return self.least + CUTOFF[1] * DISTANCE_SCALE

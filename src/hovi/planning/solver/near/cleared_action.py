@@ -1,0 +1,199 @@
+"""The discrete action under limits, with distances that stay at least as large as they must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.contraction import Expansion
+from hovi.discrete.grid import DiscretePath
+from hovi.optimize.barrier import Bounds
+from hovi.optimize.bounded_objective import Outputs, Refinement
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.planning.clearance.clearance import DISTANCE_SCALE
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.action_objective import LinearAlgebra
+from hovi.planning.solver.bounded_action import BoundedAction
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.multipliers import Multipliers
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.near.expanded_rows import ExpandedRows
+from hovi.scene.lagrangian import PointTerms
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+AHEAD = 0.5
+"""Distance up to which pairs count as near, over DISTANCE_SCALE, per barrier parameter."""
+DEEPEST = 0.005
+"""Depth of a pair without a row in a trial of a step beyond which the step is refused, in [m]."""
+
+
+class ClearedAction(BoundedAction):
+    """The action with limits, and with rows of distances, extended where pairs come near.
+
+    Outputs are those at the points, then rows of limits and of distances in the order in which
+    they were added: `near.order` has their numbers, those of limits first.
+
+    near: rows of distances, extended in place. Other arguments as for BoundedAction.
+    """
+
+    reopens = True
+
+    def __init__(
+        self,
+        problem: TrajectoryProblem,
+        limits: Limits,
+        margins: Array | None,
+        algebra: LinearAlgebra | None,
+        multipliers: Multipliers | None,
+        rows: LimitRows,
+        near: ClearanceRows,
+    ) -> None:
+        self.near = near
+        near.stand_behind(rows)
+        super().__init__(problem, limits, margins, algebra, multipliers, None, rows)
+        self._near: ExpandedRows | None = None
+        self._force = np.zeros(0)
+
+    def _with_rows(self) -> None:
+        super()._with_rows()
+        bounds, near = self.bounds, self.near
+        if near.size == 0:
+            return
+        lower, upper, weights = (
+            self._ordered(np.append(base, more))
+            for base, more in (
+                (bounds.lower, np.zeros(near.size)),
+                (bounds.upper, np.full(near.size, np.inf)),
+                (bounds.weights, near.weights),
+            )
+        )
+        self.bounds = Bounds(lower, upper, weights, bounds.measure)
+
+    def outputs(self, x: DiscretePath) -> Outputs:
+        """See BoundedAction.outputs."""
+        base = super().outputs(x)
+        if self.near.size == 0:
+            return base
+        value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
+        return Outputs(value, self._ordered(np.append(base.y, self.near.values(x))))
+
+    def model(
+        self, x: DiscretePath, sigma: Array, rho: Array, multipliers: Array
+    ) -> QuadraticModel:
+        """See BoundedAction.model."""
+        sigma, rho, multipliers = (self.plain(each) for each in (sigma, rho, multipliers))
+        force = self.near.weights * multipliers[self._limit_count :]
+        self._near = None
+        if self.near.size > 0:
+            self._near = self.near.expanded(x, force, self.action.coordinates)
+        return super().model(x, sigma, rho, multipliers)
+
+    def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
+        """What adds the terms of all rows to an expansion."""
+        first = self._limit_count
+        limits, near, weights = super()._row_terms(sigma, rho), self._near, self.near.weights
+        if near is None:
+            return limits
+        slopes, curves = weights * rho[first:], weights * sigma[first:]
+
+        def add(expansion: Expansion) -> None:
+            if limits is not None:
+                limits(expansion)
+            near.pull(slopes, expansion.gradient)
+            near.add_squares(curves, expansion.hessian)
+
+        return add
+
+    def push(self, step: Array, model: QuadraticModel) -> Array:
+        """See BoundedAction.push."""
+        dy = super().push(step, model)
+        if self._near is None:
+            return dy
+        return self._ordered(np.append(dy, self._near.push(model.gather(step))))
+
+    def pull(self, forces: Array, model: QuadraticModel) -> Array:
+        """See BoundedAction.pull."""
+        forces = self.plain(forces)
+        pulled = super().pull(forces, model)
+        if self._near is None:
+            return pulled
+        local = np.zeros_like(model.intervals.gradient)
+        self._near.pull(self.near.weights * forces[self._limit_count :], local)
+        return pulled + model.scatter(local)
+
+    def forces(self, x: DiscretePath, multipliers: Array) -> list[PointTerms]:
+        """See BoundedAction.forces: without those of rows."""
+        return super().forces(x, self.plain(multipliers))
+
+    def refine(self, x: DiscretePath, level: float) -> Refinement | None:
+        """Bound more control points, and distances where pairs come near: see ClearanceRows."""
+        assert self.rows is not None
+        order, before = self.near.order, self.rows.size
+        found = self.rows.refine(x, level)
+        added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
+        self.blocked = self.near.blocked
+        if found is None and added == 0:
+            return None
+        kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
+        if found is not None:
+            kept, origin = found.kept, found.origin
+        return self._renumbered(order, before, kept, origin, added)
+
+    def refine_at_once(self, x: DiscretePath) -> Refinement | None:
+        """Bound the distances of pairs that have come near in a step."""
+        assert self.rows is not None
+        order, before = self.near.order, self.rows.size
+        added = 0 if self.near.size == 0 else self.near.follow(x)
+        if added == 0:
+            return None
+        none = np.zeros(0, dtype=np.intp)
+        return self._renumbered(order, before, np.arange(before), none, added)
+
+    def _renumbered(
+        self, order: Index, before: int, kept: Index, origin: Index, added: int
+    ) -> Refinement:
+        """The refinement in the order of the outputs, and the order after it.
+
+        order: before it. before: number of rows of limits then, of which some were kept. origin: of
+        new ones. added: number of new rows of distances, which come last.
+        """
+        first, size = self._point_count, self.rows.size if self.rows is not None else 0
+        places = np.full(len(order), -1)  # of former rows among the present ones
+        places[kept] = np.arange(len(kept))
+        places[before:] = size + np.arange(len(order) - before)
+        slots = np.empty(len(order), dtype=np.intp)  # of rows among the outputs
+        slots[order] = np.arange(len(order))
+        remaining = np.flatnonzero(places[order] >= 0)
+        fresh = np.arange(len(kept), size)
+        last = size + len(order) - before + np.arange(added)
+        self.near.order = np.concatenate([places[order][remaining], fresh, last])
+        self._with_rows()
+        origins = np.where(origin < 0, -1, first + slots[origin])
+        none = np.full(added, -1)
+        return Refinement(np.append(np.arange(first), first + remaining), np.append(origins, none))
+
+    @property
+    def _limit_count(self) -> int:
+        """The number of outputs that are no distances."""
+        return self._point_count + (0 if self.rows is None else self.rows.size)
+
+    def _ordered(self, plain: Array) -> Array:
+        """Outputs in their order, from those at the points, of limits and of distances."""
+        first = self._point_count
+        if self.near.size == 0:
+            return plain
+        return np.append(plain[:first], plain[first:][self.near.order])
+
+    def plain(self, ordered: Array) -> Array:
+        """Values of outputs at the points, then of rows of limits, then of distances."""
+        if self.near.size == 0:  # rows of limits alone are in their order
+            return ordered
+        first, plain = self._point_count, np.empty_like(ordered)
+        plain[:first] = ordered[:first]
+        plain[first:][self.near.order] = ordered[first:]
+        return plain

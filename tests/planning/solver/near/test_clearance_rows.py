@@ -1,0 +1,142 @@
+"""Rows of distances, against sampled trajectories and finite differences."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import hovi
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.job import Job
+from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.near.approaches import approaches_along
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.solver import guess_path
+from hovi.scene.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+FAR_BALL = hovi.Sphere([5.0, 0.0, 0.0], 0.1, name="far")
+LEAST = 0.05
+ROBOTS = "ur5", "kinova"
+"""One on a vector space, one with continuous joints."""
+
+
+def problem_of(name: str, *balls: hovi.Sphere) -> TrajectoryProblem:
+    robot = hovi.load_robot(name)
+    start = robot.space.integrate(robot.neutral(), np.full(robot.nv, 0.2))
+    goal = robot.space.integrate(start, np.linspace(0.8, -0.4, robot.nv))
+    grid = hovi.Grid.uniform(1.0, 5, hovi.schemes.galerkin(2))
+    job = Job(Scene(robot, []), grid, hovi.State(start), hovi.State(goal))
+    problem = job.problem()
+    if not balls:
+        middle = problem.trajectory(guess_path(problem, "cubic")).configurations(np.array([0.5]))
+        tip = robot.frame_position(robot.tip_frames[0], middle)[0]
+        balls = hovi.Sphere(tip + np.array([0.0, 0.0, 0.16]), 0.06, name="ball"), FAR_BALL
+    return dataclasses.replace(problem, clearance=Clearance(balls))
+
+
+def wavy(problem: TrajectoryProblem, seed: int = 5) -> DiscretePath:
+    """The cubic guess, displaced at random."""
+    objective = ActionObjective(problem)
+    x = guess_path(problem, "cubic")
+    model = objective.model(x, None, None)
+    return objective.retract(x, 0.02 * model.random_vector(seed), model)
+
+
+def rows_of(problem: TrajectoryProblem, path: DiscretePath, ahead: float) -> ClearanceRows:
+    assert problem.distances is not None
+    rows = ClearanceRows(problem, problem.distances, LEAST)
+    rows.extend(problem, path, ahead)
+    return rows
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_rows_are_distances_along_the_motion(name: str) -> None:
+    problem = problem_of(name)
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.2)
+    assert rows.size > 10
+    assert problem.distances is not None
+    t = problem.grid.t[rows.intervals] + rows.positions * problem.grid.steps[rows.intervals]
+    d = problem.distances.values(problem.trajectory(path).configurations(t))
+    expected = (d[np.arange(rows.size), rows.pairs] - LEAST) / DISTANCE_SCALE
+    near = expected < 1.0  # beyond, rows level off
+    assert near.sum() > 10
+    np.testing.assert_allclose(rows.values(path)[near], expected[near], atol=1e-9)
+    assert (rows.values(path)[~near] >= 1.0).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_derivatives_are_those_of_finite_differences(name: str) -> None:
+    problem = problem_of(name)
+    objective = ActionObjective(problem)
+    path = wavy(problem)
+    model = objective.model(path, None, None)
+    rows = rows_of(problem, path, 0.2)
+    force = np.random.default_rng(3).normal(size=rows.size)
+    expanded = rows.expanded(path, force, objective.coordinates)
+    step, h = model.random_vector(7), 1e-5
+    columns = model.gather(step)
+    moved = [rows.values(objective.retract(path, s * step, model)) for s in (h, -h)]
+    pushed = expanded.push(columns)
+    np.testing.assert_allclose(pushed, (moved[0] - moved[1]) / (2 * h), atol=1e-5)
+    gradient = np.zeros_like(model.intervals.gradient)
+    expanded.pull(force, gradient)
+    assert np.vdot(gradient, columns) == pytest.approx(float(force @ pushed), rel=1e-9)
+    if name == "kinova":  # its hulls have small faces, at whose edges there are no second ones
+        return
+    hessian = np.zeros_like(model.intervals.hessian)
+    weights = np.random.default_rng(4).uniform(size=rows.size)
+    expanded.add_squares(weights, hessian)
+    square = float(np.einsum("kia,kijab,kjb", columns, hessian, columns))
+    near = [objective.retract(path, s * step, model) for s in (1e-4, -1e-4)]
+    bend = force @ (rows.values(near[0]) + rows.values(near[1]) - 2 * rows.values(path)) / 1e-8
+    assert square == pytest.approx(float(weights @ pushed**2 + bend), rel=1e-2)
+
+
+def test_pairs_that_stay_far_have_no_rows() -> None:
+    problem = problem_of("ur5", FAR_BALL)
+    assert rows_of(problem, wavy(problem), 0.5).size == 0
+
+
+def test_least_distances_are_found_between_the_samples() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    assert problem.distances is not None
+    t = np.linspace(0.0, 1.0, 20_001)
+    d = problem.distances.values(problem.trajectory(path).configurations(t))
+    pair = int(d.min(axis=0).argmin())
+    inner = int(d[:, pair].argmin())
+    least = float(d[inner, pair])
+    found = approaches_along(problem, path, problem.distances, least + 1e-3, 0.0)
+    assert found.nearest == pytest.approx(least, abs=1e-3)
+    assert 0 < inner < len(t) - 1
+    times = found.at[found.pairs == pair] / problem.grid.intervals
+    assert np.abs(times - t[inner]).min() < 1e-3
+
+
+def test_a_second_look_at_the_same_motion_adds_nothing() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.1)
+    assert rows.extend(problem, path, 0.1) == 0
+    assert rows.hidden_depth(path) <= 0.0
+
+
+def test_thinned_rows_are_those_of_near_pairs() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.2)
+    rows.order = np.arange(rows.size)[::-1]  # no rows of limits, the last row first
+    within = float(np.median(rows.values(path))) * DISTANCE_SCALE
+    near, kept = rows.thinned(path, within)
+    ordered = rows.values(path)[rows.order]
+    np.testing.assert_array_equal(ordered[kept], near.values(path))
+    assert (near.values(path) <= within / DISTANCE_SCALE).all()
+    assert 0 < near.size < rows.size

@@ -1,0 +1,63 @@
+"""The action with rows of distances keeps its outputs when rows are added, and its derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hovi.discrete.grid import DiscretePath
+from hovi.planning.problem.limits import as_limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.solver.limits.limit_rows import LimitRows
+from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.near.cleared_action import ClearedAction
+from planning.solver.near.test_clearance_rows import problem_of, wavy
+
+LIMITS = {"base": "none", "q": 3.0, "v": 2.0, "tau": 200.0}
+
+
+def action_of(problem: TrajectoryProblem, path: DiscretePath, ahead: float) -> ClearedAction:
+    limits = as_limits(problem.robot, LIMITS)
+    assert problem.distances is not None
+    near = ClearanceRows(problem, problem.distances, 0.05)
+    near.extend(problem, path, ahead)
+    rows = LimitRows(problem.grid, limits, problem.coordinates.curved_space)
+    return ClearedAction(problem, limits, None, None, None, rows, near)
+
+
+def test_outputs_that_remain_keep_their_values_in_order() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    action = action_of(problem, path, 0.0)
+    for level in (0.5, 1.0, 2.0):
+        before = action.outputs(path).y
+        found = action.refine(path, level)
+        assert found is not None
+        after, old = action.outputs(path).y, len(found.kept)
+        np.testing.assert_allclose(after[:old], before[found.kept], atol=1e-14)
+        assert len(after) == old + len(found.origin) == len(action.bounds.lower)
+        assert (np.diff(found.kept) > 0).all()
+    numbers = np.arange(float(len(after)))
+    np.testing.assert_array_equal(action._ordered(action.plain(numbers)), numbers)
+
+
+def test_the_gradient_is_that_of_the_action_and_the_forces() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    action = action_of(problem, path, 0.1)
+    action.refine(path, 0.3)
+    count = len(action.bounds.lower)
+    rho, none = np.random.default_rng(0).normal(size=count), np.zeros(count)
+    model = action.model(path, none, rho, none)
+    step, h = 1e-3 * model.random_vector(4), 1e-3
+    weighted = action.bounds.weights * rho
+    sides = [action.outputs(action.retract(path, s * step, model)) for s in (h, -h)]
+    values = [each.value + float(weighted @ each.y) for each in sides]
+    slope = (values[0] - values[1]) / (2 * h)
+    assert float(np.vdot(model.gradient, step)) == pytest.approx(slope, rel=1e-4)
+    pushed = action.push(step, model)
+    change = (sides[0].y - sides[1].y) / (2 * h)
+    np.testing.assert_allclose(pushed, change, atol=1e-6 * max(1.0, np.abs(change).max()))
+    force = np.random.default_rng(1).normal(size=count)
+    pulled = float(np.vdot(action.pull(force, model), step))
+    assert pulled == pytest.approx(float((action.bounds.weights * force) @ pushed), rel=1e-9)
