@@ -16,6 +16,7 @@ from hovi.planning.paths import ompl_paths
 from hovi.planning.paths.free_space import FreeSpace
 from hovi.planning.paths.ompl_paths import OmplProcess
 from hovi.planning.paths.path_guess import depth_of, path_guesses
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline, OutOfTimeError
 from planning.paths.test_path_guess import ball, problem_of
@@ -103,3 +104,18 @@ def test_a_process_that_fails_gives_no_path(
     space, goal = space_of(two_link, ball())
     with OmplProcess() as ompl:
         assert ompl.path(space, np.zeros(2), goal, 0) is None
+
+
+@needs_ompl
+def test_a_path_passes_its_via_points(two_link: Robot) -> None:
+    """Of a frame, found by inverse kinematics, with the elbow folded before the ball."""
+    problem, time = problem_of(two_link, ball()), 0.6
+    via = hovi.Via(time, hovi.FrameGoal("tip", position=[1.2, 0.0, 0.2]))
+    grid = problem.grid.with_nodes([time])
+    ld = hovi.DiscreteLagrangian(problem.scene.effort_lagrangian(), grid)
+    ends, clearance = (problem.start, problem.goal), problem.clearance
+    passing = TrajectoryProblem(ld, *ends, problem.limits, via=[via], clearance=clearance)
+    (guess,) = path_guesses(passing, passing.guess("cubic"), 1, 0)
+    at = two_link.frame_position("tip", guess.q[grid.node_at(time)][None])[0]
+    np.testing.assert_allclose(at, [1.2, 0.0, 0.2], atol=1e-8)
+    assert depth_of(passing, guess) < 0.01
