@@ -138,7 +138,8 @@ def disturb(child: subprocess.Popen[bytes], way: str, random: Random) -> None:
 
 
 def children_of(pid: int) -> list[str]:
-    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return [child for each in threads for child in (each / "children").read_text().split()]
 
 
 def child(count: int, folder: Path, limited: bool) -> None:
