@@ -21,7 +21,8 @@ def model_of_mjcf(path: Path, free_flyer: bool) -> tuple[pin.Model, Geometry]:
     """
     if free_flyer:
         raise ModelError(
-            f"the base of an MJCF floats by <freejoint/> in its first body: add it to {path.name!r}."
+            f"the base of an MJCF floats by <freejoint/> in its first body: put it into "
+            f"{path.name!r}."
         )
     try:
         require_file(path, MAX_BYTES)
