@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.exchange.samples import times_of
-from hovi.viewing.unwrapped_angles import unwrapped
+from hovi.viewing.curves.unwrapped_angles import unwrapped
 
 Array = npt.NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from hovi.dynamics.mimic_kernel import rnea_kernel
 from hovi.effects import Effect, MovingBase, ViscousFriction
 from hovi.errors import InputError
 from hovi.scene.scene import Scene
-from hovi.viewing.unwrapped_angles import unwrapped
+from hovi.viewing.curves.unwrapped_angles import unwrapped
 
 Array = npt.NDArray[np.float64]
 Element = ElementTree.Element
