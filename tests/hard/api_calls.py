@@ -840,6 +840,11 @@ def _files() -> list[Call]:
         call(hovi.load_task, toml),
         call(hovi.save_task, task, toml),
         call(hovi.write_csv, trajectory, folder() / "motion.csv", rate=100.0),
+        call(hovi.export, trajectory, folder() / "all.csv", "csv", rate=50.0, efforts=False),
+        own(trajectory, "to_numpy", folder() / "all.npz", 50.0),
+        own(trajectory, "to_joint_trajectory", folder() / "all.json", 50.0, efforts=True),
+        own(trajectory, "to_mcap", folder() / "all.mcap", 50.0),
+        own(trajectory, "to_mujoco", folder() / "all.xml", 50.0),
         call(hovi.plot, trajectory, folder() / "motion.svg"),
         call(
             hovi.replay,

@@ -18,7 +18,9 @@ LEFT_OUT = {
     # results, which hovi makes
     *("Accuracy", "Certificate", "Flow", "MotionError", "Simulation", "Solution", "Status"),
     *("Tolerance", "Tracking", "Robot", "HoviError"),
-    *("Extreme", "Extremes", "LimitSet", "LimitSource"),
+    *("Extreme", "Extremes", "LimitSet", "LimitSource", "MujocoReplay"),
+    # needs an optional library, and has tests of its own
+    "replay_in_mujoco",
     # packages, of which the members are called
     *("accuracy", "effects", "schemes", "symbolic"),
 }

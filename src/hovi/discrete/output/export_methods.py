@@ -6,9 +6,12 @@ import os
 from importlib import import_module
 from typing import Any
 
+from hovi.checks.arguments import check_arguments
+
 Path = str | os.PathLike[str]
 
 
+@check_arguments
 class ExportMethods:
     """`to_...` for every export format, as `hovi.export` writes it.
 

@@ -30,8 +30,10 @@ _READY = (
 )
 _HIDE = (
     "const hidden = document.createElement('style');"
-    "hidden.textContent = 'body > :not(#meshcat-pane), .dg { display: none !important; }';"
-    "document.head.append(hidden); viewer.gui.close(); viewer.animator.pause(); 1"
+    "hidden.textContent = '#bar, #side, #names, #caption, .dg { display: none !important; }"
+    " #scene, #meshcat-pane { position: fixed; inset: 0; width: 100vw; height: 100vh; }';"
+    "document.head.append(hidden); window.dispatchEvent(new Event('resize'));"
+    "viewer.animator.pause(); 1"
 )
 _SEEK = (
     "for (const a of viewer.animator.actions) {{ a.play(); a.paused = false; }}"
