@@ -21,11 +21,7 @@ def model_of_mjcf(path: Path, free_flyer: bool) -> tuple[pin.Model, Geometry]:
     """
     if free_flyer:
         raise ModelError(
-<<<<<<< HEAD
-            "the base of an MJCF floats by <freejoint/> in its first body: add it to "
-=======
-            f"the base of an MJCF floats by <freejoint/> in its first body: put it into "
->>>>>>> h_files
+            "the base of an MJCF floats by <freejoint/> in its first body: put it into "
             f"{path.name!r}."
         )
     try:
