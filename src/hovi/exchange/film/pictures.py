@@ -25,18 +25,11 @@ SIZE = 640, 480
 """Width and height, in pixels."""
 MAX_PICTURES = 20_000
 _READY = (
-    "typeof viewer == 'object' && viewer.animator.actions.length > 0"
+    "typeof controls == 'object' && viewer.animator.actions.length > 0"
     " && viewer.scene_tree.children['meshcat'] !== undefined"
 )
-_HIDE = (
-    "const hidden = document.createElement('style');"
-    "hidden.textContent = 'body > :not(#meshcat-pane), .dg { display: none !important; }';"
-    "document.head.append(hidden); viewer.gui.close(); viewer.animator.pause(); 1"
-)
-_SEEK = (
-    "for (const a of viewer.animator.actions) {{ a.play(); a.paused = false; }}"
-    "viewer.animator.seek({t}); viewer.render(); 1"
-)
+_SCENE_ALONE = "document.body.classList.add('bare'); stage.resize(); viewer.animator.pause(); 1"
+_SEEK = "controls.seek({t}); viewer.render(); 1"
 _MAX_LOADS = 40
 
 
@@ -80,7 +73,7 @@ def _by_browser(trajectory: Trajectory, times: Array) -> list[Picture]:
             tab.call("Emulation.setDeviceMetricsOverride", **_METRICS)
             tab.call("Page.navigate", url=page.as_uri())
             tab.until(_READY)
-            tab.value(_HIDE)
+            tab.value(_SCENE_ALONE)
             _wait_until_drawn(tab)
             return [_decoded(_at(tab, float(t))) for t in times]
 
