@@ -25,20 +25,11 @@ SIZE = 640, 480
 """Width and height, in pixels."""
 MAX_PICTURES = 20_000
 _READY = (
-    "typeof viewer == 'object' && viewer.animator.actions.length > 0"
+    "typeof controls == 'object' && viewer.animator.actions.length > 0"
     " && viewer.scene_tree.children['meshcat'] !== undefined"
 )
-_HIDE = (
-    "const hidden = document.createElement('style');"
-    "hidden.textContent = '#bar, #side, #names, #caption, .dg { display: none !important; }"
-    " #scene, #meshcat-pane { position: fixed; inset: 0; width: 100vw; height: 100vh; }';"
-    "document.head.append(hidden); window.dispatchEvent(new Event('resize'));"
-    "viewer.animator.pause(); 1"
-)
-_SEEK = (
-    "for (const a of viewer.animator.actions) {{ a.play(); a.paused = false; }}"
-    "viewer.animator.seek({t}); viewer.render(); 1"
-)
+_SCENE_ALONE = "document.body.classList.add('bare'); stage.resize(); viewer.animator.pause(); 1"
+_SEEK = "controls.seek({t}); viewer.render(); 1"
 _MAX_LOADS = 40
 
 
@@ -82,7 +73,7 @@ def _by_browser(trajectory: Trajectory, times: Array) -> list[Picture]:
             tab.call("Emulation.setDeviceMetricsOverride", **_METRICS)
             tab.call("Page.navigate", url=page.as_uri())
             tab.until(_READY)
-            tab.value(_HIDE)
+            tab.value(_SCENE_ALONE)
             _wait_until_drawn(tab)
             return [_decoded(_at(tab, float(t))) for t in times]
 
