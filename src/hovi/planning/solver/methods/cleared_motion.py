@@ -36,9 +36,11 @@ KEPT = 0.03
 """Distance beyond the least one up to which they keep their rows after a rough motion, in [m]."""
 FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
+ROUGH_STEPS = 100
+"""Maximum number of its steps."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-DETOUR = 1.05
+DETOUR = 1.02
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
 
@@ -122,7 +124,7 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
     search.near.extend(problem, moved, AHEAD)
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome = _rough(search, moved, known, FIRST_MU)
-    if outcome.stop not in (Stop.STATIONARY, *STOPPED) or not outcome.feasible:
+    if outcome.stop is Stop.DIVERGED or not outcome.feasible:
         return None
     if known is not None:
         residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
@@ -137,8 +139,10 @@ def _rough(
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     """
+    whole = search.remaining_options()
+    most = min(ROUGH_STEPS, whole.max_iterations)
     options = dataclasses.replace(
-        search.remaining_options(), barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE
+        whole, barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE, max_iterations=most
     )
     objective, start = search.objective(known), None
     if mu is not None:
