@@ -13,7 +13,6 @@ from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 
 import hovi
-from hovi.viewing.plotting import motion_figure
 
 TOP = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(TOP / "docs"))
@@ -41,28 +40,8 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 
-
-def scrape_motion(block: Any, variables: dict[str, Any], gallery: dict[str, Any]) -> str:
-    """The curves of each motion of an example, below the code that plans it; its thumbnail, too."""
-    from sphinx_gallery.scrapers import figure_rst
-
-    seen = variables.setdefault("hovi_seen", set())
-    names = variables["example_globals"]
-    motions = [getattr(each, "trajectory", each) for each in list(names.values())]
-    new = [m for m in motions if isinstance(m, hovi.Trajectory) and id(m) not in seen]
-    seen.update(map(id, motions))
-    if not new:
-        return ""
-    path = next(variables["image_path_iterator"])
-    try:
-        motion_figure(new[-1]).savefig(path, dpi=80)
-    except hovi.HoviError:  # a motion without torques between its nodes
-        return ""
-    return str(figure_rst([path], gallery["src_dir"]))
-
-
 sphinx_gallery_conf = {
-    "image_scrapers": ("matplotlib", scrape_motion),
+    "image_scrapers": ("matplotlib", "gallery_pictures.scrape_motion"),
     "reset_modules": ("matplotlib",),
     "examples_dirs": ["../examples"],
     "gallery_dirs": ["gallery"],

@@ -79,7 +79,7 @@ def _sentences(text: str) -> Iterator[tuple[str, str, str]]:
             if error is None or matched[1] == "Warns":
                 yield "prose", "", sentence
             else:
-                yield "raises", error[1], error[2]
+                yield "raises", error[1], error[2].lstrip(".")
 
 
 def _inline(text: str, public: Collection[str]) -> str:
