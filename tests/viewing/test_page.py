@@ -338,7 +338,7 @@ print("after", flush=True)
 
 
 def script(tmp_path: Path, keywords: str = "", then: str = "") -> list[str]:
-    file = tmp_path / "script.py"
+    file = tmp_path / "shown"
     tests = str(Path(__file__).parents[1])
     file.write_text(SCRIPT.format(tests=tests, keywords=keywords, then=then))
     return [sys.executable, str(file)]
