@@ -140,14 +140,6 @@ class BoundedSearch:
         least = self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
         return ClearanceRows(self.problem, self.problem.distances, least)
 
-    def keeps_distances(self, path: DiscretePath) -> bool:
-        """Whether a motion keeps the distances of rows."""
-        assert self.near is not None
-        return (
-            len(near_pairs(self.problem.trajectory(path), self.near.distances, self.near.least))
-            == 0
-        )
-
     def look_around(self, path: DiscretePath) -> None:
         """Add rows for pairs that are near along a motion that nearly is a solution."""
         if self.near is not None:

@@ -52,11 +52,6 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     motion with distances that costs least is solved to its end.
     """
     assert search.near is not None
-    if search.keeps_distances(guess) and search.near.extend(search.problem, guess, AHEAD) > 0:
-        beside = _rough_with_distances(search, guess)  # on its side of the obstacles
-        if beside is not None:
-            return beside.solved(search)
-    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
     free = _without_distances(search, guess)
     if not search.near.blocked:
         return free
