@@ -521,6 +521,24 @@ def test_out_of_time_the_kept_point_has_the_outputs_of_the_last_bounds(steps: in
     assert stopped.violation.shape == program.bounds.lower.shape
 
 
+@pytest.mark.parametrize("calls", range(3, 30))
+def test_out_of_time_within_the_outputs_the_outcome_is_of_one_set_of_bounds(calls: int) -> None:
+    """Outputs that take long run out of time themselves, also while they are refined."""
+
+    class Slow(Majorant):
+        called = 0
+
+        def outputs(self, x: Array) -> Outputs:
+            self.called += 1
+            if self.called == calls:
+                raise OutOfTimeError
+            return super().outputs(x)
+
+    stopped = minimize_bounded(Slow(), np.array([3.0, 3.0]), Options())
+    assert stopped.stop in (Stop.TIME_LIMIT, Stop.STATIONARY)
+    assert stopped.violation.shape == stopped.barrier.zl.shape == stopped.outputs.y.shape
+
+
 def test_the_kept_point_is_the_best_one_within_the_bounds() -> None:
     bounds = Bounds(np.zeros(1), np.ones(1), np.ones(1))
     outcome = BoundedOutcome(0, Outputs(0.0, np.zeros(1)), None, Stop.TIME_LIMIT)  # type: ignore[arg-type]

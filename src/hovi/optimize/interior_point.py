@@ -277,19 +277,19 @@ class _Iteration(BoundedSteps[X]):
         """Whether outputs were replaced; then their slacks and multipliers are, too."""
         if found is None:
             return False
-        outcome = self.outcome
-        outcome.outputs = self.objective.outputs(outcome.x)
+        outcome, kept = self.outcome, self.outcome.kept
+        outputs = self.objective.outputs(outcome.x)  # these may run out of time, so first of all
+        if kept is not None:
+            kept = kept[0], self.objective.outputs(kept[0])
         barrier = outcome.barrier.refined(
-            self.objective.bounds, outcome.outputs.y, found.kept, found.origin
+            self.objective.bounds, outputs.y, found.kept, found.origin
         )
-        outside = float(barrier.outside(outcome.outputs.y)[len(found.kept) :].max(initial=0.0))
+        outside = float(barrier.outside(outputs.y)[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
-            barrier = barrier.warm(barrier.bounds, outcome.outputs.y, mu, REOPENED * outside)
+            barrier = barrier.warm(barrier.bounds, outputs.y, mu, REOPENED * outside)
+        outcome.outputs, outcome.kept = outputs, kept
         self.product = barrier.mean_product()
         outcome.barrier = barrier.with_mu(max(barrier.mu, self.product))
         self.penalty, self.radius = 0.0, max(self.radius, 1.0)
-        if outcome.kept is not None:
-            kept, _ = outcome.kept
-            outcome.kept = kept, self.objective.outputs(kept)
         return True
