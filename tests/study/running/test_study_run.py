@@ -207,11 +207,11 @@ def test_no_failure_stops_a_study(tmp_path: Path) -> None:
 
 
 def test_poses_are_met_by_inverse_kinematics_or_unreachable(tmp_path: Path) -> None:
-    poses = {"frame": "tip", "lower": [1.2, 0, 0], "upper": [2.4, 0, 0], "grid": [3, 1, 1]}
+    poses = {"frame": "tip", "lower": [1.2, 0, 0], "upper": [2.8, 0, 0], "grid": [3, 1, 1]}
     study = Study("two_link_reach", [{"field": "goal", "poses": poses}])
     study.run(tmp_path, 1)
     rows = Study.load(tmp_path)
-    assert rows["goal.position[0]"].tolist() == pytest.approx([1.2, 1.8, 2.4])
+    assert rows["goal.position[0]"].tolist() == pytest.approx([1.2, 2.0, 2.8])
     task = load_task(example("two_link_reach"))
     model, frame = task.scene.model, task.scene.model.getFrameId("tip")
     data = model.createData()
