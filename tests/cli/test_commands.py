@@ -296,7 +296,7 @@ def test_a_goal_outside_the_limits_is_infeasible_and_named(run: Run, tmp_path: P
     assert (code, fields["status"]) == (1, "infeasible")
     assert "goal" in fields["message"]
     assert "'elbow'" in fields["message"]
-    assert "! beyond one" in run("plan", tmp_path / "scene.toml")[1]
+    assert "position of joint 'elbow' at the goal" in run("plan", tmp_path / "scene.toml")[1]
 
 
 def test_a_written_motion_is_the_planned_motion(motion: Path) -> None:
@@ -390,7 +390,7 @@ def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
     assert "Base: floating" in run("info", "ur5", "--free-flyer")[1]
 
 
-@pytest.mark.parametrize("name", ["ARM.URDF", "arm.xml", "arm.xacro", "folder/arm"])
+@pytest.mark.parametrize("name", ["ARM.URDF", "arm.xml", "folder/arm"])
 def test_info_takes_the_paths_that_load_robot_takes(run: Run, tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.parent.mkdir(exist_ok=True)

@@ -14,6 +14,7 @@ from hovi.dynamics.joint_tree import axes_of
 from hovi.dynamics.mimic_kernel import rnea_kernel
 from hovi.effects import Effect, MovingBase, ViscousFriction
 from hovi.errors import InputError
+from hovi.robot.space.joint_kinds import kind_of
 from hovi.scene.scene import Scene
 from hovi.viewing.curves.unwrapped_angles import unwrapped
 
@@ -22,6 +23,8 @@ Element = ElementTree.Element
 
 STEP = 1e-4
 """Time step of the model, in [s]."""
+MOTORED = "revolute", "continuous", "prismatic", "translation"
+"""The kinds of joints that are hinges, or slides."""
 _THICKNESS = 0.02  # of the bars, relative to the longest
 _TINY = "1e-12"  # MuJoCo refuses bodies without mass, such as those between the axes of a wrist
 
@@ -179,9 +182,8 @@ def _require_supported(scene: Scene) -> None:
         )
     for i in range(1, scene.model.njoints):
         joint, name = scene.model.joints[i], str(scene.model.names[i])
-        kind = joint.shortname().removeprefix("JointModel")
-        single = joint.nv == 1 and not kind.startswith("H")
-        if not (single or kind == "Translation"):
+        kind = kind_of(joint).label
+        if kind not in MOTORED:
             raise InputError(
                 f"joint {name!r} is neither a hinge nor a slide ({kind}), and the motors of a "
                 "MuJoCo model drive these alone: use the format 'mcap' or 'csv'."

@@ -47,7 +47,7 @@ def test_a_failure_without_ompl_names_the_extra(
     two_link: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "has_ompl", lambda: False)
-    found = planned(two_link, max_iterations=2, continuation=False)
+    found = planned(two_link, max_iterations=1, continuation=False)
     assert not found.success
     assert "hovi[obstacles]" in found.message
     assert "hovi[obstacles]" not in planned(two_link).message
@@ -97,7 +97,7 @@ def test_several_starts_give_several_minima_and_the_same_ones_again(two_link: Ro
 
 @needs_ompl
 def test_where_no_start_succeeds_the_message_says_what_was_tried(two_link: Robot) -> None:
-    found = planned(two_link, max_iterations=2, continuation=False)
+    found = planned(two_link, max_iterations=1, continuation=False)
     assert not found.success
     assert "Neither OMPL's paths" in found.message
 

@@ -270,7 +270,7 @@ def test_a_length_is_measured_where_the_file_ends_at_what_does_not_move(exact: S
     assert exact.accuracy.estimate.frame == "right_gripper"
     assert re.search(
         r"estimated error \S+ mm at right_gripper, tolerance 0.1 mm at left_gripper and "
-        r"right_gripper\.$",
+        r"right_gripper\.( |$)",
         exact.message,
     )
 

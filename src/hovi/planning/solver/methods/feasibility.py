@@ -67,13 +67,12 @@ SMALL_VIOLATION = 1e-3
 
 def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     """A motion from the guess within bounds at points and control points, or why there is none."""
-    path = search.guess
+    path, outcome = search.guess, None
     if search.clearance is not None:
-        path = _moved_out_of_obstacles(search, path, search.clearance)
-    if search.clearance is not None and path is search.guess:
-        outcome = solved_from(search, path)  # on its side of the obstacles
-    else:
-        outcome = _solved_nearby(search, path) or _solved_at_all(search, path)
+        outcome = _solved_beside_obstacles(search, path, search.clearance)
+        if outcome is None:
+            path = _moved_out_of_obstacles(search, path, search.clearance)
+    outcome = outcome or _solved_nearby(search, path) or _solved_at_all(search, path)
     if search.near is not None:
         failed = outcome.stop is Stop.DIVERGED and not outcome.feasible
         return outcome, search.worst(outcome.x) if failed else ""
@@ -181,17 +180,24 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
 
 
+def _solved_beside_obstacles(
+    search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
+) -> Bounded | None:
+    """The solution from a guess free of obstacles, on its side; None if it is not, or that fails."""
+    given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
+    if float(given.distance.min()) < wanted.least:
+        return None
+    outcome = solved_from(search, path)
+    return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
+
+
 def _moved_out_of_obstacles(
     search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
 ) -> DiscretePath:
     """A guess: the motion of least action without obstacles, moved out of them in stages.
 
     In one stage a motion deep in an obstacle would leave it on different sides at different times.
-    A guess that is free of obstacles stays as it is.
     """
-    given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
-    if float(given.distance.min()) >= wanted.least:
-        return path
     options, search.clearance = search.options, None
     path = _without_obstacles(search, path)
     approach = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
