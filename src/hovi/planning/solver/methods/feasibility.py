@@ -183,7 +183,7 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
 def _solved_beside_obstacles(
     search: BoundedSearch, path: DiscretePath, wanted: ClearanceOutputs
 ) -> Bounded | None:
-    """The solution from a guess free of obstacles, on its side; None if it is not, or that fails."""
+    """The solution beside a guess free of obstacles; None if it is not free, or that fails."""
     given = approach_along(search.problem.trajectory(path), wanted.distances, wanted.least)
     if float(given.distance.min()) < wanted.least:
         return None
