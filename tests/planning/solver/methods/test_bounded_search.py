@@ -32,4 +32,4 @@ def test_a_barrier_begins_at_the_mean_of_the_cost_over_time_whatever_its_sign(
     for sign in (1, -1):
         signed = dataclasses.replace(outputs, value=sign * outputs.value)
         mean = outputs.value / T
-        assert mean_density(signed, objective) == pytest.approx(mean, rel=1e-12)
+        assert mean_density(signed, objective.bounds.measure) == pytest.approx(mean, rel=1e-12)

@@ -159,7 +159,7 @@ class BoundedSearch:
 
     def central_path(self, outcome: Bounded) -> CentralPath:
         """The points at which the barrier of a solve was larger, and its solution."""
-        density = mean_density(outcome.outputs, self.objective(self.multipliers))
+        density = mean_density(outcome.outputs, self.problem.grid.duration)
         points = (*self.points, (outcome.barrier.mu / density, outcome.x))
         barrier = outcome.barrier if self.problem.distances is None else None
         return CentralPath(points, self.rows, barrier, self.margins, self.near)
@@ -169,7 +169,7 @@ class BoundedSearch:
 
         These are on the central path of a similar problem only, but the next solve may need room.
         """
-        density = mean_density(outcome.outputs, objective)
+        density = mean_density(outcome.outputs, objective.bounds.measure)
         points = [(product / density, x) for product, x in outcome.marks]
         first, like = points[0]
         before = [
@@ -197,7 +197,7 @@ class BoundedSearch:
             options = dataclasses.replace(options, decrease=decrease, barrier=mu)
             outcome = self.minimized(objective, x, options, start)
             share = float(np.clip(decrease**0.5, ROUND_BARRIER, WARM_MU_RANGE[1]))
-            mu = share * mean_density(outcome.outputs, objective)
+            mu = share * mean_density(outcome.outputs, objective.bounds.measure)
             y, barrier = outcome.outputs.y, outcome.barrier
             start = None
             if len(y) == len(barrier.s):
@@ -306,6 +306,6 @@ class BoundedSearch:
         return sentence + static_sentence(self.problem, self.limits)
 
 
-def mean_density(outputs: Outputs, objective: BoundedAction) -> float:
+def mean_density(outputs: Outputs, duration: float) -> float:
     """|objective| / duration: its mean density."""
-    return max(abs(outputs.value), 1e-12) / objective.bounds.measure
+    return max(abs(outputs.value), 1e-12) / duration

@@ -142,6 +142,6 @@ def _rough(
     objective, start = search.objective(known), None
     if mu is not None:
         outputs = objective.outputs(path)
-        density = mean_density(outputs, objective)
+        density = mean_density(outputs, objective.bounds.measure)
         start = Barrier.central(objective.bounds, outputs.y, mu * density)
     return search.minimized(objective, path, options, start)

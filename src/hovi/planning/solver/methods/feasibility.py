@@ -151,7 +151,7 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     outputs = objective.outputs(path)
     start = None
     if len(known.s) == len(outputs.y):
-        mu *= mean_density(outputs, objective)
+        mu *= mean_density(outputs, objective.bounds.measure)
         start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
     outcome = search.solve(path, start)
     search.options = whole
@@ -165,7 +165,7 @@ def _solved_from_level(search: BoundedSearch, along: CentralPath, level: float) 
     search.look_around(path)
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
-    density = mean_density(outputs, objective)
+    density = mean_density(outputs, objective.bounds.measure)
     margin = min(INITIAL_MARGIN, SHIFT_MARGIN * share)
     start = Barrier.central(objective.bounds, outputs.y, share * density, density, margin)
     return search.solve(path, start)
@@ -176,7 +176,7 @@ def solved_from(search: BoundedSearch, path: DiscretePath) -> Bounded:
     search.look_around(path)
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
-    mu = NEARBY_MU * mean_density(outputs, objective)
+    mu = NEARBY_MU * mean_density(outputs, objective.bounds.measure)
     return search.solve(path, Barrier.central(objective.bounds, outputs.y, mu))
 
 
@@ -234,7 +234,7 @@ def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     known = first_multipliers(search.problem, outcome.x) if constrained else None
     search.rows = search.coarse_rows()
     objective = search.objective(known)
-    density = mean_density(outcome.outputs, objective)
+    density = mean_density(outcome.outputs, objective.bounds.measure)
     least = np.inf
     for guess in _guesses(search):
         path, violation, stop = _penalized(search, objective, guess, density)

@@ -93,7 +93,7 @@ def _solved_tighter(search: BoundedSearch, outcome: Bounded, sides: Array) -> Bo
     search.margins = np.clip(search.margins + tighter + looser, 0.0, MAX_MARGIN)
     objective = search.objective(search.multipliers)
     share = float(np.clip(1e-2 * float(sides.max()), *WARM_MU_RANGE))
-    mu = share * mean_density(outcome.outputs, objective)
+    mu = share * mean_density(outcome.outputs, objective.bounds.measure)
     y, barrier = objective.outputs(outcome.x).y, outcome.barrier
     start = barrier.warm(objective.bounds, y, mu) if len(y) == len(barrier.s) else None
     return search.solve(outcome.x, start)
