@@ -17,7 +17,7 @@ import pytest
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.search import free_duration
-from hovi.planning.search.free_duration import FreeDuration, solve_duration
+from hovi.planning.search.free_duration import FreeDuration, best_duration
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 
@@ -58,9 +58,8 @@ class Landscape:
 
     def search(self, lower: float, upper: float, weight: float, first: float) -> Solution:
         guess: Any = SimpleNamespace(duration=first)
-        return solve_duration(
-            FreeDuration(lower, upper, weight), self.solve, self.solve(first, guess)
-        )
+        free = FreeDuration(lower, upper, weight)
+        return best_duration(free, self.solve, self.solve(first, guess)).with_time()
 
 
 def agrees(solution: Solution) -> bool:

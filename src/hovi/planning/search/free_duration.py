@@ -146,11 +146,6 @@ def best_duration(
     return _Search(free, solve, first, stride).run()
 
 
-def solve_duration(free: FreeDuration, solve: SolveFor, first: Solution) -> Solution:
-    """As best_duration, with w T included in the cost."""
-    return best_duration(free, solve, first).with_time()
-
-
 @dataclass(frozen=True, eq=False)
 class _Trial:
     """A solution for a duration.

@@ -97,11 +97,10 @@ class BoundedSearch:
         self.clearance: ClearanceOutputs | None = None
         self.near: ClearanceRows | None = None
         if distances is not None:
-            least = self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
             if self.lazy:
                 self.near = self.no_near_rows()
             else:
-                self.clearance = ClearanceOutputs(distances, least)
+                self.clearance = ClearanceOutputs(distances, self.bounded_distance)
         self.margins = self.no_margins()
         known = None if self.along is None else self.along.rows
         self.rows = self.coarse_rows() if known is None else known.copied()
@@ -113,6 +112,11 @@ class BoundedSearch:
         """Margin plus tolerance, in [m]: violated by up to the tolerance, it keeps the margin."""
         assert self.problem.clearance is not None
         return float(self.problem.clearance.margin) + self.limits.tolerance * DISTANCE_SCALE
+
+    @property
+    def bounded_distance(self) -> float:
+        """The least distance with the extra clearance where it is bounded, in [m]."""
+        return self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
 
     def no_margins(self) -> Array:
         """Zero margins, shape (2, N, kinds nv + pairs)."""
@@ -137,8 +141,7 @@ class BoundedSearch:
     def no_near_rows(self) -> ClearanceRows:
         """No rows of distances yet."""
         assert self.problem.distances is not None
-        least = self.least_distance + EXTRA_CLEARANCE * DISTANCE_SCALE
-        return ClearanceRows(self.problem, self.problem.distances, least)
+        return ClearanceRows(self.problem, self.problem.distances, self.bounded_distance)
 
     def look_around(self, path: DiscretePath) -> None:
         """Add rows for pairs that are near along a motion that nearly is a solution."""
