@@ -26,14 +26,12 @@ class Cell:
     number: of the cell, from 0, the last axis fastest.
     values: what it puts into the template. ends: see Axis.
     key: hash of all that its result depends on; two cells of one content have one key.
-    parent: the number of the cell whose motion is its initial guess; None for none.
     """
 
     number: int
     values: tuple[tuple[FieldPath, Any], ...]
     ends: tuple[str, ...]
     key: str
-    parent: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +95,7 @@ class Cells:
 
     def cell(self, number: int) -> Cell:
         """A cell. Raises SceneError if its values have no place in the template."""
-        values = self.values(number)
-        parent = self.parent(number)
-        key = self.key(number)
-        return Cell(number, values, self.ends, key, parent)
+        return Cell(number, self.values(number), self.ends, self.key(number))
 
     def key(self, number: int) -> str:
         """The key of a cell: see Cell. Raises SceneError."""

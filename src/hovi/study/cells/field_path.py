@@ -60,7 +60,7 @@ class FieldPath:
 
     def _check(self, at: Any, key: str | int, number: int) -> None:
         """Raise SceneError unless `at` is a table or a list that has a place for a key."""
-        above = _spelled(self.keys[:number])
+        above = spelled(self.keys[:number]).removeprefix(".")
         if isinstance(key, str):
             if not isinstance(at, dict):
                 raise SceneError(
@@ -74,11 +74,9 @@ class FieldPath:
             )
 
 
-def _spelled(keys: tuple[str | int, ...]) -> str:
-    text = ""
-    for key in keys:
-        text += f"[{key}]" if isinstance(key, int) else f".{key}" if text else str(key)
-    return text
+def spelled(keys: tuple[str | int, ...]) -> str:
+    """Keys as they follow those before them in a path."""
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys)
 
 
 def _shown(value: Any) -> str:

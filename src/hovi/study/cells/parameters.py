@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from hovi.study.cells.axis import Axis
-from hovi.study.cells.field_path import FieldPath
+from hovi.study.cells.field_path import FieldPath, spelled
 
 Kind = Literal["number", "whole", "truth", "text", "json"]
 Entry = tuple[str | int, ...]
@@ -63,7 +63,7 @@ def _columns(path: FieldPath, values: Iterable[Any]) -> list[Parameter]:
             kinds = {entry: _common(kinds[entry], here[entry]) for entry in kinds}
     if not kinds or len(kinds) > MAX_ENTRIES:
         return [Parameter(path.text, "json", path)]
-    return [Parameter(path.text + _spelled(e), kind, path, e) for e, kind in kinds.items()]
+    return [Parameter(path.text + spelled(e), kind, path, e) for e, kind in kinds.items()]
 
 
 def _leaves(value: Any, above: Entry) -> Iterable[tuple[Entry, Kind]]:
@@ -82,7 +82,3 @@ def _common(one: Kind, other: Kind) -> Kind:
     if one == other:
         return one
     return "number" if {one, other} == {"number", "whole"} else "json"
-
-
-def _spelled(entry: Entry) -> str:
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in entry)

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from hovi.errors import HoviError, ModelError
+from hovi.errors import HoviError
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.reading import parsed, read_toml, task_of
 from hovi.planning.task_file.scene_cache import SceneCache
@@ -86,7 +86,7 @@ class Template:
             return self._file(text)
         try:
             known = example_robot(text)
-        except (HoviError, ModelError):
+        except HoviError:
             return []  # of which the plan will say why
         return [known.urdf] if known.srdf is None else [known.urdf, known.srdf]
 

@@ -30,7 +30,6 @@ class FromNeighbours(Chunks):
 
     _ready: deque[_Ready] = field(default_factory=lambda: deque([_Ready(0, None)]))
     _finished: int = 0
-    _guesses: dict[int, Stored | None] = field(default_factory=dict)
     _continued: dict[int, int] = field(default_factory=dict)
 
     @property
@@ -52,7 +51,6 @@ class FromNeighbours(Chunks):
             if self.is_stored(cell.key):
                 self._finish(first.number, self.stored_motion(cell.key), None)
                 continue
-            self._guesses[first.number] = first.guess
             return self._path(job_of(cell, first.attempt, first.guess), size)
         return ()
 

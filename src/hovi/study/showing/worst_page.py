@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from hovi.errors import DisplayError, StudyError
 from hovi.study.showing.plans import Plans
 from hovi.study.study import Study
 from hovi.system.files import reason, whole_file
-from hovi.viewing.replay_session import replay
+from hovi.viewing.replay_session import page_of
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
@@ -50,10 +49,7 @@ def write_worst(plans: Plans, path: Path, count: int = 10) -> int:
 
 def _motion(plans: Plans, row: int, opened: bool) -> str:
     trajectory = Study.motion(plans.folder, plans.columns["key"][row])
-    with tempfile.TemporaryDirectory() as folder:
-        page = Path(folder) / "motion.html"
-        replay(trajectory, html=page)
-        source = page.read_text(encoding="utf-8")
+    source = page_of(trajectory).offline_html()
     label = f"cell {plans.columns['cell'][row]}: cost {plans.columns['cost'][row]:.6g}"
     label += "".join(f", {_parameter(name, plans, row)}" for name in _shown(plans.parameters))
     return _MOTION.format(

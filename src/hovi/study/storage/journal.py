@@ -64,7 +64,6 @@ class JournalWriter:
     name: str = field(default_factory=lambda: _new_name())
     _lines: int = -1
     _bytes: int = -1
-    _owner: int = field(default_factory=os.getpid)
 
     def store(self, content: bytes) -> Stored:
         """Add bytes. Raises StorageError."""

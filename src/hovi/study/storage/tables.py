@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,8 @@ ROWS = 5_000
 SAMPLED_PLANS = 500
 """Plans whose samples are a row group."""
 Keys = npt.NDArray[np.bytes_]
+Row = dict[str, Any]
+Item = TypeVar("Item")
 
 
 def write_tables(folder: Path, cells: Cells, keys: Keys, index: Index, samples: int) -> None:
@@ -40,10 +43,11 @@ def write_tables(folder: Path, cells: Cells, keys: Keys, index: Index, samples: 
     """
     for number in np.flatnonzero(keys == b""):
         keys[number] = cells.key(int(number)).encode()
-    _write(folder / PLANS, plan_schema(cells), _plan_rows(cells, keys, index))
-    _write(folder / RUNS, _run_schema(), _run_rows(index))
+    _write(folder / PLANS, plan_schema(cells), _batches(_plan_rows(cells, keys, index), ROWS))
+    _write(folder / RUNS, _run_schema(), _batches(_run_rows(index), ROWS))
     if samples:
-        _write(folder / SAMPLES, _sample_schema(), _sample_rows(folder, keys, index))
+        plans = _batches(_sample_rows(folder, keys, index), SAMPLED_PLANS)
+        _write(folder / SAMPLES, _sample_schema(), (list(chain(*each)) for each in plans))
 
 
 def read_table(path: Path) -> pa.Table:
@@ -96,10 +100,15 @@ def plan_schema(cells: Cells) -> pa.Schema:
     )
 
 
-def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[list[dict[str, Any]]]:
-    """The rows of what is done, in the order of the cells, in groups."""
+def _batches(items: Iterator[Item], size: int) -> Iterator[list[Item]]:
+    """So many items at a time."""
+    while batch := list(islice(items, size)):
+        yield batch
+
+
+def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[Row]:
+    """The rows of what is done, in the order of the cells."""
     parameters = parameters_of(cells.axes)
-    rows: list[dict[str, Any]] = []
     for number, key in enumerate(keys):
         done = index.done(key.decode())
         if done is None:
@@ -114,14 +123,10 @@ def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[list[dict[str
             "parent": None if parent is None else keys[parent].decode(),
             "scene": cells.template.hash,
         }
-        rows.append(row | own | _parameters(cells, number, parameters))
-        if len(rows) == ROWS:
-            yield rows
-            rows = []
-    yield rows
+        yield row | own | _parameters(cells, number, parameters)
 
 
-def _parameters(cells: Cells, number: int, columns: tuple[Parameter, ...]) -> dict[str, Any]:
+def _parameters(cells: Cells, number: int, columns: tuple[Parameter, ...]) -> Row:
     values = dict(cells.values(number))
     return {column.name: column.of(values[column.field]) for column in columns}
 
@@ -144,17 +149,12 @@ def _run_schema() -> pa.Schema:
     )
 
 
-def _run_rows(index: Index) -> Iterator[list[dict[str, Any]]]:
+def _run_rows(index: Index) -> Iterator[Row]:
     from datetime import datetime
 
-    rows: list[dict[str, Any]] = []
     for run in index.runs():
         began = run.get("began")
-        rows.append(run | {"began": None if began is None else datetime.fromisoformat(began)})
-        if len(rows) == ROWS:
-            yield rows
-            rows = []
-    yield rows
+        yield run | {"began": None if began is None else datetime.fromisoformat(began)}
 
 
 def _sample_schema() -> pa.Schema:
@@ -172,36 +172,26 @@ def _sample_schema() -> pa.Schema:
     )
 
 
-def _sample_rows(folder: Path, keys: Keys, index: Index) -> Iterator[list[dict[str, Any]]]:
-    """A row for each time of each minimum."""
-    rows: list[dict[str, Any]] = []
-    plans = 0
+def _sample_rows(folder: Path, keys: Keys, index: Index) -> Iterator[list[Row]]:
+    """Of each minimum, a row for each time."""
+    names = ("t", "q", "v", "a", "tau")
     for number, key in enumerate(keys):
         done = index.done(key.decode())
         if done is None or done.samples is None or not done.row.success:
             continue
         sampled = Samples.from_bytes(done.samples.read(folder))
         columns = [x.tolist() for x in (sampled.t, sampled.q, sampled.v, sampled.a, sampled.tau)]
-        names = ("t", "q", "v", "a", "tau")
-        for values in zip(*columns, strict=True):
-            rows.append(
-                {"cell": number, "key": key.decode(), **dict(zip(names, values, strict=True))}
-            )
-        plans += 1
-        if plans % SAMPLED_PLANS == 0:
-            yield rows
-            rows = []
-    yield rows
+        own = {"cell": number, "key": key.decode()}
+        yield [own | dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
-def _write(path: Path, schema: pa.Schema, groups: Iterator[list[dict[str, Any]]]) -> None:
+def _write(path: Path, schema: pa.Schema, groups: Iterator[list[Row]]) -> None:
     """Write a table of groups of rows."""
     import pyarrow as pa
 
     with _table_writer(path, schema) as writer:
         for rows in groups:
-            if rows:
-                writer.write_table(pa.Table.from_pylist(rows, schema), row_group_size=len(rows))
+            writer.write_table(pa.Table.from_pylist(rows, schema), row_group_size=len(rows))
 
 
 @contextmanager
