@@ -53,6 +53,14 @@ def test_a_failure_without_ompl_names_the_extra(
     assert "hovi[obstacles]" not in planned(two_link).message
 
 
+def test_out_of_time_the_direct_guess_is_the_only_one(two_link: Robot) -> None:
+    problem = problem_of(two_link, ball())
+    direct, deadline = problem.guess("cubic"), Deadline(1e-9)
+    with deadline.in_force():
+        found = first_guesses(problem, direct, 4, 0, deadline, silent)
+    assert found.all == (direct,)
+
+
 @needs_ompl
 def test_a_guess_that_is_not_deep_needs_no_path(two_link: Robot) -> None:
     problem = problem_of(two_link, ball(at=2.5))

@@ -71,7 +71,10 @@ def first_guesses(
     Where the direct one is deep in obstacles and OMPL is installed, one path for every start but
     the last, and for a single one. seed: of all paths. deadline: of the search.
     """
-    depth = depth_of(problem, direct)
+    try:
+        depth = depth_of(problem, direct)
+    except OutOfTimeError:  # which the solve from it tells
+        return FirstGuesses(direct)
     if depth < DEEP or not has_ompl():
         return FirstGuesses(direct, depth)
     progress("looking for paths around the obstacles", 0.0)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import hovi
 from hovi.discrete.trajectory import Trajectory
+from hovi.optimize.trust_region import Stop
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.solver.methods import cleared_motion
 
 INSTANTS = 2_000
 
@@ -41,6 +46,22 @@ def test_distances_hold_at_all_times(around: hovi.Task) -> None:
     least = least_by_coal(found.trajectory, robot, clearance)
     assert margin <= least + 1e-7
     assert least < margin + 1e-3  # it is worth passing closely
+
+
+def test_where_no_rough_motion_is_found_the_rounds_find_one(
+    around: hovi.Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rows of what was tried are no longer those of the motion that is given up."""
+    rough = cleared_motion._rough
+
+    def failing(*given: Any) -> Any:
+        return dataclasses.replace(rough(*given), stop=Stop.DIVERGED)
+
+    monkeypatch.setattr(cleared_motion, "_rough", failing)
+    found = hovi.plan_task(around, intervals=16)
+    assert found.status in (hovi.Status.MINIMUM, hovi.Status.UNRESOLVED)
+    least = least_by_coal(found.trajectory, around.scene.robot, around.options.clearance)
+    assert float(around.options.clearance.margin) <= least + 1e-7
 
 
 def test_an_obstacle_far_away_changes_nothing(around: hovi.Task) -> None:

@@ -25,6 +25,7 @@ from hovi.planning.solver.methods.bounded_search import (
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
+from hovi.system.deadline import raise_if_late
 
 ROUGH_BARRIER = 1e-2
 """Last barrier parameter of a rough motion, relative to the mean density of the cost."""
@@ -60,6 +61,7 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
         others = [_rough_with_distances(search, guess), found]
         found = min((each for each in others if each), key=lambda each: each.cost, default=None)
     if found is None:
+        raise_if_late()  # or more time might lead to one
         return dataclasses.replace(free, stop=Stop.DIVERGED)
     return found.solved(search)
 

@@ -125,7 +125,7 @@ def _searched(search: BoundedSearch) -> MethodResult:
     else:
         status, message = Status.SADDLE, _saddle(value, n_neg)
     instants, forces = None, None
-    if outcome.stop is not Stop.TIME_LIMIT:
+    if outcome.stop not in (Stop.TIME_LIMIT, Stop.DIVERGED):  # or rows may be of a later attempt
         instants, forces = search.forces(outcome)
     history, central = search.history, None
     if status is Status.MINIMUM:
