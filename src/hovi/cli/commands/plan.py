@@ -157,7 +157,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     if not json:
         _note_assumptions(task)
     with progress(quiet=json) as report:
-        solution = _with_self_collision(plan_task(task, report), task)
+        solution = plan_task(task, report)
     written, save_error = out, None
     if written is not None:
         try:
@@ -176,21 +176,6 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
         if save_error is not None:
             raise save_error
     return 0 if solution.success else 1
-
-
-def _with_self_collision(solution: Solution, task: Task) -> Solution:
-    """The solution, with a message that ends with links that collide where these may."""
-    import dataclasses
-
-    from hovi.planning.solver.outcome.self_collision import self_collision_sentence
-    from hovi.planning.solver.status import Status
-
-    if task.options.self_collision or solution.status in (Status.INFEASIBLE, Status.DIVERGED):
-        return solution
-    sentence = self_collision_sentence(solution.trajectory, within_share=False)
-    if not sentence or sentence in solution.message:
-        return solution
-    return dataclasses.replace(solution, message=f"{solution.message} {sentence}")
 
 
 def _note_assumptions(task: Task) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from weakref import WeakSet
 
 import coal
 import numpy as np
@@ -24,13 +23,6 @@ _CONVEX = (
     coal.TriangleP,
 )
 
-_known: WeakSet[Robot] = WeakSet()
-
-
-def has_convex_geometry(robot: Robot) -> bool:
-    """Whether `convex_geometry` has been computed, which takes up to a second."""
-    return robot in _known
-
 
 @lru_cache(maxsize=16)
 def convex_geometry(robot: Robot) -> pin.GeometryModel:
@@ -49,7 +41,6 @@ def convex_geometry(robot: Robot) -> pin.GeometryModel:
             f"robot {robot.name!r} has no collision shapes to compute distances from: add "
             "<collision> elements to its URDF."
         )
-    _known.add(robot)
     convex = given.copy()
     convex.removeAllCollisionPairs()
     for item in convex.geometryObjects:

@@ -43,6 +43,8 @@ from hovi.system.interruption import interruptible
 MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
 Keywords = ParamSpec("Keywords")
+UNSEEN = Status.INFEASIBLE, Status.DIVERGED, Status.TIME_LIMIT
+"""Statuses of motions in which self-collision is not looked for."""
 
 
 class _Plan(Protocol[Keywords]):
@@ -155,7 +157,7 @@ def with_notes(
     weighted = options.weight is not None
     of_scenes = [assumptions(scene, found.trajectory, weighted) for scene in scenes]
     said = [each for each in of_scenes[0] if all(each in others for others in of_scenes)]
-    if not options.self_collision and found.status not in (Status.INFEASIBLE, Status.DIVERGED):
+    if not options.self_collision and found.status not in UNSEEN:
         said.append(self_collision_sentence(found.trajectory))
     message = " ".join([found.message, *filter(None, said)])
     setup = found.setup_seconds if setup_seconds is None else setup_seconds

@@ -7,8 +7,6 @@ overlapping at another.
 
 from __future__ import annotations
 
-import re
-import time
 from functools import lru_cache
 
 import numpy as np
@@ -16,9 +14,8 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import HoviError
-from hovi.planning.clearance.convex_shapes import convex_geometry, has_convex_geometry
+from hovi.planning.clearance.convex_shapes import convex_geometry
 from hovi.planning.clearance.pair_distances import PairDistances
-from hovi.robot.geometry import find_mesh
 from hovi.robot.robot import Robot
 from hovi.robot.srdf import checked_pairs
 from hovi.system.deadline import OutOfTimeError
@@ -27,20 +24,12 @@ SAMPLES = 129
 """Number of samples of a motion that are looked at."""
 DEPTH = 1e-3
 """Overlap, in [m], from which a pair is told: hulls are a little larger than links."""
-SHARE = 0.05
-"""Largest share of the process's time so far that reading the robot's shapes may take."""
-FIRST_SECONDS, BYTES_PER_SECOND = 0.04, 5e6
-"""Time to read shapes, in [s]: of any robot, and the bytes of meshes that are read in a second."""
 
 
-def self_collision_sentence(motion: Trajectory, within_share: bool = True) -> str:
-    """The links that a motion brings into each other, as a sentence; "" if none are found.
-
-    within_share: whether shapes that were not read before are read only where this takes at most
-        SHARE of the time that the process has taken; otherwise they are read in any case.
-    """
+def self_collision_sentence(motion: Trajectory) -> str:
+    """The links that a motion brings into each other, as a sentence; "" if none are found."""
     robot = motion.robot
-    if robot is None or (within_share and not _is_cheap(robot)):
+    if robot is None:
         return ""
     try:
         pairs, links = _pairs_of(robot)
@@ -72,23 +61,3 @@ def _pairs_of(robot: Robot) -> tuple[PairDistances, list[tuple[str, str]]]:
     shapes = list(geometry.geometryObjects)
     names = [str(robot.model.frames[shape.parentFrame].name) for shape in shapes]
     return PairDistances(robot, geometry), [(names[i], names[j]) for i, j in found]
-
-
-def _is_cheap(robot: Robot) -> bool:
-    """Whether the robot's shapes are at hand, or read in SHARE of the time so far."""
-    if has_convex_geometry(robot):
-        return True
-    return _seconds_to_read(robot) <= SHARE * time.process_time()
-
-
-@lru_cache(maxsize=16)
-def _seconds_to_read(robot: Robot) -> float:
-    """The time that reading the collision shapes takes, estimated by the size of their files."""
-    size = 0
-    for shape in re.findall(r"<collision\b.*?</collision>", robot.source.urdf or "", re.DOTALL):
-        for name in re.findall(r'filename="([^"]*)"', shape):
-            try:
-                size += find_mesh(name, robot.source).stat().st_size
-            except (HoviError, OSError):  # reading it will say so
-                continue
-    return FIRST_SECONDS + size / BYTES_PER_SECOND
