@@ -10,6 +10,7 @@ namespace hovi::barrier {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_gap = 1e-16;  // the rounding unit at a bound of one
+constexpr double rounding = 1e-10;   // of a slack, as a share of its gap
 
 // R slacks s with multipliers zl, zu; infinite bounds are none.
 struct Slacks {
@@ -173,12 +174,8 @@ inline double merit(const Slacks& at, const double* weights, const double* y, co
   return penalty * misfit - mu * logs.total();
 }
 
-inline double barrier_of(const Slacks& at, std::size_t i, double below, double above) {
-  return (at.has_lower(i) ? std::log(below) : 0.0) + (at.has_upper(i) ? std::log(above) : 0.0);
-}
-
 // Slacks and multipliers after shares of a direction. A slack becomes its output y where that is
-// inside of the bounds and lowers the merit, and z gap stays within `ratio` of mu.
+// inside of the bounds and lowers the merit, or next to it, and z gap stays within `ratio` of mu.
 inline void move(const Slacks& at, const double* y, const Direction& d, double primal, double dual,
                  double keep, double mu, double penalty, double ratio, const Direction& out) {
   for (std::size_t i = 0; i < at.count; ++i) {
@@ -186,10 +183,10 @@ inline void move(const Slacks& at, const double* y, const Direction& d, double p
     double s = at.s[i] + std::clamp(primal * d.s[i], -keep * below, keep * above);
     const double low = y[i] - at.lower[i], high = at.upper[i] - y[i];
     if (y[i] != s && low > least_gap && high > least_gap) {
-      const double here = penalty * std::abs(y[i] - s) -
-                          mu * barrier_of(at, i, std::max(s - at.lower[i], least_gap),
-                                          std::max(at.upper[i] - s, least_gap));
-      if (-mu * barrier_of(at, i, low, high) < here) s = y[i];
+      const double off = std::abs(y[i] - s);
+      const double ratios = (at.has_lower(i) ? low / std::max(s - at.lower[i], least_gap) : 1.0) *
+                            (at.has_upper(i) ? high / std::max(at.upper[i] - s, least_gap) : 1.0);
+      if (off <= rounding * std::min(low, high) || -mu * std::log(ratios) < penalty * off) s = y[i];
     }
     out.s[i] = s;
     const double centre_low = mu / std::max(s - at.lower[i], least_gap);

@@ -88,36 +88,59 @@ struct LinearRows {
   const double* rows;                         // (E, m)
 };
 
-// The change of the rows, (E), in a step of the intervals' columns, (N, m, n).
-inline void push_rows(const LinearRows& of, const double* step, double* out) {
-  const std::size_t m = of.columns, n = of.dof;
-  for (std::size_t e = 0; e < of.count; ++e) {
-    const double* const x = step + of.intervals[e] * m * n + of.joints[e];
-    double change = 0.0;
-    for (std::size_t j = 0; j < m; ++j) change += of.rows[e * m + j] * x[j * n];
-    out[e] = change;
+// Calls work(first, last) for every run of rows in one interval and of one joint.
+template <typename Work>
+void in_runs(const LinearRows& of, const Work& work) {
+  for (std::size_t first = 0, last = 0; first < of.count; first = last) {
+    for (last = first + 1; last < of.count && of.intervals[last] == of.intervals[first] &&
+                           of.joints[last] == of.joints[first];)
+      ++last;
+    work(first, last);
   }
 }
 
-// Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n).
-inline void pull_rows(const LinearRows& of, const double* forces, double* out) {
+// The change of the rows, (E), in a step of the intervals' columns, (N, m, n). work: m numbers.
+inline void push_rows(const LinearRows& of, const double* step, double* work, double* out) {
   const std::size_t m = of.columns, n = of.dof;
-  for (std::size_t e = 0; e < of.count; ++e) {
-    double* const g = out + of.intervals[e] * m * n + of.joints[e];
-    for (std::size_t j = 0; j < m; ++j) g[j * n] += forces[e] * of.rows[e * m + j];
-  }
+  in_runs(of, [&](std::size_t first, std::size_t last) {
+    const double* const x = step + of.intervals[first] * m * n + of.joints[first];
+    for (std::size_t j = 0; j < m; ++j) work[j] = x[j * n];
+    for (std::size_t e = first; e < last; ++e) {
+      double change = 0.0;
+      for (std::size_t j = 0; j < m; ++j) change += of.rows[e * m + j] * work[j];
+      out[e] = change;
+    }
+  });
 }
 
-// Add weights of the rows' squares, (E), to a Hessian, (N, m, m, n, n).
-inline void add_squares(const LinearRows& of, const double* weights, double* out) {
+// Add forces on the rows, (E), to a covector in the intervals' columns, (N, m, n). work: m numbers.
+inline void pull_rows(const LinearRows& of, const double* forces, double* work, double* out) {
   const std::size_t m = of.columns, n = of.dof;
-  for (std::size_t e = 0; e < of.count; ++e) {
-    const double* const row = of.rows + e * m;
-    double* const block = out + of.intervals[e] * m * m * n * n + of.joints[e] * (n + 1);
-    for (std::size_t i = 0; i < m; ++i)
-      for (std::size_t j = 0; j < m; ++j)
-        block[(i * m + j) * n * n] += weights[e] * row[i] * row[j];
-  }
+  in_runs(of, [&](std::size_t first, std::size_t last) {
+    std::fill_n(work, m, 0.0);
+    for (std::size_t e = first; e < last; ++e)
+      for (std::size_t j = 0; j < m; ++j) work[j] += forces[e] * of.rows[e * m + j];
+    double* const g = out + of.intervals[first] * m * n + of.joints[first];
+    for (std::size_t j = 0; j < m; ++j) g[j * n] += work[j];
+  });
+}
+
+// Add weights of the rows' squares, (E), to a Hessian, (N, m, m, n, n). work: m^2 numbers.
+inline void add_squares(const LinearRows& of, const double* weights, double* work, double* out) {
+  const std::size_t m = of.columns, n = of.dof;
+  in_runs(of, [&](std::size_t first, std::size_t last) {
+    std::fill_n(work, m * m, 0.0);
+    for (std::size_t e = first; e < last; ++e) {
+      const double* const row = of.rows + e * m;
+      for (std::size_t i = 0; i < m; ++i) {
+        const double weighted = weights[e] * row[i];
+        for (std::size_t j = 0; j < m; ++j) work[i * m + j] += weighted * row[j];
+      }
+    }
+    double* const block =
+        out + of.intervals[first] * m * m * n * n + of.joints[first] * (n + 1);
+    for (std::size_t i = 0; i < m * m; ++i) block[i * n * n] += work[i];
+  });
 }
 
 }  // namespace hovi::intervals

@@ -150,7 +150,8 @@ void push_rows(const Index& intervals, const Index& joints, const Input<2>& rows
   const LinearRows of =
       rows_of(intervals, joints, rows, step.shape(0), step.shape(1), step.shape(2));
   out.require("out", {of.count});
-  hovi::intervals::push_rows(of, step.data(), out.data());
+  const auto work = allocate(of.columns);
+  hovi::intervals::push_rows(of, step.data(), work.get(), out.data());
 }
 
 void pull_rows(const Index& intervals, const Index& joints, const Input<2>& rows,
@@ -159,7 +160,8 @@ void pull_rows(const Index& intervals, const Index& joints, const Input<2>& rows
   const LinearRows of =
       rows_of(intervals, joints, rows, sums.shape(0), sums.shape(1), sums.shape(2));
   forces.require("forces", {of.count});
-  hovi::intervals::pull_rows(of, forces.data(), sums.data());
+  const auto work = allocate(of.columns);
+  hovi::intervals::pull_rows(of, forces.data(), work.get(), sums.data());
 }
 
 void add_squares(const Index& intervals, const Index& joints, const Input<2>& rows,
@@ -169,7 +171,8 @@ void add_squares(const Index& intervals, const Index& joints, const Input<2>& ro
   sums.require("sums", {N, m, m, n, n});
   const LinearRows of = rows_of(intervals, joints, rows, N, m, n);
   weights.require("weights", {of.count});
-  hovi::intervals::add_squares(of, weights.data(), sums.data());
+  const auto work = allocate(of.columns * of.columns);
+  hovi::intervals::add_squares(of, weights.data(), work.get(), sums.data());
 }
 
 void interpolate(const Input<3>& table, const Input<1>& steps, const Index& intervals,

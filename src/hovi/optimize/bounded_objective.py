@@ -100,7 +100,7 @@ class BoundedOutcome(Generic[X]):
     """The final point, its multipliers, and why the iteration ended.
 
     corrected: whether some steps were corrected ones, without which it may end otherwise.
-    marks: the points on the way at which the mean product z gap had halved, with that product.
+    marks: the last points on the way before the mean product z gap had halved, with that product.
     kept: the point of least objective so far that keeps the bounds to KEPT, and the outputs there;
         None for none. It is the final point where time runs out.
     """

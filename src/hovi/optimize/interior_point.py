@@ -21,6 +21,7 @@ imposed on outputs close to the motion, the closer the smaller mu.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import TypeVar
@@ -43,6 +44,9 @@ from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 X = TypeVar("X")
 
+FIRST_RADIUS, WARM_RADIUS = 50.0, 1000.0
+"""First radius of the trust region, as the norm of a step in the metric, and the same in a warm
+start, which is near to a solution of a similar problem."""
 INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
 WHOLE_STEP = 0.9
@@ -99,6 +103,8 @@ def minimize_bounded(
     if density < DENSITY_FLOOR:
         density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
+    radius = FIRST_RADIUS if start is None else WARM_RADIUS
+    options = dataclasses.replace(options, radius=radius)
     outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
         outcome.stop = Stop.DIVERGED
@@ -138,6 +144,7 @@ class _Iteration(BoundedSteps[X]):
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = 0
         self.marks = outcome.marks
+        self.marked = 0.0
 
     def run(self) -> None:
         """Iterate until stationary, or until a limit is reached."""
@@ -205,9 +212,16 @@ class _Iteration(BoundedSteps[X]):
         self.cautious = self.plain
         self.product = outcome.barrier.mean_product()
         self.violations.append(float(outcome.violation.max(initial=0.0)))
-        if not self.marks or self.product < 0.5 * self.marks[-1][0]:
-            self.marks.append((self.product, x))
+        self._mark(x)
         return True
+
+    def _mark(self, x: X) -> None:
+        """Mark a point: the last one before the product falls to half of what it was at first."""
+        if self.marks and self.product >= 0.5 * self.marked:
+            self.marks[-1] = self.product, x
+        else:
+            self.marks.append((self.product, x))
+            self.marked = self.product
 
     def _is_hopeless(self) -> bool:
         """Whether the bounds seem impossible to meet from here."""

@@ -59,9 +59,9 @@ class LimitedParts:
     @property
     def unique(self) -> tuple[Array, Array, Index]:
         """The different pairs of left and width, and the number of the pair of every part."""
-        pairs = np.stack([self.left, self.width], axis=1)
-        different, which = np.unique(pairs, axis=0, return_inverse=True)
-        return different[:, 0], different[:, 1], which
+        number = np.rint((1.0 + self.left) / self.width)  # in a tree of halves, 1 at its root
+        _, first, which = np.unique(number, return_index=True, return_inverse=True)
+        return self.left[first], self.width[first], which
 
     @property
     def _arrays(self) -> tuple[Any, ...]:

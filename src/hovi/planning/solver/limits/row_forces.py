@@ -31,17 +31,19 @@ def forces_of(
         return None, []
     grid, nv = problem.grid, problem.coordinates.nv
     nodes = control_nodes(control_degree(grid.order, grid.inner_modes, 0))
-    slope = np.zeros((grid.intervals, len(nodes), grid.order + 1, nv))
+    slope = np.zeros((grid.intervals, grid.order + 1, nv, len(nodes)))
     forces = rows.weights * multipliers / rows.of.ranges[rows.coordinate]
     for order in np.unique(rows.orders):
         own = np.flatnonzero(rows.orders == order)
         shares = forces[own, None] * _values_in(rows.table[own], nodes, grid, int(order))
-        at = (rows.intervals[own, None], np.arange(len(nodes)), order, rows.joints[own, None])
-        np.add.at(slope, at, shares)
+        places = rows.intervals[own] * nv + rows.joints[own]
+        numbers = places[:, None] * len(nodes) + np.arange(len(nodes))
+        sums = np.bincount(numbers.ravel(), shares.ravel(), len(slope) * nv * len(nodes))
+        slope[:, order] = sums.reshape(len(slope), nv, len(nodes))
     weights = np.repeat(grid.steps / len(nodes), len(nodes))
     k = np.repeat(np.arange(grid.intervals), len(nodes))
     instants = Instants(k, np.tile(nodes, grid.intervals), weights)
-    slope = slope.reshape(len(k), -1) / weights[:, None]
+    slope = slope.transpose(0, 3, 1, 2).reshape(len(k), -1) / weights[:, None]
     outputs = np.zeros((len(k), 0))
     return instants, [PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))]
 
