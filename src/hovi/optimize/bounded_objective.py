@@ -54,6 +54,9 @@ class BoundedObjective(ABC, Generic[X]):
     """Whether refining found outputs so far from their bounds that the iteration is to end."""
     reopens: bool = False
     """Whether new outputs may be outside their bounds, which an iteration then recovers from."""
+    radii: tuple[float, float] = 50.0, 1000.0
+    """First radius of the trust region, as the norm of a step in the metric, in a cold start and in
+    a warm one, which is near to a solution of a similar problem."""
 
     @abstractmethod
     def outputs(self, x: X) -> Outputs:

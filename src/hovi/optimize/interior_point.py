@@ -44,9 +44,6 @@ from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
 X = TypeVar("X")
 
-FIRST_RADIUS, WARM_RADIUS = 50.0, 1000.0
-"""First radius of the trust region, as the norm of a step in the metric, and the same in a warm
-start, which is near to a solution of a similar problem."""
 INITIAL_MU = 0.1
 """First barrier parameter, relative to the mean density of the objective."""
 WHOLE_STEP = 0.9
@@ -63,6 +60,8 @@ they are and to the mean density, and its largest value, relative to the mean de
 LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
 """Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
 slacks are moved away from their bounds instead of ending as diverged, and how many times."""
+MARKED_AGAIN = 1.5
+"""Product up to which a later point takes the place of a marked one, relative to its first."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 SHORT_SHARE = 0.1
@@ -103,8 +102,8 @@ def minimize_bounded(
     if density < DENSITY_FLOOR:
         density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
-    radius = FIRST_RADIUS if start is None else WARM_RADIUS
-    options = dataclasses.replace(options, radius=radius)
+    cold, warm = objective.radii
+    options = dataclasses.replace(options, radius=cold if start is None else warm)
     outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
         outcome.stop = Stop.DIVERGED
@@ -217,11 +216,12 @@ class _Iteration(BoundedSteps[X]):
 
     def _mark(self, x: X) -> None:
         """Mark a point: the last one before the product falls to half of what it was at first."""
-        if self.marks and self.product >= 0.5 * self.marked:
-            self.marks[-1] = self.product, x
-        else:
-            self.marks.append((self.product, x))
-            self.marked = self.product
+        product, marks = self.product, self.marks
+        if not marks or product < 0.5 * self.marked:
+            self.marked = product
+            marks.append((product, x))
+        elif product <= MARKED_AGAIN * self.marked:
+            marks[-1] = min(product, self.marked), x
 
     def _is_hopeless(self) -> bool:
         """Whether the bounds seem impossible to meet from here."""

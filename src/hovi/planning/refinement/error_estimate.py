@@ -39,8 +39,6 @@ LIMITED_SAFETY_FACTOR = 3.0
 """Factor on estimates under limits, where the finer solution is not much better."""
 RICHER_LEVEL = 1e-3
 """Barrier parameter at which a solve with more modes begins within limits."""
-FINISHED_LEVEL = 1e-4
-"""Barrier parameter at which such a motion is solved to its end."""
 RICHER_BARRIER = 1e-7
 """Its least last barrier parameter, whose share of the cost is less than errors that can be told.
 """
@@ -159,7 +157,7 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
-    method = InteriorPoint(known.central.freed(), FINISHED_LEVEL)
+    method = InteriorPoint(known.central.freed())
     solution = solve_on_grid(
         known.problem, known.trajectory.path, near=True, method=method, barrier=barrier
     )

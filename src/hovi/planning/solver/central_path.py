@@ -66,4 +66,4 @@ class CentralPath:
         """The same with rows that may be refined."""
         rows = None if self.rows is None else self.rows.freed()
         near = None if self.near is None else self.near.copied(fixed=False)
-        return CentralPath(self.points, rows, near=near)
+        return dataclasses.replace(self, rows=rows, near=near)

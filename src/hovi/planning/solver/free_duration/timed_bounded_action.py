@@ -40,6 +40,8 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     duration T0. limits, margins, rows: as for BoundedAction. price: of time.
     """
 
+    radii = 10.0, 10.0  # a long step in time leads to another motion
+
     def __init__(
         self,
         problem: TrajectoryProblem,

@@ -163,7 +163,9 @@ class BoundedSearch:
     def central_path(self, outcome: Bounded) -> CentralPath:
         """The points at which the barrier of a solve was larger, and its solution."""
         density = mean_density(outcome.outputs, self.problem.grid.duration)
-        points = (*self.points, (outcome.barrier.mu / density, outcome.x))
+        last = outcome.barrier.mu / density
+        before = [(level, x) for level, x in self.points if level > last]
+        points = (*before, (last, outcome.x))
         barrier = outcome.barrier if self.problem.distances is None else None
         return CentralPath(points, self.rows, barrier, self.margins, self.near)
 
