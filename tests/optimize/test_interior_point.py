@@ -458,7 +458,27 @@ def test_few_further_steps_are_taken_for_bounds_that_are_replaced() -> None:
     assert found.iterations <= 2 * whole.iterations
 
 
-# Warm starts, and time limits
+# The points on the way, warm starts, and time limits
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_marks_are_the_points_before_the_product_halves(seed: int) -> None:
+    """They descend, the last is the solution, and each is near the minimum with its barrier."""
+    program, start, _ = random_quadratic(seed, 20, 60)
+    outcome = minimize_bounded(program, start, Options(barrier=1e-8))
+    levels = np.array([level for level, _ in outcome.marks])
+    assert len(levels) > 4
+    assert (levels[1:] <= levels[:-1]).all()
+    assert (levels[2:] < 0.5 * levels[:-2]).all()  # two in one halving: its end, and the next
+    np.testing.assert_array_equal(outcome.marks[-1][1], outcome.x)
+    for level, x in outcome.marks[2:]:
+        there = minimize_bounded(program, x, Options(barrier=level / density(program, start)))
+        assert np.abs(there.x - x).max() <= 0.3 * np.abs(outcome.x - start).max()
+
+
+def density(program: Quadratic, x: Array) -> float:
+    """The mean density of the objective at a point, to which barrier parameters are relative."""
+    return abs(program.outputs(x).value) / program.bounds.measure
 
 
 def after_a_change(seed: int, enough: float = 0.0) -> tuple[BoundedOutcome[Array], ...]:

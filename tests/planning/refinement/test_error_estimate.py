@@ -246,6 +246,23 @@ def test_an_estimate_within_limits_holds_its_time_limit(arm_scene: Scene) -> Non
     assert finer_than(limited, time_limit=1e-9) is None
 
 
+def test_a_richer_motion_is_finished_from_its_own_barrier(arm_scene: Scene) -> None:
+    """In a few steps, after which it is a minimum within limits at all times."""
+    lower = np.full((4, 2), -np.inf)
+    lower[1] = -3.0
+    problem = reach_problem(arm_scene, Grid.uniform(1.0, 12, galerkin(2)))
+    limited = solve_on_grid(dataclasses.replace(problem, limits=Limits(lower, -lower)))
+    finer = finer_than(limited)
+    assert finer is not None
+    finished = finer.finish()
+    assert finished is not None
+    assert finished.success
+    assert finished.nit <= 4 < 0.5 * limited.nit
+    assert finished.cost == pytest.approx(finer.cost, rel=1e-6)
+    t = np.linspace(0.0, 1.0, 10_001)
+    assert np.abs(finished.trajectory.sample(t).v).max() <= 3.0 * (1 + 2e-6)
+
+
 def test_only_minima_have_an_estimate(reach_reference: Solution) -> None:
     stopped = dataclasses.replace(reach_reference, success=False)
     with pytest.raises(InputError, match="only errors of minima can be estimated"):

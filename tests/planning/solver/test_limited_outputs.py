@@ -79,8 +79,8 @@ def test_pulled_forces_are_weighted_sums_over_the_points(shape: tuple[int, ...],
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
-ROWS = [(1, 4, 1, 1), (3, 5, 6, 11), (4, 8, 7, 40), (2, 4, 2, 0)]
-"""Intervals N, columns m, components n, rows E."""
+ROWS = [(1, 4, 1, 1), (3, 5, 6, 11), (4, 8, 7, 40), (2, 4, 2, 0), (2, 6, 2, 30)]
+"""Intervals N, columns m, components n, rows E: of the last, many in one place follow each other."""
 each_rows = pytest.mark.parametrize("shape", ROWS, ids=str)
 
 
@@ -89,6 +89,9 @@ def rows_of(shape: tuple[int, ...]) -> tuple[Any, Any, Array, Array, np.random.G
     N, m, n, E = shape
     random = np.random.default_rng(list(shape))
     k, joints = random.integers(N, size=E), random.integers(n, size=E)
+    if 4 * N * n < E:
+        order = np.lexsort((joints, k))
+        k, joints = k[order], joints[order]
     rows = random.normal(size=(E, m))
     whole = np.zeros((E, N, m, n))
     whole[np.arange(E), k, :, joints] = rows
