@@ -80,7 +80,7 @@ def test_pulled_forces_are_weighted_sums_over_the_points(shape: tuple[int, ...],
 
 
 ROWS = [(1, 4, 1, 1), (3, 5, 6, 11), (4, 8, 7, 40), (2, 4, 2, 0), (2, 6, 2, 30)]
-"""Intervals N, columns m, components n, rows E: of the last, many in one place follow each other."""
+"""Intervals N, columns m, components n, rows E: of the last, many follow in one place."""
 each_rows = pytest.mark.parametrize("shape", ROWS, ids=str)
 
 
