@@ -39,6 +39,8 @@ FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
 """Maximum number of its steps."""
+ROUGH_TOLERANCE = 1e-4
+"""Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
 DETOUR = 1.02
@@ -74,14 +76,23 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     if not search.problem.constrained:
         return search.solve(guess)
 
-    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
-        return _rough(search, x, known, None if x is guess else FIRST_MU)
-
     search.near = None
-    rounds = minimize_constrained(search.problem, guess, minimize_round, most=ROUGH_ROUNDS)
-    search.near, rough = near, rounds.result
+    rough = _rough_with_constraints(search, guess)
+    search.near = near
     near.extend(search.problem, rough.x, AHEAD)
     return rough if near.blocked or rough.stop in STOPPED else search.solve(rough.x)
+
+
+def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
+    """A rough motion that nearly meets the constraints."""
+    problem = search.problem
+
+    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
+        return _rough(search, x, known, None if x is guess else FIRST_MU)[0]
+
+    if len(problem.passive) == 0:
+        return _rough(search, guess, first_multipliers(problem, guess), None)[0]
+    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS).result
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,10 +131,10 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
         return None
     search.near.extend(problem, moved, AHEAD)
     known = first_multipliers(problem, moved) if problem.constrained else None
-    outcome = _rough(search, moved, known, FIRST_MU)
+    outcome, known = _rough(search, moved, known, FIRST_MU)
     if outcome.stop is Stop.DIVERGED or not outcome.feasible:
         return None
-    if known is not None:
+    if known is not None and len(problem.passive) > 0:
         residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
         known = known.updated(residuals, problem.passive)
     return _Rough(outcome, known, search.rows, search.near)
@@ -131,8 +142,8 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
 
 def _rough(
     search: BoundedSearch, path: DiscretePath, known: Multipliers | None, mu: float | None
-) -> Bounded:
-    """A solve up to a large barrier parameter.
+) -> tuple[Bounded, Multipliers | None]:
+    """A solve up to a large barrier parameter, and the multipliers of conditions then.
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     """
@@ -141,9 +152,10 @@ def _rough(
     options = dataclasses.replace(
         whole, barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE, max_iterations=most
     )
-    objective, start = search.objective(known), None
+    tolerance = None if known is None or len(search.problem.passive) > 0 else ROUGH_TOLERANCE
+    objective, start = search.objective(known, node_tolerance=tolerance), None
     if mu is not None:
         outputs = objective.outputs(path)
         density = mean_density(outputs, objective.bounds.measure)
         start = Barrier.central(objective.bounds, outputs.y, mu * density)
-    return search.minimized(objective, path, options, start)
+    return search.minimized(objective, path, options, start), objective.action.multipliers
