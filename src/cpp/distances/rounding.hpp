@@ -25,6 +25,10 @@ constexpr double most_below = 40.0;
 constexpr int rounding_steps = 40, rounding_halvings = 20;
 // Step of n at which Newton's method ends.
 constexpr double rounding_step = 1e-12;
+// Vertices that may gain weight while n turns by less than the first of these are looked at, by the
+// second if n turns further.
+constexpr double turns[] = {0.02, 0.3};
+constexpr std::size_t most_candidates = 512;
 
 // The value of a support function, its gradient in the shape's frame, and its Hessian in the plane
 // of two directions.
@@ -34,40 +38,54 @@ struct Support {
   Plane bend;
 };
 
-inline Support support_of_points(const Model& model, const Shape& shape, const Vector& n,
-                                 const Vector& s, const Vector& t, double eps) {
+// The vertices of a shape that may have weight near a direction.
+struct Candidates {
+  std::size_t count;
+  Vector point[most_candidates];
+};
+
+// False where there are too many. n: in the shape's frame.
+inline bool find_candidates(const Model& model, const Shape& shape, const Vector& n, double eps,
+                            double turn, Candidates& out) {
+  out.count = 0;
+  if (shape.kind == ShapeKind::cylinder) return true;
   double top = -__builtin_inf();
+  Vector highest{};
   for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
     const double height = along(model, i, n);
-    if (height > top) top = height;
+    if (height > top) top = height, highest = {model.x[i], model.y[i], model.z[i]};
+  }
+  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
+    const double below = top - along(model, i, n) - most_below * eps;
+    const Vector v{model.x[i], model.y[i], model.z[i]}, w = v - highest;
+    if (below > 0.0 && below * below > turn * turn * dot(w, w)) continue;
+    if (out.count > 0 && same(v, out.point[out.count - 1])) continue;  // a copy
+    if (out.count == most_candidates) return false;
+    out.point[out.count++] = v;
+  }
+  return true;
+}
+
+inline Support support_of_points(const Candidates& near, const Vector& n, const Vector& s,
+                                 const Vector& t, double eps) {
+  double height[most_candidates], top = -__builtin_inf();
+  for (std::size_t i = 0; i < near.count; ++i) {
+    height[i] = dot(near.point[i], n);
+    if (height[i] > top) top = height[i];
   }
   Support h{};
-  double sum = 0.0, x = 0.0, y = 0.0;
-  Vector before{__builtin_nan(""), 0.0, 0.0};
-  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
-    const double below = (top - along(model, i, n)) / eps;
-    const Vector v{model.x[i], model.y[i], model.z[i]};
-    if (below > most_below || same(v, before)) continue;  // copies follow what they are copies of
-    before = v;
-    const double weight = __builtin_exp(-below), vs = dot(v, s), vt = dot(v, t);
-    sum += weight;
-    h.point = h.point + weight * v;
-    x += weight * vs;
-    y += weight * vt;
-    h.bend.add(weight, vs, vt);
+  double sum = 0.0;
+  for (std::size_t i = 0; i < near.count; ++i) {
+    const double below = (top - height[i]) / eps, weight = __builtin_exp(-below);
+    height[i] = below > most_below ? 0.0 : weight;
+    sum += height[i];
+    h.point = h.point + height[i] * near.point[i];
   }
-  const double share = 1.0 / sum;
-  h.point = share * h.point;
-  x *= share;
-  y *= share;
-  h.bend = {};
-  before = {__builtin_nan(""), 0.0, 0.0};
-  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
-    const double below = (top - along(model, i, n)) / eps;
-    const Vector v{model.x[i], model.y[i], model.z[i]};
-    if (below > most_below || same(v, before)) continue;
-    before = v;
-    h.bend.add(share * __builtin_exp(-below) / eps, dot(v, s) - x, dot(v, t) - y);
+  h.point = (1.0 / sum) * h.point;
+  for (std::size_t i = 0; i < near.count; ++i) {
+    if (height[i] == 0.0) continue;
+    const Vector w = near.point[i] - h.point;
+    h.bend.add(height[i] / (sum * eps), dot(w, s), dot(w, t));
   }
   h.value = top + eps * __builtin_log(sum);
   return h;
@@ -90,11 +108,11 @@ inline Support support_of_cylinder(const Shape& shape, const Vector& n, const Ve
   return h;
 }
 
-inline Support support_of(const Model& model, const Shape& shape, const Rotation& R,
+inline Support support_of(const Candidates& near, const Shape& shape, const Rotation& R,
                           const Vector& n, const Vector& s, const Vector& t, double eps) {
   const Vector own = turned_back(R, n), first = turned_back(R, s), other = turned_back(R, t);
   if (shape.kind == ShapeKind::cylinder) return support_of_cylinder(shape, own, first, other, eps);
-  return support_of_points(model, shape, own, first, other, eps);
+  return support_of_points(near, own, first, other, eps);
 }
 
 // phi at a unit vector, where it is measured along tangents.
@@ -104,7 +122,7 @@ struct Separation {
   double value, apart;
 };
 
-inline Separation separation(const Model& model, const Placed& placed, const Vector& n,
+inline Separation separation(const Candidates* near, const Placed& placed, const Vector& n,
                              double eps) {
   Separation s{};
   s.n = n;
@@ -115,10 +133,10 @@ inline Separation separation(const Model& model, const Placed& placed, const Vec
   const Vector side = cross(n, some);
   s.tangent[0] = (1.0 / length(side)) * side;
   s.tangent[1] = cross(n, s.tangent[0]);
-  const Support a = support_of(model, *placed.first, placed.at_first.rotation, n, s.tangent[0],
+  const Support a = support_of(near[0], *placed.first, placed.at_first.rotation, n, s.tangent[0],
                                s.tangent[1], eps);
-  const Support b = support_of(model, *placed.second, placed.at_second.rotation, -n, s.tangent[0],
-                               s.tangent[1], eps);
+  const Support b = support_of(near[1], *placed.second, placed.at_second.rotation, -n,
+                               s.tangent[0], s.tangent[1], eps);
   s.own_first = a.point;
   s.own_second = b.point;
   s.first = placed.at_first * a.point;
@@ -145,13 +163,21 @@ inline void solve_plane(const Plane& M, double x, double y, double* out) {
 }
 
 // Newton's method for the largest separation near that of a contact, which becomes that of the
-// rounded shapes. It stays as it is where that fails.
-inline void round_off(const Model& model, const Placed& placed, double eps, Contact& c) {
-  Separation s = separation(model, placed, c.n, eps);
+// rounded shapes. It stays as it is where that fails, or would need many vertices.
+// False if n turns too far for the vertices that are looked at.
+inline bool round_within(const Model& model, const Placed& placed, double eps, double most,
+                         Contact& c) {
+  Candidates near[2];
+  if (!find_candidates(model, *placed.first, turned_back(placed.at_first.rotation, c.n), eps,
+                       most, near[0]) ||
+      !find_candidates(model, *placed.second, -turned_back(placed.at_second.rotation, c.n), eps,
+                       most, near[1]))
+    return true;
+  Separation s = separation(near, placed, c.n, eps);
   Plane M;
   bool found = false;
   for (int step = 0; step < rounding_steps && !found; ++step) {
-    if (!stiffness(s, M)) return;
+    if (!stiffness(s, M)) return true;
     const Vector w = placed.difference(s.own_first, s.own_second);
     double move[2];
     solve_plane(M, dot(w, s.tangent[0]), dot(w, s.tangent[1]), move);
@@ -162,14 +188,16 @@ inline void round_off(const Model& model, const Placed& placed, double eps, Cont
     bool better = false;
     for (int k = 0; k < rounding_halvings && !better; ++k, share *= 0.5) {
       const Vector n = s.n + (share * move[0]) * s.tangent[0] + (share * move[1]) * s.tangent[1];
-      next = separation(model, placed, (1.0 / length(n)) * n, eps);
+      next = separation(near, placed, (1.0 / length(n)) * n, eps);
       better = next.value > s.value || size < 1e-7;
     }
     if (!better) break;
     s = next;
     found = size < rounding_step;
   }
-  if (!stiffness(s, M)) return;
+  const Vector turn = s.n - c.n;
+  if (dot(turn, turn) > most * most) return false;
+  if (!stiffness(s, M)) return true;
   c.own_first = s.own_first;
   c.own_second = s.own_second;
   c.first = s.first;
@@ -182,6 +210,11 @@ inline void round_off(const Model& model, const Placed& placed, double eps, Cont
   c.tangent[1] = s.tangent[1];
   c.bend[0] = s.at_first;
   c.bend[1] = s.at_second;
+  return true;
+}
+
+inline void round_off(const Model& model, const Placed& placed, double eps, Contact& c) {
+  if (!round_within(model, placed, eps, turns[0], c)) round_within(model, placed, eps, turns[1], c);
 }
 
 // Adds force d'' of rounded shapes to a matrix (nv, nv). work: at least 6 x columns.
