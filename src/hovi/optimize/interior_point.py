@@ -105,7 +105,7 @@ def minimize_bounded(
     if density < DENSITY_FLOOR:
         density = 1.0
     barrier = start or Barrier.central(objective.bounds, outputs.y, INITIAL_MU * density)
-    radius = FIRST_RADIUS if start is None else WARM_RADIUS
+    radius = FIRST_RADIUS if start is None or objective.reopens else WARM_RADIUS
     options = dataclasses.replace(options, radius=radius)
     outcome = BoundedOutcome(x, outputs, barrier, Stop.ITERATION_LIMIT)
     if not np.isfinite(outputs.value):
