@@ -39,6 +39,8 @@ FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
 """Maximum number of its steps."""
+ROUGH_VIOLATION = 0.05
+"""Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
 ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
@@ -58,14 +60,15 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     free = _without_distances(search, guess)
     if not search.near.blocked:
         return free
-    found = _rough_with_distances(search, free.x)
-    if found is None or found.cost > DETOUR * abs(free.outputs.value):
-        others = [_rough_with_distances(search, guess), found]
-        found = min((each for each in others if each), key=lambda each: each.cost, default=None)
-    if found is None:
-        raise_if_late()  # or more time might lead to one
-        return dataclasses.replace(free, stop=Stop.DIVERGED)
-    return found.solved(search)
+    rough = [_rough_with_distances(search, free.x)]
+    if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
+        rough.append(_rough_with_distances(search, guess))
+    for found in sorted(filter(None, rough), key=lambda each: each.rank):
+        outcome = found.solved(search)
+        if outcome.stop is not Stop.DIVERGED:
+            return outcome
+    raise_if_late()  # or more time might lead to one
+    return dataclasses.replace(free, stop=Stop.DIVERGED)
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -105,9 +108,9 @@ class _Rough:
     near: ClearanceRows
 
     @property
-    def cost(self) -> float:
-        """The action."""
-        return self.outcome.outputs.value
+    def rank(self) -> tuple[bool, float]:
+        """Whether it does not keep its bounds yet, and the action."""
+        return not self.outcome.feasible, self.outcome.outputs.value
 
     def solved(self, search: BoundedSearch) -> Bounded:
         """The solve from there to the end, with rows of pairs that are near."""
@@ -132,7 +135,8 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
     search.near.extend(problem, moved, AHEAD)
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome, known = _rough(search, moved, known, FIRST_MU)
-    if outcome.stop is Stop.DIVERGED or not outcome.feasible:
+    violation = float(outcome.violation.max(initial=0.0))
+    if outcome.stop is Stop.DIVERGED or violation > ROUGH_VIOLATION:
         return None
     if known is not None and len(problem.passive) > 0:
         residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
