@@ -527,6 +527,7 @@ _PAIRS = {
         sizes["q"] == pair_distances().nq
         and sizes.get("n", pair_distances().nv) == pair_distances().nv
         and all(0 <= k < pair_distances().size for k in arguments["chosen"].tolist())
+        and 0.0 <= arguments["rounding"] <= 1.0
     ),
 }
 
@@ -857,7 +858,7 @@ ENTRIES: dict[str, Entry] = {
     "distances.values": Entry(
         lambda **arguments: pair_distances().values(**arguments),
         _CHOSEN,
-        {"reach": 0.5},
+        {"reach": 0.5, "rounding": 1e-4},
         optional=("wanted",),
         **_PAIRS,
     ),
@@ -867,7 +868,7 @@ ENTRIES: dict[str, Entry] = {
             **{**_CHOSEN, "force": _in("P k")},
             **{"jacobian": _out("P k n"), "curvature": _out("P n n")},
         },
-        {"reach": 0.5},
+        {"reach": 0.5, "rounding": 1e-4},
         optional=("force", "wanted"),
         **_PAIRS,
     ),

@@ -136,6 +136,17 @@ inline void solve(std::size_t k, double (*A)[most_directions], double* B, std::s
   }
 }
 
+// A symmetric matrix (2, 2).
+struct Plane {
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+
+  void add(double weight, double x, double y) {
+    xx += weight * x * x;
+    xy += weight * x * y;
+    yy += weight * y * y;
+  }
+};
+
 // The nearest points of two cores and the features that they lie on.
 // own_first, own_second: the points in their shapes' frames; first, second: in the world.
 // n: the normal from the first core to the second. distance: of the cores, negative where they
@@ -147,6 +158,11 @@ struct Contact {
   const PairColumn* column;
   std::size_t columns;
   const Twist* twist;
+  // Of rounded shapes: see rounding.hpp.
+  bool rounded;
+  double apart;
+  Vector tangent[2];
+  Plane bend[2];
 };
 
 // The velocity of w in each column.

@@ -72,7 +72,7 @@ enum class Known : std::int64_t { exactly, far, not_at_all };
 
 // points: configurations, (P, nq). pairs: numbers of k pairs. force: weights of the second
 // derivatives, (P, k), or null. wanted: which distances are, (P, k), or null for all; others count
-// as far.
+// as far. rounding: eps of rounding.hpp, in [m]; 0 for the shapes as they are.
 struct Request {
   std::size_t points;
   const double* q;
@@ -81,6 +81,7 @@ struct Request {
   double reach;
   const double* force;
   const bool* wanted;
+  double rounding;
 };
 
 // distance, known: (P, k). jacobian: (P, k, nv), or null; zero where the distance is not known

@@ -7,6 +7,7 @@
 #include "nearest.hpp"
 #include "penetration.hpp"
 #include "poses.hpp"
+#include "rounding.hpp"
 
 namespace hovi::distances {
 namespace {
@@ -35,7 +36,7 @@ struct Workspace {
     return doubles((model.joints + model.shapes) * sizeof(Pose)) +
            doubles(model.nv * sizeof(Twist)) +
            doubles((model.shapes + model.most_columns) * sizeof(Vector)) +
-           doubles(pairs * sizeof(Memory)) + 2 * most_directions * model.most_columns;
+           doubles(pairs * sizeof(Memory)) + 2 * most_directions * model.most_columns;  // or 6
   }
 
   Workspace(const Model& model, std::size_t pairs, double* work) {
@@ -181,7 +182,7 @@ inline bool is_round(const Placed& placed) {
 
 // The distance of a pair, by its bounding spheres if they are far apart; the contact otherwise.
 inline Known measure_pair(const Model& model, const Pair& pair, const Workspace& work, double reach,
-                          Memory& memory, Contact& contact, double& distance) {
+                          double rounding, Memory& memory, Contact& contact, double& distance) {
   distance = lower_bound(model, pair, work, memory, reach);
   if (distance > reach) return Known::far;
   const Shape &first = model.shape[pair.first], &second = model.shape[pair.second];
@@ -212,6 +213,10 @@ inline Known measure_pair(const Model& model, const Pair& pair, const Workspace&
   }
   distance = (known == Known::far ? bound : contact.distance) - radii;
   remember(pair, work, simplex, distance, memory);
+  if (known == Known::exactly && rounding > 0.0) {
+    round_off(model, placed, rounding, contact);
+    distance = contact.distance - radii;
+  }
   return known;
 }
 
@@ -227,7 +232,9 @@ inline void expand_pair(const Model& model, const Pair& pair, const Workspace& w
   write_velocities(c, work.velocity);
   for (std::size_t i = 0; i < c.columns; ++i)
     slope[c.column[i].column] = dot(c.n, work.velocity[i]);
-  if (curvature && force != 0.0)
+  if (curvature && force != 0.0 && c.rounded)
+    add_rounded_curvature(c, work.velocity, force, model.nv, work.directions, curvature);
+  else if (curvature && force != 0.0)
     add_curvature(c, work.velocity, force, model.nv, work.directions, curvature);
 }
 
@@ -245,13 +252,13 @@ void measure(const Model& model, const Request& request, const Answer& answer, d
     if (curvature) fill(curvature, nv * nv);
     for (std::size_t k = 0; k < K; ++k) {
       const Pair& pair = model.pair[request.pair[k]];
-      Contact contact;
+      Contact contact{};
       const std::size_t at = p * K + k;
       Known known = Known::far;
       answer.distance[at] = request.reach;
       if (!request.wanted || request.wanted[at])
-        known = measure_pair(model, pair, work, request.reach, work.memory[k], contact,
-                             answer.distance[at]);
+        known = measure_pair(model, pair, work, request.reach, request.rounding, work.memory[k],
+                             contact, answer.distance[at]);
       answer.known[at] = static_cast<std::int64_t>(known);
       if (!answer.jacobian) continue;
       double* const slope = answer.jacobian + at * nv;

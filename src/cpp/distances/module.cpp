@@ -30,6 +30,7 @@ std::size_t natural(const char* name, std::int64_t value, std::int64_t end) {
 }
 
 constexpr std::int64_t most = std::int64_t{1} << 30;
+constexpr double most_rounding = 1.0;
 
 struct JointArrays {
   const Index &parents, &kinds, &coordinates, &columns;
@@ -165,14 +166,20 @@ Request request_of(const PairDistances& self, const Input<2>& q, const Index& ch
   const std::size_t pairs = chosen.shape(0);
   for (std::size_t k = 0; k < pairs; ++k)
     natural("chosen", chosen.data()[k], static_cast<std::int64_t>(self.size()));
-  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr};
+  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr, 0.0};
+}
+
+double rounding_of(double rounding) {
+  if (!(0.0 <= rounding && rounding <= most_rounding)) refuse("rounding must be from 0 to 1 m.");
+  return rounding;
 }
 
 void values(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const Output<2>& distances, const IndexOut2& known,
-            const std::optional<Mask2>& wanted) {
+            const std::optional<Mask2>& wanted, double rounding) {
   Request request = request_of(self, q, chosen, reach);
   request.wanted = data_or_null("wanted", wanted, {request.points, request.pairs});
+  request.rounding = rounding_of(rounding);
   distances.require("distances", {request.points, request.pairs});
   known.require("known", {request.points, request.pairs});
   const nb::gil_scoped_release released;
@@ -182,8 +189,9 @@ void values(const PairDistances& self, const Input<2>& q, const Index& chosen, d
 void expand(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const std::optional<Input<2>>& force, const Output<2>& distances,
             const IndexOut2& known, const Output<3>& jacobian, const Output<3>& curvature,
-            const std::optional<Mask2>& wanted) {
+            const std::optional<Mask2>& wanted, double rounding) {
   Request request = request_of(self, q, chosen, reach);
+  request.rounding = rounding_of(rounding);
   const std::size_t P = request.points, K = request.pairs, nv = self.nv();
   request.force = data_or_null("force", force, {P, K});
   request.wanted = data_or_null("wanted", wanted, {P, K});
@@ -208,7 +216,7 @@ NB_MODULE(distances, m) {
       .def_prop_ro("nv", &PairDistances::nv)
       .def_prop_ro("size", &PairDistances::size)
       .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a,
-           "wanted"_a = nb::none())
+           "wanted"_a = nb::none(), "rounding"_a = 0.0)
       .def("expand", &expand, "q"_a, "chosen"_a, "reach"_a, "force"_a.none(), "distances"_a,
-           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none());
+           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(), "rounding"_a = 0.0);
 }

@@ -44,6 +44,7 @@ class PairDistances:
         distances: Array,
         known: Index,
         wanted: Mask | None = None,
+        rounding: float = 0.0,
     ) -> None: ...
     def expand(
         self,
@@ -56,4 +57,5 @@ class PairDistances:
         jacobian: Array,
         curvature: Array,
         wanted: Mask | None = None,
+        rounding: float = 0.0,
     ) -> None: ...

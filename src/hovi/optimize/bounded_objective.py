@@ -85,6 +85,14 @@ class BoundedObjective(ABC, Generic[X]):
     def retract(self, x: X, step: Array, model: QuadraticModel) -> X:
         """The point that a step of a model leads to."""
 
+    def hold(self, x: X, change: Array) -> float:
+        """Add a change to the multipliers of equations; returns what it adds to the value at x."""
+        return 0.0
+
+    def meets_equations(self, x: X) -> bool:
+        """Whether equations hold at x to their tolerance; true without any."""
+        return True
+
     def refine(self, x: X, level: float) -> Refinement | None:
         """Replace outputs by others, which come after those that remain and bound x less.
 

@@ -40,6 +40,7 @@ class BoundedStep:
     along: the whole direction. share: of it that is taken. mu: at which it aims.
     decrease: predicted decrease of the merit function.
     remaining: decrease that the whole direction predicts for the objective with its barrier.
+    reaction: change of the multipliers of equations in the whole step; None without any.
     """
 
     trial: Trial
@@ -48,6 +49,7 @@ class BoundedStep:
     mu: float
     decrease: float
     remaining: float
+    reaction: Array | None = None
 
 
 class BoundedSteps(Generic[X]):
@@ -149,7 +151,10 @@ class BoundedSteps(Generic[X]):
         slope = float(np.vdot(model.gradient, s)) - float(np.vdot(weights * self.rho, along.dy))
         gradient = model.gradient if pulled is None else model.gradient + pulled
         norm2 = trial.norm**2 if pulled is None else float(np.vdot(s, model.metric_product(s)))
-        whole = -float(np.vdot(gradient, s))
+        whole, reaction = -float(np.vdot(gradient, s)), model.reaction(gradient, trial.factor)
+        if reaction is not None:
+            whole += reaction[1]
+            slope -= reaction[1]  # the merit function has the multipliers after the step
         square = whole - trial.shift * norm2
         square -= float(np.vdot(weights * self.sigma, along.dy**2))
         before = barrier.merit(y, self.penalty, along, 0.0)
@@ -169,7 +174,8 @@ class BoundedSteps(Generic[X]):
                 break
             share, predicted = shorter * longest, other
         trial = trial._replace(step=s, norm=math.sqrt(max(norm2, 0.0)))
-        return BoundedStep(trial, along, share, barrier.mu, predicted, 0.5 * whole)
+        change = None if reaction is None else reaction[0]
+        return BoundedStep(trial, along, share, barrier.mu, predicted, 0.5 * whole, change)
 
     def scale(self) -> float:
         """Magnitude of the objective, to which decreases are relative; positive."""

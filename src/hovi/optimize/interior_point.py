@@ -78,6 +78,8 @@ MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
+MAX_UNMET = 4
+"""Steps that predict next to nothing after which it ends although equations do not hold."""
 MAX_SLOW_STEPS = 40
 """Steps after which it ends as diverged if |y - s| was large in all and has hardly fallen."""
 SLOW_DECREASE, LARGE_VIOLATION = 0.1, 1e-3
@@ -140,6 +142,7 @@ class _Iteration(BoundedSteps[X]):
         self.report = report
         self.stalled = 0
         self.violations: list[float] = []
+        self.unmet = 0
         self.level = FIRST_REFINEMENT
         self.refinements = self.reopenings = 0
         self.marks = outcome.marks
@@ -176,8 +179,11 @@ class _Iteration(BoundedSteps[X]):
         barrier = outcome.barrier.with_mu(step.mu)
         moved_step = step.share * trial.step
         x = self.objective.retract(outcome.x, moved_step, model)
+        before = outcome.outputs.value
+        if step.reaction is not None:
+            before += self.objective.hold(outcome.x, step.reaction)
         outputs = self.objective.outputs(x)
-        old = outcome.outputs.value + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
+        old = before + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
         new, moved = math.inf, barrier
         if np.isfinite(outputs.value):
             moved = barrier.moved(outputs.y, along, step.share, self.penalty)
@@ -190,7 +196,7 @@ class _Iteration(BoundedSteps[X]):
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         length = trial.norm * step.share
-        before, radius = self.radius, next_radius(self.radius, length, ratio)
+        last, radius = self.radius, next_radius(self.radius, length, ratio)
         matched = outcome.violation.max(initial=0.0) <= MATCHED
         if matched and not trial.newton and step.share < SHORT_SHARE:
             radius = min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
@@ -200,7 +206,9 @@ class _Iteration(BoundedSteps[X]):
         self.stalled = self.stalled + 1 if stalled else 0
         if ratio <= 1e-4:
             if not self.cautious:  # the same again, as a plain step
-                self.radius = before
+                self.radius = last
+            if step.reaction is not None:
+                self.objective.hold(outcome.x, -step.reaction)
             self.cautious = True
             return False
         self.objective.accept(moved_step, model)
@@ -257,7 +265,10 @@ class _Iteration(BoundedSteps[X]):
         small = step.remaining <= SHORT_STEP_SHARE * enough
         if whole:
             small = max(step.remaining, step.decrease) <= enough
-        return last and small and step.trial.newton and self.outcome.feasible
+        if not (last and small and step.trial.newton and self.outcome.feasible):
+            return False
+        self.unmet = 0 if self.objective.meets_equations(self.outcome.x) else self.unmet + 1
+        return self.unmet % MAX_UNMET == 0
 
     def _reduce_mu(self, step: BoundedStep) -> None:
         """Reduce mu after a plain step once its problem is solved."""

@@ -65,6 +65,13 @@ class QuadraticModel(ABC):
         slope = float(np.vdot(self.gradient, s))
         return s, slope, float(np.vdot(s, self.metric_product(s)))
 
+    def reaction(self, gradient: Array, factor: Factor | None) -> tuple[Array, float] | None:
+        """Multipliers of equations of a step for a gradient, and their product with the residual.
+
+        None for a step, or a model, without equations.
+        """
+        return None
+
     def curvature_scale(self) -> float:
         """Magnitude of H relative to D, from which a first shift is chosen."""
         largest = float(np.max(np.abs(self.intervals.hessian)))

@@ -314,3 +314,67 @@ def test_other_shapes_are_not_known_and_other_joints_refused() -> None:
     universal = chain([pin.JointModelUniversal(np.eye(3)[0], np.eye(3)[1])])
     with pytest.raises(NotImplementedError, match="universal"):
         CompiledDistances(robot_of(universal), geometry)
+
+
+ROUNDING = 1e-4
+
+
+@pytest.mark.parametrize("joints", JOINTS.values(), ids=JOINTS)
+def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
+    joints: list[pin.JointModel],
+) -> None:
+    """First and second ones are those of finite differences, without exceptions."""
+    robot = robot_of(chain(joints))
+    geometry = geometry_of(robot.model, [*SHAPES.values()])
+    compiled, pairs = CompiledDistances(robot, geometry), everything(geometry)
+    q = configurations(robot, 20)
+    plain, known = compiled.values(q, pairs, np.inf)
+    rounded, _, jacobian, _ = compiled.expand(q, pairs, np.inf, rounding=ROUNDING)
+    exact = (known == EXACT) & (plain > 1e-3)
+    loss = (plain - rounded)[exact]
+    assert loss.min() >= -1e-12
+    assert loss.max() <= 10 * ROUNDING
+
+    def values(dq: Array) -> Array:
+        at = robot.integrate(q, dq)
+        distances, known = compiled.values(at, pairs, np.inf, rounding=ROUNDING)
+        return np.where(known == EXACT, distances, np.nan)
+
+    zero = np.zeros((len(q), robot.nv))
+    numeric = derivative_per_point(values, zero, 1e-6)
+    exact &= np.isfinite(numeric).all(axis=2)
+    np.testing.assert_allclose(jacobian[exact], numeric[exact], atol=1e-6)
+    force = np.random.default_rng(2).uniform(0.5, 1.0, plain.shape) * exact
+
+    def slope(dq: Array) -> Array:
+        J = compiled.expand(robot.integrate(q, dq), pairs, np.inf, rounding=ROUNDING)[2]
+        return np.einsum("pk,pki->pi", force, J)
+
+    rows = derivative_per_point(slope, zero, 1e-7)
+    numeric = 0.5 * (rows + rows.transpose(0, 2, 1))
+    curvature = compiled.expand(q, pairs, np.inf, force, rounding=ROUNDING)[3]
+    error = np.abs(curvature - numeric).max(axis=(1, 2)) / np.abs(numeric).max(axis=(1, 2))
+    assert error.max() < 1e-4
+
+
+def test_a_rounded_distance_is_smooth_where_faces_are_parallel() -> None:
+    """A box that tilts below a larger one, where the slope of its distance jumps."""
+    robot = robot_of(chain([pin.JointModelRX()]))
+    geometry = pin.GeometryModel()
+    place = robot.model.jointPlacements[1]
+    above = place * pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.25]))
+    geometry.addGeometryObject(pin.GeometryObject("floor", 0, 0, above, coal.Box(1.0, 1.0, 0.1)))
+    unit = pin.SE3.Identity()
+    geometry.addGeometryObject(pin.GeometryObject("box", 1, 0, unit, coal.Box(0.2, 0.2, 0.2)))
+    geometry.addCollisionPair(pin.CollisionPair(0, 1))
+    compiled, pairs = CompiledDistances(robot, geometry), np.arange(1)
+    tilt = np.array([[-1e-6], [0.0], [1e-6]])
+    slope = compiled.expand(tilt, pairs, np.inf)[2][:, 0, 0]
+    assert slope[2] - slope[0] == pytest.approx(-0.2, rel=1e-3)  # half a width to either side
+    force = np.ones((3, 1))
+    _, _, jacobian, curvature = compiled.expand(tilt, pairs, np.inf, force, rounding=ROUNDING)
+    rounded = jacobian[:, 0, 0]
+    # the corners of each face have radii of their variance over the rounding, which add up inverse
+    radii = np.array([0.1, 0.5]) ** 2 / ROUNDING
+    assert curvature[1, 0, 0] == pytest.approx(-1.0 / np.sum(1.0 / radii), rel=1e-2)
+    assert (rounded[2] - rounded[0]) / 2e-6 == pytest.approx(curvature[1, 0, 0], rel=1e-3)

@@ -61,16 +61,23 @@ class CompiledDistances:
         self._kernel = native.PairDistances(**arguments, portable=portable)
 
     def values(
-        self, q: Array, chosen: Index, reach: float, wanted: Mask | None = None
+        self,
+        q: Array,
+        chosen: Index,
+        reach: float,
+        wanted: Mask | None = None,
+        rounding: float = 0.0,
     ) -> tuple[Array, Index]:
         """Distances of chosen pairs at configurations (P, nq), and how each is known, (P, k).
 
         reach: distance in [m], beyond which a lower bound of at least that is enough.
         wanted: which distances are, (P, k), all if None; others count as FAR at the reach.
+        rounding: see Distances.rounded.
         """
         distances = np.empty((len(q), len(chosen)))
         known = np.empty(distances.shape, dtype=np.int64)
-        self._kernel.values(self._coordinates(q), chosen, reach, distances, known, wanted)
+        at = self._coordinates(q)
+        self._kernel.values(at, chosen, reach, distances, known, wanted, rounding)
         return distances, known
 
     def expand(
@@ -80,10 +87,11 @@ class CompiledDistances:
         reach: float,
         force: Array | None = None,
         wanted: Mask | None = None,
+        rounding: float = 0.0,
     ) -> tuple[Array, Index, Array, Array]:
         """As values, with d' (P, k, nv) and the sum of force d'' (P, nv, nv), where exact.
 
-        force: shape (P, k). wanted: as for values.
+        force: shape (P, k). wanted, rounding: as for values.
         """
         P, k, nv = len(q), len(chosen), self._nv + 6 * self._paths
         distances, known = np.empty((P, k)), np.empty((P, k), dtype=np.int64)
@@ -98,6 +106,7 @@ class CompiledDistances:
             jacobian,
             curvature,
             wanted,
+            rounding,
         )
         if self._paths:
             jacobian = np.ascontiguousarray(jacobian[:, :, : self._nv])

@@ -100,6 +100,7 @@ class Distances:
         self.moving = frozenset(moving)
         self._measured = PairDistances(robot, geometry, moving)
         self._chosen = np.arange(len(pairs))
+        self._rounding = 0.0
 
     def restricted(self, pairs: Sequence[int]) -> Distances:
         """The distances of some of the pairs, by their numbers."""
@@ -109,6 +110,18 @@ class Distances:
         chosen.allowance = self.allowance[list(pairs)]
         chosen._chosen = np.ascontiguousarray(self._chosen[list(pairs)])
         return chosen
+
+    def rounded(self, size: float) -> Distances:
+        """The distances of shapes that are made slightly larger, and smooth, for solvers.
+
+        Where faces or edges are parallel, distances have kinks, since the nearest points jump.
+        Those of rounded shapes have none, and are smaller by at most `size` times the logarithm of
+        the number of vertices that are as near. What Coal measures stays as it is.
+        size: in [m].
+        """
+        rounded = copy.copy(self)
+        rounded._rounding = size
+        return rounded
 
     def at(self, q: Array, t: npt.ArrayLike) -> Array:
         """Configurations (P, nq) with their times, shape (P,) or one for all, in [s].
@@ -145,7 +158,9 @@ class Distances:
         reach: distance beyond which a lower bound of at least that is returned, in [m].
         wanted: which distances are, shape (P, K), all if None; of others the reach is returned.
         """
-        distances = self._measured.values(self._placed(q), self._chosen, reach, wanted)
+        distances = self._measured.values(
+            self._placed(q), self._chosen, reach, wanted, self._rounding
+        )
         return distances + self.allowance if self.allowance.any() else distances
 
     def expand(self, q: Array, reach: float = np.inf) -> tuple[Array, Array]:
@@ -178,7 +193,7 @@ class Distances:
         edges, faces and round surfaces that it lies on; cylinders that overlap have none.
         """
         placed = self._placed(q)
-        found = self._measured.expand(placed, self._chosen, reach, force, wanted)
+        found = self._measured.expand(placed, self._chosen, reach, force, wanted, self._rounding)
         distances, jacobian, curvature = found
         if self.allowance.any():
             distances = distances + self.allowance

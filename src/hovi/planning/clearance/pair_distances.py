@@ -45,17 +45,25 @@ class PairDistances:
         except NotImplementedError:
             self._compiled = None
 
-    def values(self, q: Array, pairs: Index, reach: float, wanted: Mask | None = None) -> Array:
+    def values(
+        self,
+        q: Array,
+        pairs: Index,
+        reach: float,
+        wanted: Mask | None = None,
+        rounding: float = 0.0,
+    ) -> Array:
         """Distances of pairs, by number, at configurations (P, nq), shape (P, k), in [m].
 
         reach: distance in [m], beyond which a lower bound of at least that is returned.
         wanted: which distances are, (P, k), all if None; of others the reach is returned.
+        rounding: see Distances.rounded.
         """
         distances = np.empty((len(q), len(pairs)))
         self._coal.reset()
         for part in self._parts(len(q), len(pairs)):
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
-            distances[part] = self._part_values(q[part], pairs, reach, some)
+            distances[part] = self._part_values(q[part], pairs, reach, some, rounding)
         return distances
 
     def expand(
@@ -65,11 +73,12 @@ class PairDistances:
         reach: float,
         force: Array | None,
         wanted: Mask | None = None,
+        rounding: float = 0.0,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives (P, k, nv), and the sum of force d'', (P, nv, nv).
 
         Pairs beyond reach have no derivatives, and those that overlap by Coal no second ones.
-        force: shape (P, k); zero if None. wanted: as for `values`.
+        force: shape (P, k); zero if None. wanted, rounding: as for `values`.
         """
         P, k = len(q), len(pairs)
         distances = np.empty((P, k))
@@ -78,7 +87,7 @@ class PairDistances:
         for part in self._parts(P, k):
             weights = None if force is None else np.ascontiguousarray(force[part])
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
-            found = self._part_expanded(q[part], pairs, reach, weights, some)
+            found = self._part_expanded(q[part], pairs, reach, weights, some, rounding)
             distances[part], jacobian[part], curvature[part] = found
         return distances, jacobian, curvature
 
@@ -86,13 +95,15 @@ class PairDistances:
         size = max(1, BATCH // max(1, pairs))
         return [slice(first, first + size) for first in range(0, points, size)]
 
-    def _part_values(self, q: Array, pairs: Index, reach: float, wanted: Mask | None) -> Array:
+    def _part_values(
+        self, q: Array, pairs: Index, reach: float, wanted: Mask | None, rounding: float
+    ) -> Array:
         raise_if_late()
         if self._compiled is None:
             unknown = np.ones((len(q), len(pairs)), dtype=bool) if wanted is None else wanted
             distances = np.full(unknown.shape, reach)
         else:
-            distances, known = self._compiled.values(q, pairs, reach, wanted)
+            distances, known = self._compiled.values(q, pairs, reach, wanted, rounding)
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):
             raise_if_late()
@@ -107,6 +118,7 @@ class PairDistances:
         reach: float,
         force: Array | None,
         wanted: Mask | None,
+        rounding: float,
     ) -> tuple[Array, Array, Array]:
         raise_if_late()
         P, k, nv = len(q), len(pairs), self._nv
@@ -115,7 +127,7 @@ class PairDistances:
             distances, jacobian = np.full((P, k), reach), np.zeros((P, k, nv))
             curvature = np.zeros((P, nv, nv))
         else:
-            found = self._compiled.expand(q, pairs, reach, force, wanted)
+            found = self._compiled.expand(q, pairs, reach, force, wanted, rounding)
             distances, known, jacobian, curvature = found
             unknown = known == UNKNOWN
         for p in np.flatnonzero(unknown.any(axis=1)):

@@ -22,6 +22,7 @@ from hovi.discrete.interval_batch import Coordinates, Jet
 from hovi.discrete.interval_paths import move, move_any
 from hovi.errors import InputError
 from hovi.optimize.banded_model import BandModel
+from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.merge_tree import MergeTreeModel
 from hovi.optimize.quadratic_model import IntervalSum, QuadraticModel
 from hovi.optimize.trust_region import Objective
@@ -269,20 +270,53 @@ class ActionObjective(Objective[DiscretePath]):
 
     def _add_conditions(self, x: DiscretePath, expansion: Expansion, known: Multipliers) -> None:
         """Add the terms of the conditions to the intervals that contain their nodes."""
-        N, rho = self.problem.grid.intervals, known.node_penalty
+        rho = known.node_penalty
         for each, mu in zip(self.problem.conditions, known.nodes, strict=True):
-            k = min(each.node, N - 1)
-            first = 0 if each.node < N else self.ld.k
-            columns = slice(first, first + 2)
+            k, columns, scale = self._place(each.node)
             q, v = x.q[each.node], x.v[each.node]
             c, J = each.condition.evaluate(q, v)  # (s,), (s, 2, n)
             force = mu + rho * c
             curvature = rho * np.einsum("sin,sjm->injm", J, J)
             curvature += each.condition.curvature(q, v, force)
-            scale = np.array([1.0, 1.0 / self.problem.grid.steps[k]])  # of (q, h v)
             expansion.gradient[k, columns] += np.tensordot(force, J, 1) * scale[:, None]
             curvature *= scale[:, None, None, None] * scale[:, None]
             expansion.hessian[k, columns, columns] += curvature.transpose(0, 2, 1, 3)
+
+    def under_conditions(self, x: DiscretePath, model: BandModel) -> EquationModel:
+        """A model at x whose Newton steps meet the conditions at nodes to first order."""
+        assert self.multipliers is not None
+        rows, residuals = [], []
+        for each in self.problem.conditions:
+            k, columns, scale = self._place(each.node)
+            c, J = each.condition.evaluate(x.q[each.node], x.v[each.node])
+            local = np.zeros(model.intervals.gradient.shape)
+            for slope in J:
+                local[k, columns] = slope * scale[:, None]
+                rows.append(model.scatter(local))
+            residuals.append(c)
+        penalty = self.multipliers.node_penalty
+        return EquationModel(model, np.stack(rows), np.concatenate(residuals), penalty)
+
+    def hold(self, x: DiscretePath, change: Array) -> float:
+        """Add a change to the multipliers of conditions; returns what it adds to the value at x."""
+        known, first = self.multipliers, 0
+        assert known is not None
+        nodes, residuals = [], node_residuals(self.problem, x)
+        for mu in known.nodes:
+            nodes.append(mu + change[first : first + len(mu)])
+            first += len(mu)
+        self.multipliers = dataclasses.replace(known, nodes=nodes)
+        return float(change @ np.concatenate(residuals))
+
+    def node_error(self, x: DiscretePath) -> float:
+        """The largest residual of a condition at a node, in [rad] or [m]."""
+        return max(float(np.abs(c).max()) for c in node_residuals(self.problem, x))
+
+    def _place(self, node: int) -> tuple[int, slice, Array]:
+        """An interval that contains a node, the columns of its (q, h v), and their scales."""
+        k = min(node, self.problem.grid.intervals - 1)
+        first = 0 if node == k else self.ld.k
+        return k, slice(first, first + 2), np.array([1.0, 1.0 / self.problem.grid.steps[k]])
 
     def retract(self, x: DiscretePath, step: Array, model: QuadraticModel) -> DiscretePath:
         """The path moved by a step: nodes by `integrate`, everything else added."""

@@ -15,6 +15,7 @@ from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import Batch
 from hovi.discrete.grid import DiscretePath
 from hovi.errors import InputError
+from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import Bounds
 from hovi.optimize.bounded_objective import BoundedObjective, Outputs, Refinement
 from hovi.optimize.quadratic_model import QuadraticModel
@@ -42,7 +43,11 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     algebra, multipliers: as for ActionObjective.
     more: further outputs.
     rows: control points, bounded instead of values at the points and refined in place; or None.
+    node_tolerance: largest residual of a condition at a node, in [rad] or [m], where steps meet
+        these conditions and their multipliers follow; None where the multipliers stay.
     """
+
+    node_tolerance: float | None = None
 
     def __init__(
         self,
@@ -122,7 +127,10 @@ class BoundedAction(BoundedObjective[DiscretePath]):
             curvatures.append(self._slope(x, i) + force[part, k:])
         if self.more is not None:
             terms = self._with_more(x, terms, sigma_at, rho_at, multipliers_at)
-        return self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
+        model = self.action.model_with(x, curvatures, terms, self._row_terms(sigma, rho))
+        if self.node_tolerance is None or not isinstance(model, BandModel):
+            return model
+        return self.action.under_conditions(x, model)
 
     def _row_terms(self, sigma: Array, rho: Array) -> Callable[[Expansion], None] | None:
         """What adds the terms of the rows to an expansion; None without rows."""
@@ -246,6 +254,16 @@ class BoundedAction(BoundedObjective[DiscretePath]):
     def accept(self, step: Array, model: QuadraticModel) -> None:
         """Use the torques that the step predicts as weights of the next model's curvature."""
         self._predicted = self.action.predicted_slopes(model.gather(step))
+
+    def hold(self, x: DiscretePath, change: Array) -> float:
+        """See BoundedObjective.hold: of conditions at nodes."""
+        return self.action.hold(x, change)
+
+    def meets_equations(self, x: DiscretePath) -> bool:
+        """Whether conditions at nodes hold to their tolerance."""
+        if self.node_tolerance is None:
+            return True
+        return self.action.node_error(x) <= self.node_tolerance
 
     def refine(self, x: DiscretePath, level: float) -> Refinement | None:
         """Bound more control points of the motion: see LimitRows."""

@@ -55,7 +55,8 @@ def test_where_no_rough_motion_is_found_the_rounds_find_one(
     rough = cleared_motion._rough
 
     def failing(*given: Any) -> Any:
-        return dataclasses.replace(rough(*given), stop=Stop.DIVERGED)
+        outcome, known = rough(*given)
+        return dataclasses.replace(outcome, stop=Stop.DIVERGED), known
 
     monkeypatch.setattr(cleared_motion, "_rough", failing)
     found = hovi.plan_task(around, intervals=16)

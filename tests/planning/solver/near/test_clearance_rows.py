@@ -68,7 +68,7 @@ def test_rows_are_distances_along_the_motion(name: str) -> None:
     expected = (d[np.arange(rows.size), rows.pairs] - LEAST) / DISTANCE_SCALE
     near = expected < 1.0  # beyond, rows level off
     assert near.sum() > 10
-    np.testing.assert_allclose(rows.values(path)[near], expected[near], atol=1e-9)
+    np.testing.assert_allclose(rows.values(path)[near], expected[near], atol=1e-3)
     assert (rows.values(path)[~near] >= 1.0).all()
 
 

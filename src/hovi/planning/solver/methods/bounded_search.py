@@ -28,7 +28,12 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.presolve.end_torques import static_sentence
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import LinearAlgebra
-from hovi.planning.solver.augmented_lagrangian_rounds import minimize_constrained
+from hovi.planning.solver.augmented_lagrangian_rounds import (
+    NODE_TOLERANCE,
+    first_multipliers,
+    minimize_constrained,
+    spurious_sentence,
+)
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE, ClearanceOutputs
@@ -149,9 +154,20 @@ class BoundedSearch:
             self.near.extend(self.problem, path, LOOK_AROUND)
 
     def objective(
-        self, known: Multipliers | None, algebra: LinearAlgebra | None = None
+        self,
+        known: Multipliers | None,
+        algebra: LinearAlgebra | None = None,
+        node_tolerance: float | None = None,
     ) -> BoundedAction:
-        """The action with the tightened bounds. known: multipliers of the constraints."""
+        """The action with the tightened bounds.
+
+        known: multipliers of the constraints. node_tolerance: see BoundedAction.
+        """
+        objective = self._objective(known, algebra)
+        objective.node_tolerance = node_tolerance
+        return objective
+
+    def _objective(self, known: Multipliers | None, algebra: LinearAlgebra | None) -> BoundedAction:
         if self.near is not None:
             return ClearedAction(
                 self.problem, self.limits, self.margins, algebra, known, self.rows, self.near
@@ -194,6 +210,10 @@ class BoundedSearch:
         """Solve with bounds at the quadrature points, in rounds if there are constraints."""
         if not self.problem.constrained:
             return self.minimized(self.objective(None), path, self.remaining_options(), start)
+        if len(self.problem.passive) == 0:
+            found = self._solved_under_conditions(path, start)
+            if found is not None:
+                return found
 
         def minimize_round(known: Multipliers, x: DiscretePath, decrease: float) -> Bounded:
             nonlocal start
@@ -205,13 +225,26 @@ class BoundedSearch:
             mu = share * mean_density(outcome.outputs, objective.bounds.measure)
             y, barrier = outcome.outputs.y, outcome.barrier
             start = None
-            if len(y) == len(barrier.s):
+            if len(y) == len(barrier.s) == len(objective.bounds.lower):
                 start = barrier.warm(objective.bounds, y, mu, min(share, WARM_START_MARGIN))
             return outcome
 
         rounds = minimize_constrained(self.problem, path, minimize_round, self.multipliers)
         self.multipliers, self.unmet = rounds.multipliers, rounds.reason
         return rounds.result
+
+    def _solved_under_conditions(self, path: DiscretePath, start: Barrier | None) -> Bounded | None:
+        """A solve whose steps meet the conditions at nodes; None where that fails."""
+        known = self.multipliers or first_multipliers(self.problem, path)
+        objective = self.objective(known, node_tolerance=NODE_TOLERANCE)
+        outcome = self.minimized(objective, path, self.remaining_options(), start)
+        met = objective.meets_equations(outcome.x)
+        if outcome.stop is Stop.DIVERGED or (outcome.stop is Stop.STATIONARY and not met):
+            return None
+        self.multipliers = objective.action.multipliers
+        spurious = outcome.stop is Stop.STATIONARY
+        self.unmet = spurious_sentence(self.problem, outcome.x) if spurious else ""
+        return outcome
 
     def minimized(
         self,

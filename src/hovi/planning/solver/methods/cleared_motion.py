@@ -39,6 +39,10 @@ FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
 """Maximum number of its steps."""
+ROUGH_VIOLATION = 0.05
+"""Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
+ROUGH_TOLERANCE = 1e-4
+"""Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
 DETOUR = 1.02
@@ -56,14 +60,15 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     free = _without_distances(search, guess)
     if not search.near.blocked:
         return free
-    found = _rough_with_distances(search, free.x)
-    if found is None or found.cost > DETOUR * abs(free.outputs.value):
-        others = [_rough_with_distances(search, guess), found]
-        found = min((each for each in others if each), key=lambda each: each.cost, default=None)
-    if found is None:
-        raise_if_late()  # or more time might lead to one
-        return dataclasses.replace(free, stop=Stop.DIVERGED)
-    return found.solved(search)
+    rough = [_rough_with_distances(search, free.x)]
+    if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
+        rough.append(_rough_with_distances(search, guess))
+    for found in sorted(filter(None, rough), key=lambda each: each.rank):
+        outcome = found.solved(search)
+        if outcome.stop is not Stop.DIVERGED:
+            return outcome
+    raise_if_late()  # or more time might lead to one
+    return dataclasses.replace(free, stop=Stop.DIVERGED)
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -74,14 +79,23 @@ def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     if not search.problem.constrained:
         return search.solve(guess)
 
-    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
-        return _rough(search, x, known, None if x is guess else FIRST_MU)
-
     search.near = None
-    rounds = minimize_constrained(search.problem, guess, minimize_round, most=ROUGH_ROUNDS)
-    search.near, rough = near, rounds.result
+    rough = _rough_with_constraints(search, guess)
+    search.near = near
     near.extend(search.problem, rough.x, AHEAD)
     return rough if near.blocked or rough.stop in STOPPED else search.solve(rough.x)
+
+
+def _rough_with_constraints(search: BoundedSearch, guess: DiscretePath) -> Bounded:
+    """A rough motion that nearly meets the constraints."""
+    problem = search.problem
+
+    def minimize_round(known: Multipliers, x: DiscretePath, _: float) -> Bounded:
+        return _rough(search, x, known, None if x is guess else FIRST_MU)[0]
+
+    if len(problem.passive) == 0:
+        return _rough(search, guess, first_multipliers(problem, guess), None)[0]
+    return minimize_constrained(problem, guess, minimize_round, most=ROUGH_ROUNDS).result
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +108,9 @@ class _Rough:
     near: ClearanceRows
 
     @property
-    def cost(self) -> float:
-        """The action."""
-        return self.outcome.outputs.value
+    def rank(self) -> tuple[bool, float]:
+        """Whether it does not keep its bounds yet, and the action."""
+        return not self.outcome.feasible, self.outcome.outputs.value
 
     def solved(self, search: BoundedSearch) -> Bounded:
         """The solve from there to the end, with rows of pairs that are near."""
@@ -120,10 +134,11 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
         return None
     search.near.extend(problem, moved, AHEAD)
     known = first_multipliers(problem, moved) if problem.constrained else None
-    outcome = _rough(search, moved, known, FIRST_MU)
-    if outcome.stop is Stop.DIVERGED or not outcome.feasible:
+    outcome, known = _rough(search, moved, known, FIRST_MU)
+    violation = float(outcome.violation.max(initial=0.0))
+    if outcome.stop is Stop.DIVERGED or violation > ROUGH_VIOLATION:
         return None
-    if known is not None:
+    if known is not None and len(problem.passive) > 0:
         residuals = ActionObjective(problem, multipliers=known).residuals(outcome.x)
         known = known.updated(residuals, problem.passive)
     return _Rough(outcome, known, search.rows, search.near)
@@ -131,8 +146,8 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
 
 def _rough(
     search: BoundedSearch, path: DiscretePath, known: Multipliers | None, mu: float | None
-) -> Bounded:
-    """A solve up to a large barrier parameter.
+) -> tuple[Bounded, Multipliers | None]:
+    """A solve up to a large barrier parameter, and the multipliers of conditions then.
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
     """
@@ -141,9 +156,10 @@ def _rough(
     options = dataclasses.replace(
         whole, barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE, max_iterations=most
     )
-    objective, start = search.objective(known), None
+    tolerance = None if known is None or len(search.problem.passive) > 0 else ROUGH_TOLERANCE
+    objective, start = search.objective(known, node_tolerance=tolerance), None
     if mu is not None:
         outputs = objective.outputs(path)
         density = mean_density(outputs, objective.bounds.measure)
         start = Barrier.central(objective.bounds, outputs.y, mu * density)
-    return search.minimized(objective, path, options, start)
+    return search.minimized(objective, path, options, start), objective.action.multipliers

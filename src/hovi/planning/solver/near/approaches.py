@@ -104,7 +104,7 @@ def approaches_along(
     q = distances.at(configurations(problem, path, batch), batch.t)
     reach = least + max(ahead, 0.0) + 0.5 * DISTANCE_SCALE
     d = distances.values(q, reach)  # (M, K)
-    pairs = np.flatnonzero(d.min(axis=0) < least + ahead)
+    pairs = np.flatnonzero(d.min(axis=0) < least + max(ahead, CLOSE))  # nearer between samples
     d = d[:, pairs]
     chosen = (np.arange(len(d)) % (SAMPLES // SPREAD) == 0) & free_ones(problem, len(d))
     rows, columns = np.nonzero(chosen[:, None] & (d < least + ahead))

@@ -36,6 +36,8 @@ from hovi.scene.lagrangian import PointTerms
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
+ROUNDING = 2e-5
+"""Size by which shapes are rounded in rows, in [m]: see Distances.rounded."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
 GUARD = 0.05
@@ -199,7 +201,7 @@ class ClearanceRows:
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
         at, self._instant = np.unique(intervals + 1j * positions, return_inverse=True)
         chosen, self._column = np.unique(pairs, return_inverse=True)
-        some = self.distances.restricted(chosen.tolist())
+        some = self.distances.restricted(chosen.tolist()).rounded(ROUNDING)
         self._some, self._wanted = some, np.zeros((len(at), len(chosen)), dtype=bool)
         self._wanted[self._instant, self._column] = True
         self._sums = RowSums.of(at.real.astype(np.intp), self._instant)

@@ -42,6 +42,7 @@ class ClearedAction(BoundedAction):
     """
 
     reopens = True
+    radii = 50.0, 50.0  # the neighborhood of obstacles is not convex
 
     def __init__(
         self,

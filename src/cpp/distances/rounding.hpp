@@ -1,0 +1,251 @@
+// Distances of shapes that are made slightly larger, and smooth: their support functions
+//
+//   h(n) = eps log sum exp(n . v / eps) over the vertices v, and, of a cylinder about z,
+//   h(n) = r sqrt(n_x^2 + n_y^2 + (eps / r)^2) + eps log(2 cosh(l n_z / eps)),
+//
+// exceed those of the shapes by at most eps times the logarithm of the number of vertices. The
+// distance of two polyhedra has kinks where faces or edges are parallel, since its nearest points
+// jump; the largest separation phi(n) = -h_1(n) - h_2(-n) over unit vectors n is smooth there. With
+// p_1, p_2 the gradients of h, which are points of the shapes, D = n . (p_2 - p_1), C the Hessians
+// of h in the tangent plane of n, w = p_2 - p_1 with p fixed to the shapes, and u = n x omega for
+// the shape that a column moves,
+//
+//   d'  = n . w_q,
+//   d'' = n . w_qq - u^T C u + G^T (C_1 + C_2 + D)^-1 G,   G = w_q - C u in the tangent plane.
+#pragma once
+
+#include "curvature.hpp"
+#include "nearest.hpp"
+
+namespace hovi::distances {
+namespace {
+
+// Differences of heights, over eps, from which vertices have no weight.
+constexpr double most_below = 40.0;
+constexpr int rounding_steps = 40, rounding_halvings = 20;
+// Step of n at which Newton's method ends.
+constexpr double rounding_step = 1e-12;
+// Vertices that may gain weight while n turns by less than the first of these are looked at, by the
+// second if n turns further.
+constexpr double turns[] = {0.02, 0.3};
+constexpr std::size_t most_candidates = 512;
+
+// The value of a support function, its gradient in the shape's frame, and its Hessian in the plane
+// of two directions.
+struct Support {
+  double value;
+  Vector point;
+  Plane bend;
+};
+
+// The vertices of a shape that may have weight near a direction.
+struct Candidates {
+  std::size_t count;
+  Vector point[most_candidates];
+};
+
+// False where there are too many. n: in the shape's frame.
+inline bool find_candidates(const Model& model, const Shape& shape, const Vector& n, double eps,
+                            double turn, Candidates& out) {
+  out.count = 0;
+  if (shape.kind == ShapeKind::cylinder) return true;
+  double top = -__builtin_inf();
+  Vector highest{};
+  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
+    const double height = along(model, i, n);
+    if (height > top) top = height, highest = {model.x[i], model.y[i], model.z[i]};
+  }
+  for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
+    const double below = top - along(model, i, n) - most_below * eps;
+    const Vector v{model.x[i], model.y[i], model.z[i]}, w = v - highest;
+    if (below > 0.0 && below * below > turn * turn * dot(w, w)) continue;
+    if (out.count > 0 && same(v, out.point[out.count - 1])) continue;  // a copy
+    if (out.count == most_candidates) return false;
+    out.point[out.count++] = v;
+  }
+  return true;
+}
+
+inline Support support_of_points(const Candidates& near, const Vector& n, const Vector& s,
+                                 const Vector& t, double eps) {
+  double height[most_candidates], top = -__builtin_inf();
+  for (std::size_t i = 0; i < near.count; ++i) {
+    height[i] = dot(near.point[i], n);
+    if (height[i] > top) top = height[i];
+  }
+  Support h{};
+  double sum = 0.0;
+  for (std::size_t i = 0; i < near.count; ++i) {
+    const double below = (top - height[i]) / eps, weight = __builtin_exp(-below);
+    height[i] = below > most_below ? 0.0 : weight;
+    sum += height[i];
+    h.point = h.point + height[i] * near.point[i];
+  }
+  h.point = (1.0 / sum) * h.point;
+  for (std::size_t i = 0; i < near.count; ++i) {
+    if (height[i] == 0.0) continue;
+    const Vector w = near.point[i] - h.point;
+    h.bend.add(height[i] / (sum * eps), dot(w, s), dot(w, t));
+  }
+  h.value = top + eps * __builtin_log(sum);
+  return h;
+}
+
+inline Support support_of_cylinder(const Shape& shape, const Vector& n, const Vector& s,
+                                   const Vector& t, double eps) {
+  const double r = shape.cylinder_radius, l = shape.half_length, least = eps / r;
+  const double slope = __builtin_sqrt(n.x * n.x + n.y * n.y + least * least);
+  const double up = n.z < 0.0 ? -n.z : n.z, fall = __builtin_exp(-2.0 * l * up / eps);
+  const double share = (1.0 - fall) / (1.0 + fall);
+  Support h{};
+  h.value = r * slope + l * up + eps * __builtin_log(1.0 + fall);
+  h.point = {r * n.x / slope, r * n.y / slope, (n.z < 0.0 ? -l : l) * share};
+  const double across = r / slope, radial = -r / (slope * slope * slope);
+  h.bend.add(across, s.x, t.x);
+  h.bend.add(across, s.y, t.y);
+  h.bend.add(radial, n.x * s.x + n.y * s.y, n.x * t.x + n.y * t.y);
+  h.bend.add(l * l / eps * (1.0 - share * share), s.z, t.z);
+  return h;
+}
+
+inline Support support_of(const Candidates& near, const Shape& shape, const Rotation& R,
+                          const Vector& n, const Vector& s, const Vector& t, double eps) {
+  const Vector own = turned_back(R, n), first = turned_back(R, s), other = turned_back(R, t);
+  if (shape.kind == ShapeKind::cylinder) return support_of_cylinder(shape, own, first, other, eps);
+  return support_of_points(near, own, first, other, eps);
+}
+
+// phi at a unit vector, where it is measured along tangents.
+struct Separation {
+  Vector n, tangent[2], own_first, own_second, first, second;
+  Plane at_first, at_second;
+  double value, apart;
+};
+
+inline Separation separation(const Candidates* near, const Placed& placed, const Vector& n,
+                             double eps) {
+  Separation s{};
+  s.n = n;
+  const double x = n.x * n.x, y = n.y * n.y, z = n.z * n.z;
+  const Vector some = x <= y && x <= z   ? Vector{1.0, 0.0, 0.0}
+                      : y <= z           ? Vector{0.0, 1.0, 0.0}
+                                         : Vector{0.0, 0.0, 1.0};
+  const Vector side = cross(n, some);
+  s.tangent[0] = (1.0 / length(side)) * side;
+  s.tangent[1] = cross(n, s.tangent[0]);
+  const Support a = support_of(near[0], *placed.first, placed.at_first.rotation, n, s.tangent[0],
+                               s.tangent[1], eps);
+  const Support b = support_of(near[1], *placed.second, placed.at_second.rotation, -n,
+                               s.tangent[0], s.tangent[1], eps);
+  s.own_first = a.point;
+  s.own_second = b.point;
+  s.first = placed.at_first * a.point;
+  s.second = placed.at_second * b.point;
+  s.at_first = a.bend;
+  s.at_second = b.bend;
+  s.value = dot(n, placed.at_second.translation - placed.at_first.translation) - a.value - b.value;
+  s.apart = dot(n, placed.difference(a.point, b.point));
+  return s;
+}
+
+// C_1 + C_2 + D; false where that is not positive definite, so that n is no maximum.
+inline bool stiffness(const Separation& s, Plane& M) {
+  M.xx = s.at_first.xx + s.at_second.xx + s.apart;
+  M.xy = s.at_first.xy + s.at_second.xy;
+  M.yy = s.at_first.yy + s.at_second.yy + s.apart;
+  return M.xx > 0.0 && M.xx * M.yy - M.xy * M.xy > 0.0;
+}
+
+inline void solve_plane(const Plane& M, double x, double y, double* out) {
+  const double inverse = 1.0 / (M.xx * M.yy - M.xy * M.xy);
+  out[0] = inverse * (M.yy * x - M.xy * y);
+  out[1] = inverse * (M.xx * y - M.xy * x);
+}
+
+// Newton's method for the largest separation near that of a contact, which becomes that of the
+// rounded shapes. It stays as it is where that fails, or would need many vertices.
+// False if n turns too far for the vertices that are looked at.
+inline bool round_within(const Model& model, const Placed& placed, double eps, double most,
+                         Contact& c) {
+  Candidates near[2];
+  if (!find_candidates(model, *placed.first, turned_back(placed.at_first.rotation, c.n), eps,
+                       most, near[0]) ||
+      !find_candidates(model, *placed.second, -turned_back(placed.at_second.rotation, c.n), eps,
+                       most, near[1]))
+    return true;
+  Separation s = separation(near, placed, c.n, eps);
+  Plane M;
+  bool found = false;
+  for (int step = 0; step < rounding_steps && !found; ++step) {
+    if (!stiffness(s, M)) return true;
+    const Vector w = placed.difference(s.own_first, s.own_second);
+    double move[2];
+    solve_plane(M, dot(w, s.tangent[0]), dot(w, s.tangent[1]), move);
+    double share = 1.0;
+    const double size = __builtin_sqrt(move[0] * move[0] + move[1] * move[1]);
+    if (size > 0.5) share = 0.5 / size;
+    Separation next = s;
+    bool better = false;
+    for (int k = 0; k < rounding_halvings && !better; ++k, share *= 0.5) {
+      const Vector n = s.n + (share * move[0]) * s.tangent[0] + (share * move[1]) * s.tangent[1];
+      next = separation(near, placed, (1.0 / length(n)) * n, eps);
+      better = next.value > s.value || size < 1e-7;
+    }
+    if (!better) break;
+    s = next;
+    found = size < rounding_step;
+  }
+  const Vector turn = s.n - c.n;
+  if (dot(turn, turn) > most * most) return false;
+  if (!stiffness(s, M)) return true;
+  c.own_first = s.own_first;
+  c.own_second = s.own_second;
+  c.first = s.first;
+  c.second = s.second;
+  c.n = s.n;
+  c.distance = s.value;
+  c.rounded = true;
+  c.apart = s.apart;
+  c.tangent[0] = s.tangent[0];
+  c.tangent[1] = s.tangent[1];
+  c.bend[0] = s.at_first;
+  c.bend[1] = s.at_second;
+  return true;
+}
+
+inline void round_off(const Model& model, const Placed& placed, double eps, Contact& c) {
+  if (!round_within(model, placed, eps, turns[0], c)) round_within(model, placed, eps, turns[1], c);
+}
+
+// Adds force d'' of rounded shapes to a matrix (nv, nv). work: at least 6 x columns.
+inline void add_rounded_curvature(const Contact& c, const Vector* velocity, double force,
+                                  std::size_t nv, double* work, double* curvature) {
+  const std::size_t m = c.columns;
+  Plane M{c.bend[0].xx + c.bend[1].xx + c.apart, c.bend[0].xy + c.bend[1].xy,
+          c.bend[0].yy + c.bend[1].yy + c.apart};
+  double *const u = work, *const Cu = work + 2 * m, *const G = work + 4 * m;
+  for (std::size_t i = 0; i < m; ++i) {
+    const Plane& C = c.bend[c.column[i].second];
+    const Vector turn = cross(c.n, c.twist[c.column[i].column].angular);
+    double* const own = u + 2 * i;
+    for (int k = 0; k < 2; ++k) own[k] = dot(turn, c.tangent[k]);
+    Cu[2 * i] = C.xx * own[0] + C.xy * own[1];
+    Cu[2 * i + 1] = C.xy * own[0] + C.yy * own[1];
+    for (int k = 0; k < 2; ++k) G[2 * i + k] = dot(velocity[i], c.tangent[k]) - Cu[2 * i + k];
+  }
+  for (std::size_t j = 0; j < m; ++j) {
+    double X[2];
+    solve_plane(M, G[2 * j], G[2 * j + 1], X);
+    for (std::size_t i = 0; i <= j; ++i) {
+      double value = bending(c, velocity, i, j) + G[2 * i] * X[0] + G[2 * i + 1] * X[1];
+      if (c.column[i].second == c.column[j].second)
+        value -= u[2 * i] * Cu[2 * j] + u[2 * i + 1] * Cu[2 * j + 1];
+      const std::size_t row = c.column[i].column, other = c.column[j].column;
+      curvature[row * nv + other] += force * value;
+      if (i != j) curvature[other * nv + row] += force * value;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace hovi::distances
