@@ -69,6 +69,27 @@ def test_a_first_plan_loads_no_unused_package() -> None:
     assert not {"scipy", "joblib", "matplotlib", "meshcat", "typer"} & set(loaded)
 
 
+def test_a_plan_from_the_command_line_loads_only_its_own_modules() -> None:
+    code = (
+        "import sys; from hovi.cli.application import main\n"
+        "assert main(['plan', 'two_link_reach', '--json', '--no-certificate']) == 0\n"
+        "print(*sys.modules)"
+    )
+    loaded = set(python(code))
+    assert "hovi.cli.commands.plan" in loaded
+    assert not {"scipy", "rich.table", "matplotlib", "meshcat", "tornado", "numpy.ma"} & loaded
+    assert (
+        not {
+            "hovi.cli.commands.study",
+            "hovi.planning.search.joint_duration",
+            "hovi.planning.sequence.sequence_planner",
+            "hovi.planning.task_file.obstacle_tables",
+            "hovi.viewing.replay_session",
+        }
+        & loaded
+    )
+
+
 def test_a_text_report_loads_no_plotting_package() -> None:
     loaded = python("import sys, hovi.cli.reports.plan; print(*sys.modules)")
     assert "hovi.cli.reports.plan" in loaded

@@ -22,6 +22,19 @@ from hovi.cli.reports import progress as reports
 from hovi.discrete.trajectory import Trajectory
 
 CLOSED = "error: cannot write the output: stdout is closed.\n"
+COMMAND = """
+import os, sys, types
+import hovi.cli.application as application
+def {name}():
+    {body}
+module = types.ModuleType("hovi.cli.commands.{name}")
+module.{name} = {name}
+sys.modules[module.__name__] = module
+application.COMMANDS += ("{name}",)
+from hovi.__main__ import run
+run()
+"""
+"""Runs hovi with one command more."""
 _PROGRESS = re.compile(r"^ *\d+ % .* \(\d+ s\)\n", re.MULTILINE)
 
 
@@ -74,12 +87,7 @@ def test_output_that_nobody_can_read_is_an_error(words: Sequence[str]) -> None:
 
 
 def test_a_command_without_output_succeeds_with_closed_streams() -> None:
-    program = (
-        "import hovi.cli.application as a\n"
-        "a.app.command('quiet')(lambda: None)\n"
-        "from hovi.__main__ import run\n"
-        "run()\n"
-    )
+    program = COMMAND.format(name="quiet", body="pass")
     done = run(("quiet",), (1, 2), ("-c", program))
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
@@ -103,22 +111,14 @@ def test_a_full_or_broken_stderr_changes_no_exit_code(words: Sequence[str]) -> N
             assert done.returncode == expected
 
 
-BROKEN = """
-import os
-import hovi.cli.application as application
-def broken():
-    reader, writer = os.pipe()
+BROKEN = """reader, writer = os.pipe()
     os.close(reader)
-    os.write(writer, b"to a process that has ended")
-application.app.command("broken")(broken)
-from hovi.__main__ import run
-run()
-"""
+    os.write(writer, b"to a process that has ended")"""
 
 
 def test_a_pipe_that_breaks_elsewhere_is_reported() -> None:
     """A worker that ends while it is started, for instance; only stdout's reader may be silent."""
-    done = run(("broken",), (), ("-c", BROKEN))
+    done = run(("broken",), (), ("-c", COMMAND.format(name="broken", body=BROKEN)))
     assert done.returncode == 2
     assert done.stderr.startswith("error: the connection to another process broke; ")
     assert done.stderr.count("\n") == 1

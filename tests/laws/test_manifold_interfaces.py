@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 from typer.testing import CliRunner
 
-from hovi.cli.application import app
+from hovi.cli.application import application
 from hovi.cli.reports.peaks import peaks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
@@ -199,7 +199,9 @@ def test_second_derivatives_of_a_joint_condition_match_finite_differences() -> N
 
 @pytest.mark.parametrize("name", ["kinova_reach", "flying_body_flip"])
 def test_scenes_on_manifolds_are_planned(models: Path, name: str) -> None:
-    result = CliRunner().invoke(app, ["plan", str(models / f"{name}.toml"), "--json"])
+    result = CliRunner().invoke(
+        application(["plan"]), ["plan", str(models / f"{name}.toml"), "--json"]
+    )
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["status"] == "minimum"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import select
 import sys
@@ -13,19 +14,6 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer.exceptions import TyperException
 
-from hovi.cli.commands import accuracy as accuracy_command
-from hovi.cli.commands import check as check_command
-from hovi.cli.commands import demo as demo_command
-from hovi.cli.commands import effects as effects_command
-from hovi.cli.commands import export as export_command
-from hovi.cli.commands import info as info_command
-from hovi.cli.commands import plan as plan_command
-from hovi.cli.commands import plot as plot_command
-from hovi.cli.commands import replay as replay_command
-from hovi.cli.commands import report as report_command
-from hovi.cli.commands import schema as schema_command
-from hovi.cli.commands import simulate as simulate_command
-from hovi.cli.commands import study as study_command
 from hovi.errors import HoviError, HoviWarning
 from hovi.system.files import reason
 
@@ -34,12 +22,22 @@ BAD_INPUT = 2
 OUTPUT_FAILED = 1
 """Exit code for output that could not be written."""
 
-app = typer.Typer(
-    help="Least-torque motions of URDF robots by higher-order variational integrators.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    no_args_is_help=True,
+COMMANDS = (
+    "plan",
+    "accuracy",
+    "simulate",
+    "effects",
+    "study",
+    "replay",
+    "report",
+    "plot",
+    "export",
+    "check",
+    "schema",
+    "info",
+    "demo",
 )
+"""The commands, in the order of the help; each is a module of that name in `hovi.cli.commands`."""
 
 
 def _print_version(requested: bool) -> None:
@@ -50,7 +48,28 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+def application(arguments: Sequence[str]) -> typer.Typer:
+    """The command line with the command that the arguments begin with, or else with all of them.
+
+    One by itself, since typer reads the options of all commands that it has, which takes longer
+    than a small plan.
+    """
+    app = typer.Typer(
+        help="Least-torque motions of URDF robots by higher-order variational integrators.",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        no_args_is_help=True,
+    )
+    app.callback()(_hovi)
+    for name in arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS:
+        module = importlib.import_module(f"hovi.cli.commands.{name}")
+        if hasattr(module, "app"):  # a command with commands of its own
+            app.add_typer(module.app, name=name)
+        else:
+            app.command(name)(getattr(module, name))
+    return app
+
+
 def _hovi(
     version: Annotated[
         bool,
@@ -60,21 +79,6 @@ def _hovi(
     ] = False,
 ) -> None:
     pass
-
-
-app.command("plan")(plan_command.plan)
-app.command("accuracy")(accuracy_command.accuracy)
-app.command("simulate")(simulate_command.simulate)
-app.command("effects")(effects_command.effects)
-app.add_typer(study_command.app, name="study")
-app.command("replay")(replay_command.replay)
-app.command("report")(report_command.report)
-app.command("plot")(plot_command.plot)
-app.command("export")(export_command.export)
-app.command("check")(check_command.check)
-app.command("schema")(schema_command.schema)
-app.command("info")(info_command.info)
-app.command("demo")(demo_command.demo)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -97,7 +101,8 @@ def _run_with(arguments: Sequence[str] | None, output: int | None) -> int:
     """Run one command. output: a copy of stdout's descriptor, if it has one."""
     stdout, stderr = sys.stdout, sys.stderr
     try:
-        code = app(args=arguments, prog_name="hovi", standalone_mode=False)
+        given = sys.argv[1:] if arguments is None else arguments
+        code = application(given)(args=given, prog_name="hovi", standalone_mode=False)
     except SystemExit as error:  # how typer and rich end where a pipe is broken, whichever it is
         sys.stdout, sys.stderr = stdout, stderr
         if not isinstance(error.__context__, BrokenPipeError) or _has_no_reader(output):

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import math
 import os
-import secrets
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,7 +35,7 @@ def whole_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     if target.exists() and not target.is_file():
         # As root, a rename onto /dev/null would replace the device itself.
         raise OSError("it exists and is not a regular file")
-    temporary = target.with_name(f".{target.name[:50]}.{secrets.token_hex(6)}.tmp")  # 255 bytes
+    temporary = target.with_name(f".{target.name[:50]}.{os.urandom(6).hex()}.tmp")  # 255 bytes
     try:
         with _open(temporary) as stream:
             yield stream

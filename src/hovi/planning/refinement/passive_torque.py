@@ -44,7 +44,7 @@ class PassiveTorque(NamedTuple):
 def passive_torque(problem: TrajectoryProblem, trajectory: Trajectory) -> PassiveTorque | None:
     """The torques of passive joints along a motion; None if no joint is passive, or all are."""
     passive, nv = problem.passive, trajectory.v.shape[1]
-    active = np.setdiff1d(np.arange(nv), passive)
+    active = np.delete(np.arange(nv), passive)
     if len(passive) == 0 or len(active) == 0:
         return None
     tau = np.abs(trajectory.sample_intervals(*sample_points(trajectory)).tau)

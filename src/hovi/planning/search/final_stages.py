@@ -21,9 +21,7 @@ from hovi.planning.refinement.inactive_limits import (
     without_limits,
 )
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
-from hovi.planning.search.free_to_tolerance import free_to_tolerance
 from hovi.planning.search.job import Job, Progress, split_for_charts
-from hovi.planning.search.joint_duration import best_duration_by, joint_minimum
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -167,6 +165,10 @@ class FinalStages:
 
     def _with_best_duration(self, free: FreeDuration, solution: Solution, which: str) -> Solution:
         """A minimum with its best duration, to the tolerance if there is one."""
+        # Here, since most plans have a given duration, and start without these modules.
+        from hovi.planning.search.free_to_tolerance import free_to_tolerance
+        from hovi.planning.search.joint_duration import best_duration_by
+
         solve_for = self._stretched(self.fine.grid)
         first = dataclasses.replace(solution, problem=on_grid_of(self.fine.problem(), solution))
         if not solution.success and solution.status is not Status.INFEASIBLE:
@@ -179,6 +181,8 @@ class FinalStages:
 
     def _solve_jointly(self, free: FreeDuration, first: Solution) -> Solution | None:
         """A minimum in the motion and the duration from a motion; None where not supported."""
+        from hovi.planning.search.joint_duration import joint_minimum
+
         left, most = self.deadline.seconds_left, self.fine.options.max_iterations
         problem, path = first.problem, first.trajectory.path
         if problem is None:

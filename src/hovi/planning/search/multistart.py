@@ -24,7 +24,6 @@ from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.job import Job, Progress
-from hovi.planning.search.joint_duration import joint_minimum
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
@@ -126,11 +125,11 @@ def _solve(
 ) -> Solution:
     """The solution from one guess, without the problem, which is not sent."""
     problem, most = job.problem(), job.options.max_iterations
-    solution = (
-        None
-        if free is None
-        else joint_minimum(free, problem, guess, most, time_limit, barrier=job.barrier)
-    )
+    solution = None
+    if free is not None:
+        from hovi.planning.search.joint_duration import joint_minimum  # rarely needed
+
+        solution = joint_minimum(free, problem, guess, most, time_limit, barrier=job.barrier)
     if solution is None:
         solution = solve_on_grid(
             problem, guess, max_iterations=most, time_limit=time_limit, barrier=job.barrier

@@ -72,7 +72,8 @@ Duration = Annotated[
 class Table(BaseModel):
     """A table that takes no other keys and converts nothing."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    # Tables of a file are compiled once, as parts of the whole file, and not each by itself, too.
+    model_config = ConfigDict(extra="forbid", strict=True, defer_build=True)
 
 
 _JOINTS = 'a list of joint names, or ["all"]'

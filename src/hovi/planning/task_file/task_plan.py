@@ -7,7 +7,6 @@ from typing import Any
 from hovi.checks.arguments import check_arguments
 from hovi.planning.search.job import Progress
 from hovi.planning.search.planner import plan
-from hovi.planning.sequence.sequence_planner import plan_sequence
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 
@@ -22,6 +21,8 @@ def plan_task(task: Task, progress: Progress | None = None, **changes: Any) -> S
     Raises as `plan` does.
     """
     if task.segments:
+        from hovi.planning.sequence.sequence_planner import plan_sequence  # rarely needed
+
         given = task.scene, task.start, task.segments
         return plan_sequence(*given, progress=progress, options=task.options, **changes)
     ends = task.start, task.goal, task.duration
