@@ -113,7 +113,7 @@ class Chunks(Source[Chunk]):
 
     def is_stored(self, key: str) -> bool:
         """Whether a plan is done, with what is wanted of its motion."""
-        return self.index.has(key, self.output.motions, self.output.samples)
+        return self.index.has(key, self.output.motions)
 
     def stored_motion(self, key: str) -> Stored | None:
         """Where the motion of a minimum that is done is."""

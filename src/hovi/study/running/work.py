@@ -30,7 +30,7 @@ from hovi.study.cells.template import Template
 from hovi.study.running.measures import row_of
 from hovi.study.storage.journal import JournalWriter, StorageError, Stored
 from hovi.study.storage.rows import FAILED, REFUSED, UNREACHABLE, PlanRow
-from hovi.study.storage.samples import Samples
+from hovi.study.storage.samples import SampleFormat, Samples
 from hovi.system.blas_threads import one_blas_thread
 from hovi.version import __version__
 
@@ -40,10 +40,12 @@ class Output:
     """What is stored of each motion.
 
     motions: whether the whole motion. samples: number of samples, 0 for none.
+    sample_format: of the file of all samples.
     """
 
     motions: bool = True
     samples: int = 0
+    sample_format: SampleFormat = "parquet"
 
 
 @dataclass(frozen=True)
