@@ -121,13 +121,7 @@ def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[Row]:
         row = done.row.to_dict()
         row["motion_duration"] = row.pop("duration")
         row["motion_intervals"] = row.pop("intervals")
-        parent = cells.parent(number)
-        own = {
-            "cell": number,
-            "key": key.decode(),
-            "parent": None if parent is None else keys[parent].decode(),
-            "scene": cells.template.hash,
-        }
+        own = {"cell": number, "key": key.decode(), "scene": cells.template.hash}
         yield row | own | _parameters(cells, number, parameters)
 
 
