@@ -3,7 +3,7 @@
     python studies.py throughput [COUNT]   # UR5 reaches: single plans, one worker, two workers
     python studies.py killed [COUNT]       # ended ten times at random, against an undisturbed run
     python studies.py cluster [COUNT]      # two-link reaches on a local Dask cluster, peak memory
-    python studies.py warm [SIDE]          # a grid of goals, each from its neighbour's motion
+    python studies.py warm [SIDE] [ROBOT]  # a grid of goals of a ur5 or panda, from neighbours' motions
     python studies.py cost [COUNT]         # what a plan costs beside its own time, for the docs
 
 Processor time is that of all processes together; wall time depends on what else the machine does.
@@ -34,6 +34,8 @@ from hovi.study.study import Study
 from hovi.workers.pool import end_idle_workers
 
 GOAL = np.array([1.2, -0.6, 0.4, 0.7, -0.8, 1.0])
+GRIDS = {"ur5": ((0, 1.2), (1, -0.6)), "panda": ((1, 0.3), (3, -1.2))}
+"""Joints of which the goal varies, and the middle of their ranges."""
 DISTURBANCES = 10
 WAYS = ("kill a worker", "kill the parent", "Ctrl-C", "full disk")
 
@@ -50,13 +52,13 @@ def two_link_reaches(count: int) -> Study:
     return Study("two_link_reach", [{"field": "goal.q", "sample": box}], motions=False)
 
 
-def goals_on_grid(side: int, warm: bool) -> Study:
-    """A grid of goals of the UR5 over two joints."""
+def goals_on_grid(side: int, warm: bool, robot: str = "ur5") -> Study:
+    """A grid of goals over two joints, around that of the shipped scene."""
     axes = [
         {"field": f"goal.q[{i}]", "grid": {"lower": c - 0.3, "upper": c + 0.3, "count": side}}
-        for i, c in enumerate(GOAL[:2])
+        for i, c in GRIDS[robot]
     ]
-    return Study("ur5_reach", axes, warm=warm)
+    return Study(f"{robot}_reach", axes, warm=warm)
 
 
 def processor_seconds() -> float:
@@ -222,18 +224,21 @@ def size_of(folder: Path) -> int:
     return sum(each.stat().st_size for each in folder.iterdir())
 
 
-def warm(side: int) -> None:
+def warm(side: int, robot: str = "ur5") -> None:
     """A grid of goals from the cubic guess and from neighbours."""
     folder, rows, tables = Path(tempfile.mkdtemp()), [], []
     for name in ("cold", "warm"):
         out = folder / name
-        study = goals_on_grid(side, name == "warm")
-        wall, spent, _ = timed(lambda s=study, o=out: s.run(o, 2))
+        study = goals_on_grid(side, name == "warm", robot)
+        wall, spent, _ = timed(lambda s=study, o=out: s.run(o, 1))
         table = Study.load(out)
         tables.append(table)
         minima, steps = int(table["success"].sum()), int(table["nit"].sum())
         rows.append([name, f"{wall:.1f}", f"{spent:.1f}", f"{steps:,}", f"{minima:,}"])
-    print_table([f"{side} x {side} goals", "wall [s]", "processor [s]", "steps", "minima"], rows)
+    print_table(
+        [f"{side} x {side} goals of a {robot}", "wall [s]", "processor [s]", "steps", "minima"],
+        rows,
+    )
     cold, found = tables
     same = found["success"] & (~cold["success"] | (found["cost"] <= cold["cost"] * (1 + 1e-6)))
     worse = found[~same & cold["success"]]
@@ -241,7 +246,7 @@ def warm(side: int) -> None:
         f"\nthe same minima or lower in {100 * (1 - len(worse) / len(found)):.1f} % of the cells;"
     )
     print(f"lower ones in {int((found['cost'] < cold['cost'] * (1 - 1e-6)).sum())}.")
-    for cell in worse["cell"][:20]:
+    for cell in worse["cell"]:
         print(f"cell {cell}: {cold['cost'][cell]:.6g} cold, {found['cost'][cell]:.6g} warm")
 
 
@@ -284,7 +289,7 @@ def main() -> None:
         "cost": (cost, 2000),
     }
     work, default = kinds[kind]
-    work(int(rest[0]) if rest else default)
+    work(int(rest[0]) if rest else default, *rest[1:])
 
 
 if __name__ == "__main__":

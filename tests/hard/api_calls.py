@@ -812,7 +812,7 @@ def _studies() -> list[Call]:
             hovi.Study,
             scene="two_link_reach",
             vary=[values],
-            **{"seed": 0, "warm": False, "motions": True, "samples": 0},
+            **{"seed": 0, "warm": False, "motions": True, "samples": 0, "sample_format": "zarr"},
         ),
         call(hovi.Study.read, toml),
     ]

@@ -28,6 +28,7 @@ warm = false
 [output]
 motions = true
 samples = 10
+sample_format = "zarr"
 
 [[vary]]
 field = "goal.q"

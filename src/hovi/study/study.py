@@ -20,6 +20,7 @@ from hovi.study.running.runner import StudyRun
 from hovi.study.running.work import Output, motion_from
 from hovi.study.storage.folder import About, used_alone
 from hovi.study.storage.index import Index
+from hovi.study.storage.samples import SampleFormat
 from hovi.study.storage.tables import PLANS, RUNS, read_table
 from hovi.study.study_file import cells_of, validated
 from hovi.version import __version__
@@ -71,6 +72,7 @@ class Study:
     seed: of samples.
     warm: whether each plan starts from the motion of a neighbour on the grid.
     motions: whether the motions are stored. samples: how many samples of each are, besides.
+    sample_format: of their file, samples.parquet or samples.zarr.zip.
     cells, output: what is planned, and what is stored of it.
     Raises SceneError for fields that scene files do not have, and for axes without values.
     """
@@ -81,21 +83,23 @@ class Study:
     warm: bool = False
     motions: bool = True
     samples: int = 0
+    sample_format: SampleFormat = "parquet"
     _toml: TomlText | None = field(default=None, repr=False)
     cells: Cells = field(init=False, repr=False)
     output: Output = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        output = {name: getattr(self, name) for name in ("motions", "samples", "sample_format")}
         table = {
             "scene": str(self.scene),
             "seed": self.seed,
             "warm": self.warm,
-            "output": {"motions": self.motions, "samples": self.samples},
+            "output": output,
             "vary": [dict(each) for each in self.vary],
         }
         toml = self._toml or TomlText(Path("study").absolute(), json.dumps(table, default=str))
-        cells, output = cells_of(validated(table, toml), toml)
-        for name, value in (("_toml", toml), ("cells", cells), ("output", output)):
+        cells, stored = cells_of(validated(table, toml), toml)
+        for name, value in (("_toml", toml), ("cells", cells), ("output", stored)):
             object.__setattr__(self, name, value)
 
     @classmethod
@@ -111,6 +115,7 @@ class Study:
             warm=table.warm,
             motions=table.output.motions,
             samples=table.output.samples,
+            sample_format=table.output.sample_format,
             _toml=toml,
         )
 
@@ -142,6 +147,8 @@ class Study:
         Raises StudyError if the folder cannot be written or is in use.
         """
         require_extra("pyarrow", "study")
+        if self.samples and self.sample_format == "zarr":
+            require_extra("zarr", "zarr")
         if not 1 <= workers <= MAX_WORKERS:
             raise InputError(f"workers must be from 1 to {MAX_WORKERS}, got {workers}.")
         if scheduler is not None:

@@ -17,6 +17,7 @@ from hovi.study.axes.axis_table import AxisContext, VaryTable, axis_of
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.template import Template
 from hovi.study.running.work import Output
+from hovi.study.storage.samples import SampleFormat
 from hovi.system.files import names_file
 
 MAX_SAMPLES = 100_000
@@ -30,6 +31,7 @@ class OutputTable(Table):
     samples: int = Field(
         default=0, ge=0, le=MAX_SAMPLES, description=f"a whole number from 0 to {MAX_SAMPLES:,}"
     )
+    sample_format: SampleFormat = Field(default="parquet", description='"parquet" or "zarr"')
 
 
 class StudyTable(Table):
@@ -79,7 +81,7 @@ def cells_of(table: StudyTable, toml: TomlText) -> tuple[Cells, Output]:
         raise toml.error(("vary",), str(wrong)) from None
     _check_first_cell(cells, cache, toml)
     motions = table.output.motions or table.warm  # a resumed run starts from stored motions
-    return cells, Output(motions, table.output.samples)
+    return cells, Output(motions, table.output.samples, table.output.sample_format)
 
 
 def _check_first_cell(cells: Cells, cache: SceneCache, toml: TomlText) -> None:

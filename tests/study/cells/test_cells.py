@@ -53,15 +53,40 @@ def test_a_file_that_the_scene_names_is_part_of_the_key(models: Path, tmp_path: 
     assert Cells(Template.read(tmp_path / "scene.toml"), ()).key(0) != before
 
 
-def test_every_cell_but_the_first_starts_from_a_neighbour_one_step_away(models: Path) -> None:
-    found = cells(models, 3, 4, 2, warm=True)
-    assert found.parent(0) is None
-    for number in range(1, found.count):
-        parent = found.parent(number)
-        assert parent is not None
-        assert parent < number
-        steps = [a - b for a, b in zip(found.places(number), found.places(parent), strict=True)]
-        assert sorted(steps) == [0, 0, 1]
+@pytest.mark.parametrize("shape", [(1,), (9,), (3, 4, 2), (17, 5), (8, 8), (1, 6, 1)])
+def test_parents_are_beside_a_cell_on_coarser_grids(models: Path, shape: tuple[int, ...]) -> None:
+    found = cells(models, *shape, warm=True)
+    assert found.parents(0) == ()
+    done = {0}
+    for number in sorted(range(1, found.count), key=lambda n: (found.rank(n), n)):
+        assert found.parents(number)
+        for parent in found.parents(number):
+            pairs = zip(found.places(number), found.places(parent), strict=True)
+            (step,) = (abs(a - b) for a, b in pairs if a != b)
+            assert step & (step - 1) == 0
+            assert all(place % step == 0 for place in found.places(number))
+            assert found.rank(parent) <= found.rank(number) or parent == 0
+    while True:  # each one can be begun when its parents are done
+        more = {n for n in range(found.count) if n not in done and done >= {*found.parents(n)}}
+        if not more:
+            break
+        done |= more
+    assert done == set(range(found.count))
+
+
+@pytest.mark.parametrize("shape", [(9,), (3, 4, 2), (17, 5), (1, 6, 1)])
+def test_children_are_the_cells_with_this_parent(models: Path, shape: tuple[int, ...]) -> None:
+    found = cells(models, *shape, warm=True)
+    numbers = range(found.count)
+    for number in numbers:
+        own = [each for each in numbers if number in found.parents(each)]
+        assert sorted(found.children(number)) == own
+
+
+def test_cells_of_the_coarse_grid_start_from_their_own_guess_too(models: Path) -> None:
+    found = cells(models, 9, 6, warm=True)
+    own = [found.places(n) for n in range(found.count) if found.takes_own_guess(n)]
+    assert own == [(i, j) for i in (0, 4, 8) for j in (0, 4)]
 
 
 def test_a_warm_key_depends_on_all_cells_before_it(models: Path) -> None:

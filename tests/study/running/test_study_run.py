@@ -129,10 +129,10 @@ def test_a_cell_that_ends_its_workers_is_given_up_and_tried_again_later(
     undisturbed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     class Deadly(StudyWork):
-        def _do(self, job: CellJob, guess: Any, desk: Any) -> Any:
+        def _do(self, job: CellJob, desk: Any) -> Any:
             if job.number == 5:
                 os.kill(os.getpid(), signal.SIGSEGV)
-            return super()._do(job, guess, desk)
+            return super()._do(job, desk)
 
     Deadly.__module__ = "__main__"  # sent by its code
     monkeypatch.setattr(runner, "StudyWork", Deadly)
@@ -184,6 +184,23 @@ def test_warm_plans_find_the_cold_minima(undisturbed: Path, undisturbed_warm: Pa
     assert (warm["cost"] <= cold["cost"] * (1 + 1e-6)).all()
     assert warm["nit"].sum() < cold["nit"].sum()
     assert warm["parent"].isna().sum() == 1
+
+
+def test_a_parent_of_another_robot_gives_no_guess(tmp_path: Path) -> None:
+    joints = ["wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
+    values = [[joints[i:], [0.0] * (3 + i), [0.3] * (3 + i)] for i in (0, 0, 1)]
+    study = Study(
+        "ur5_reach", [{"fields": ["locked", "start.q", "goal.q"], "values": values}], warm=True
+    )
+    study.run(tmp_path, 1)
+    rows = Study.load(tmp_path)
+    assert "refused" not in rows["status"].tolist()
+    assert rows["success"][:2].all()
+    assert [key if isinstance(key, str) else None for key in rows["parent"]] == [
+        None,
+        rows["key"][0],
+        None,
+    ]
 
 
 def test_no_failure_stops_a_study(tmp_path: Path) -> None:

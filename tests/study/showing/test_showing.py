@@ -12,8 +12,9 @@ from hovi.cli.application import main
 from hovi.study.showing.charts import draw_against, draw_histograms, draw_map
 from hovi.study.showing.plans import Plans
 from hovi.study.showing.summary import summary
-from hovi.study.showing.worst_page import write_worst
+from hovi.study.showing.worst_page import shared_pieces, write_worst
 from hovi.study.study import Study
+from hovi.viewing.replay_session import page_of
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("pandas")
@@ -92,12 +93,29 @@ def test_of_plans_at_one_place_the_map_has_the_best(folder: Path, tmp_path: Path
 
 
 def test_the_page_of_the_worst_motions_has_a_replay_of_each(folder: Path, tmp_path: Path) -> None:
-    page = tmp_path / "worst.html"
-    assert write_worst(Plans.read(folder), page, count=2) == 2
+    page, plans = tmp_path / "worst.html", Plans.read(folder)
+    assert write_worst(plans, page, count=3) == 3
     text = page.read_text()
-    assert text.count("<iframe") == 2
-    worst = Plans.read(folder).worst(1)[0]
-    assert f"cell {Study.load(folder)['cell'][worst]}:" in text
+    shared, replays = (
+        json.loads(line.removeprefix(f"const {name} = ").removesuffix(";"))
+        for name in ("SHARED", "REPLAYS")
+        for line in text.splitlines()
+        if line.startswith(f"const {name} = ")
+    )
+    assert text.count("</script>") == 1
+    for row, pieces in zip(plans.worst(3), replays, strict=True):
+        assert f"cell {plans.columns['cell'][row]}:" in text
+        own = page_of(Study.motion(folder, plans.columns["key"][row])).offline_html()
+        assert "".join(shared[x] if isinstance(x, int) else x for x in pieces) == own
+    assert len(text) < 2 * len(own)  # of which each has the viewer
+
+
+@pytest.mark.parametrize("texts", [[], [""], ["a", "a"], ["x" * 200 + "'b", "'" + "x" * 200]])
+def test_pieces_put_together_are_the_texts(texts: list[str]) -> None:
+    shared, found = shared_pieces(texts)
+    assert [
+        "".join(shared[x] if isinstance(x, int) else x for x in each) for each in found
+    ] == texts
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def index(folder: Path) -> Index:
-    found = Index(folder)
+def index(folder: Path, samples: int = 0) -> Index:
+    found = Index(folder, samples)
     found.read_new()
     return found
 
@@ -82,14 +82,20 @@ def test_an_index_reads_on_from_where_it_was(folder: Path) -> None:
     assert found.read_new() == []
 
 
-def test_of_a_plan_that_was_done_twice_the_one_with_more_samples_counts(folder: Path) -> None:
+def test_of_a_plan_that_was_done_twice_the_one_with_the_wanted_samples_counts(folder: Path) -> None:
     writer = JournalWriter(folder)
     writer.add(entry("a"))
-    assert not index(folder).has("a", motion=False, samples=5)
-    writer.add(entry("a", samples=5))
-    assert index(folder).has("a", motion=False, samples=5)
-    assert not index(folder).has("a", motion=True, samples=5)
-    assert len(list(index(folder).runs())) == 2
+    assert not index(folder, samples=5).has("a", motion=False)
+    for samples in (9, 5, 7):
+        writer.add(entry("a", cost=samples, samples=samples))
+    found = index(folder, samples=5)
+    assert found.has("a", motion=False)
+    assert not found.has("a", motion=True)
+    done = found.done("a")
+    assert done is not None
+    assert done.row.cost == 5
+    assert index(folder).has("a", motion=False)
+    assert len(list(found.runs())) == 4
 
 
 def test_a_full_disk_leaves_whole_lines(folder: Path) -> None:

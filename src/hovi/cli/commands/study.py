@@ -43,7 +43,11 @@ def run(
         typer.Option(metavar="tcp://HOST:PORT|local", help="A Dask scheduler to plan with."),
     ] = None,
     sample: Annotated[
-        int | None, typer.Option(help="Samples of each motion for samples.parquet.")
+        int | None, typer.Option(help="Samples of each motion, in samples.parquet.")
+    ] = None,
+    sample_format: Annotated[
+        str | None,
+        typer.Option(metavar="parquet|zarr", help="Of the samples; zarr is samples.zarr.zip."),
     ] = None,
     replace: Annotated[
         bool, typer.Option("--replace", help="Continue there whatever the folder holds.")
@@ -60,9 +64,9 @@ def run(
     from hovi.planning.search.multistart import default_processes
     from hovi.study.study import Study
 
-    chosen = Study.read(study)
-    if sample is not None:
-        chosen = dataclasses.replace(chosen, samples=sample)
+    given = {"samples": sample, "sample_format": sample_format}
+    changes: dict[str, Any] = {name: each for name, each in given.items() if each is not None}
+    chosen = dataclasses.replace(Study.read(study), **changes)
     with Told() as told:
         report = chosen.run(
             out,

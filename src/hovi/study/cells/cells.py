@@ -15,6 +15,8 @@ from hovi.study.cells.template import Template, content_hash
 
 MAX_CELLS = 100_000_000
 """Maximum number of cells."""
+OWN_GUESS_SPACING = 4
+"""Every how many cells along each axis one starts from its own guess, too."""
 FORMAT = 1
 """Of what is hashed; to be raised whenever equal scenes would be planned differently."""
 
@@ -38,7 +40,7 @@ class Cell:
 class Cells:
     """All cells of a study, made when they are asked for.
 
-    warm: whether each cell but the first starts from the motion of a neighbour.
+    warm: whether each cell but the first starts from the motion of a neighbour: see `parents`.
     """
 
     template: Template
@@ -78,20 +80,58 @@ class Cells:
             number = number * length + place
         return number
 
-    def parent(self, number: int) -> int | None:
-        """The cell from whose motion a cell starts; None for none.
+    def parents(self, number: int) -> tuple[int, ...]:
+        """The cells of which one gives its motion to a cell as a guess; none for the first cell.
 
-        It is one step back along the last axis on which the cell is not at the beginning, so the
-        first cell of each line along the last axis starts from that of the line before.
+        They are its neighbours on a grid that is twice as coarse: one spacing before it and one
+        behind it on the last axis on which it is no point of that grid.
         """
+        places, spacing = self.places(number), self._spacing(number)
+        if not self.warm or spacing == 0:
+            return ()
+        axis = max(i for i, place in enumerate(places) if place & spacing)
+        return self._beside(places, axis, spacing)
+
+    def children(self, number: int) -> tuple[int, ...]:
+        """The cells to which a cell is a parent, those of coarse grids first."""
         if not self.warm:
-            return None
-        places = list(self.places(number))
-        for axis in reversed(range(len(places))):
-            if places[axis] > 0:
-                places[axis] -= 1
-                return self.number(places)
-        return None
+            return ()
+        places, own = self.places(number), self._spacing(number)
+        found: list[int] = []
+        last = max((i for i, place in enumerate(places) if place & own), default=-1)
+        spacing = own or 1 << max(self.shape).bit_length()
+        for axis in range(last + 1, len(places)):
+            found += self._beside(places, axis, own) if own else ()
+        while spacing := spacing >> 1:
+            for axis in range(len(places)):
+                found += self._beside(places, axis, spacing)
+        return tuple(found)
+
+    def rank(self, number: int) -> int:
+        """How fine the coarsest grid with a cell is: a smaller number for a coarser one."""
+        return -self._spacing(number)
+
+    def takes_own_guess(self, number: int) -> bool:
+        """Whether a cell starts from its own guess as well as from a parent's motion.
+
+        So minima that are lower in a part of the grid are found there, and go to its neighbours.
+        """
+        spacing = self._spacing(number)
+        return spacing == 0 or spacing >= OWN_GUESS_SPACING
+
+    def _spacing(self, number: int) -> int:
+        """The spacing, a power of two, of the coarsest grid with a cell; 0 for the first cell."""
+        places = self.places(number)
+        return min((place & -place for place in places if place), default=0)
+
+    def _beside(self, places: tuple[int, ...], axis: int, spacing: int) -> tuple[int, ...]:
+        """The cells before and behind a place on an axis."""
+        moved = (places[axis] - spacing, places[axis] + spacing)
+        return tuple(
+            self.number([*places[:axis], place, *places[axis + 1 :]])
+            for place in moved
+            if 0 <= place < self.shape[axis]
+        )
 
     def cell(self, number: int) -> Cell:
         """A cell. Raises SceneError if its values have no place in the template."""
@@ -99,16 +139,12 @@ class Cells:
 
     def key(self, number: int) -> str:
         """The key of a cell: see Cell. Raises SceneError."""
-        chain = [number]
-        while (parent := self.parent(chain[-1])) is not None and parent not in self._keys:
-            chain.append(parent)
-        above = None if parent is None else self._keys[parent]
-        for each in reversed(chain):
-            above = self._keys[each] if each in self._keys else self._key(each, above)
-            if self.warm:  # others need no key of another cell
-                self._keys[each] = above
-        assert above is not None
-        return above
+        if not self.warm:  # keys of others are not needed
+            return self._key(number, ())
+        if number not in self._keys:
+            above = tuple(self.key(parent) for parent in self.parents(number))
+            self._keys[number] = self._key(number, above)
+        return self._keys[number]
 
     @cached_property
     def ends(self) -> tuple[str, ...]:
@@ -128,13 +164,14 @@ class Cells:
             for pair in zip(axis.fields, axis.values[place], strict=True)
         )
 
-    def _key(self, number: int, parent: str | None) -> str:
+    def _key(self, number: int, parents: tuple[str, ...]) -> str:
         table = self.template.with_values(self.values(number))
         content = {"format": FORMAT, "scene": table, "files": self.template.files(table)}
         if self.ends:
             content["ends"] = list(self.ends)
         if self.warm:
-            content["parent"] = parent
+            content["parents"] = list(parents)
+            content["own guess"] = self.takes_own_guess(number)
         return content_hash(content)
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hovi.study.cells.cells import Cell, Cells
 from hovi.study.cells.template import HASH_DIGITS
-from hovi.study.running.work import CellJob, Output, Receipt
+from hovi.study.running.work import CellJob, Guess, Output, Receipt
 from hovi.study.storage.index import Index
 from hovi.study.storage.journal import Stored
 from hovi.workers.source import Source, Taken
@@ -113,7 +113,7 @@ class Chunks(Source[Chunk]):
 
     def is_stored(self, key: str) -> bool:
         """Whether a plan is done, with what is wanted of its motion."""
-        return self.index.has(key, self.output.motions, self.output.samples)
+        return self.index.has(key, self.output.motions)
 
     def stored_motion(self, key: str) -> Stored | None:
         """Where the motion of a minimum that is done is."""
@@ -135,7 +135,7 @@ class Chunks(Source[Chunk]):
 
 
 def job_of(
-    cell: Cell, attempt: int = 1, guess: Stored | None = None, follows: bool = False
+    cell: Cell, attempt: int = 1, guesses: tuple[Guess, ...] = (), own_guess: bool = True
 ) -> CellJob:
     """The job of a cell."""
-    return CellJob(cell.number, cell.key, cell.values, cell.ends, attempt, guess, follows)
+    return CellJob(cell.number, cell.key, cell.values, cell.ends, attempt, guesses, own_guess)

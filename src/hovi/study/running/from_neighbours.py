@@ -1,40 +1,34 @@
 """Cells of which each starts from the motion of a neighbour that the grid fixes.
 
-The neighbours form a tree: see Cells.parent. A chunk is a path down that tree, so that a worker
-goes on from the motion that it has just found; whatever else hangs on its cells can be begun when
-the chunk is done.
+The neighbours are those of Cells.parents: a coarse grid is planned first, then one that is twice as
+fine, and so on. A cell can be begun when all its parents are done.
 """
 
 from __future__ import annotations
 
-from collections import deque
+import heapq
 from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
 
 from hovi.study.running.chunks import Chunk, Chunks, job_of
-from hovi.study.running.work import CellJob
+from hovi.study.running.work import CellJob, Guess
 from hovi.study.storage.journal import Stored
-
-
-@dataclass(frozen=True)
-class _Ready:
-    """A cell whose parent is done. guess: where the parent's motion is, if it is a minimum."""
-
-    number: int
-    guess: Stored | None
-    attempt: int = 1
 
 
 @dataclass(eq=False)
 class FromNeighbours(Chunks):
-    """The missing cells, each as soon as the one that it starts from is done."""
+    """The missing cells, each as soon as those that it may start from are done."""
 
-    _ready: deque[_Ready] = field(default_factory=lambda: deque([_Ready(0, None)]))
+    _ready: list[tuple[int, int, int]] = field(default_factory=lambda: [(0, 0, 1)])
     _finished: int = 0
-    _continued: dict[int, int] = field(default_factory=dict)
+    _motions: dict[int, Stored] = field(default_factory=dict)
 
     @property
     def waiting(self) -> int:
-        """See Chunks; cells of which the neighbour is missing count as well."""
+        """See Chunks; cells of which a parent is missing count as well."""
         flying = sum(len(chunk) for chunk in self._flying.values())
         return self.cells.count - self._finished - flying - len(self.given_up)
 
@@ -44,61 +38,49 @@ class FromNeighbours(Chunks):
         return bool(self._ready or self._flying)
 
     def next_chunk(self, size: int) -> Chunk:
-        """See Chunks."""
-        while self._ready:
-            first = self._ready.popleft()
-            cell = self.cell(first.number)
+        """See Chunks. What can be begun is shared among the workers."""
+        jobs: list[CellJob] = []
+        while self._ready and len(jobs) < min(size, 1 + len(self._ready) // self.workers):
+            _, number, attempt = heapq.heappop(self._ready)
+            cell = self.cell(number)
             if self.is_stored(cell.key):
-                self._finish(first.number, self.stored_motion(cell.key), None)
-                continue
-            return self._path(job_of(cell, first.attempt, first.guess), size)
-        return ()
-
-    def _path(self, first: CellJob, size: int) -> Chunk:
-        """A path down the tree from a cell, of cells that are missing."""
-        jobs = [first]
-        while len(jobs) < size:
-            below = self._children(jobs[-1].number)
-            if not below:
-                break
-            cell = self.cell(below[0])
-            if self.is_stored(cell.key):
-                break
-            self._continued[jobs[-1].number] = below[0]
-            jobs.append(job_of(cell, follows=True))
+                self._finish(number, self.stored_motion(cell.key))
+            else:
+                own = self.cells.takes_own_guess(number)
+                jobs.append(job_of(cell, attempt, self._guesses(number), own))
         return tuple(jobs)
 
     def wait_again(self, suspect: CellJob | None, others: Chunk) -> None:
-        """See Chunks; the others are below the suspect, and come when that is done."""
+        """See Chunks."""
         for job in others if suspect is None else (suspect, *others):
-            self._continued.pop(job.number, None)
-        if suspect is None:
-            return
-        guess = suspect.guess
-        if suspect.follows:
-            parent = self.cells.parent(suspect.number)
-            assert parent is not None
-            guess = self.stored_motion(self.cell(parent).key)
-        self._ready.append(_Ready(suspect.number, guess, suspect.attempt + 1))
+            self._wait(job.number, job.attempt + (job is suspect))
 
     def job_done(self, job: CellJob, motion: Stored | None) -> None:
         """See Chunks."""
-        self._finish(job.number, motion, self._continued.pop(job.number, None))
+        self._finish(job.number, motion)
 
-    def _finish(self, number: int, motion: Stored | None, continued: int | None) -> None:
-        """What hangs on a cell can be begun, but for the one that its chunk goes on to."""
+    def _guesses(self, number: int) -> tuple[Guess, ...]:
+        """The motions of a cell's parents that found a minimum."""
+        return tuple(
+            Guess(self.keys[parent].decode(), self._motions[parent])
+            for parent in self.cells.parents(number)
+            if parent in self._motions
+        )
+
+    def _finish(self, number: int, motion: Stored | None) -> None:
+        """Cells can be begun of which this was the last parent that was missing."""
         self._finished += 1
-        for child in self._children(number):
-            if child != continued:
-                self._ready.append(_Ready(child, motion))
+        self._done[number] = True
+        if motion is not None:
+            self._motions[number] = motion
+        for child in self.cells.children(number):
+            if all(self._done[parent] for parent in self.cells.parents(child)):
+                self._wait(child, 1)
 
-    def _children(self, number: int) -> list[int]:
-        """The cells that start from a cell's motion, first the next one on its own line."""
-        places, shape = list(self.cells.places(number)), self.cells.shape
-        moved = [axis for axis, place in enumerate(places) if place > 0]
-        found = []
-        for axis in range(moved[-1] if moved else 0, len(shape)):
-            if places[axis] + 1 < shape[axis]:
-                next_places = [*places[:axis], places[axis] + 1, *places[axis + 1 :]]
-                found.append(self.cells.number(next_places))
-        return found
+    def _wait(self, number: int, attempt: int) -> None:
+        """A cell can be begun; those of coarse grids are begun first, as others wait for them."""
+        heapq.heappush(self._ready, (self.cells.rank(number), number, attempt))
+
+    @cached_property
+    def _done(self) -> npt.NDArray[np.bool_]:
+        return np.zeros(self.cells.count, bool)

@@ -53,7 +53,7 @@ class StudyRun:
 
         Raises StudyError if nothing can be written any more; what is done stays.
         """
-        index = Index(self.folder)
+        index = Index(self.folder, self.output.samples)
         index.read_new()
         kind = FromNeighbours if self.cells.warm else InOrder
         chunks = kind(self.cells, index, self.output, self.workers)
@@ -71,7 +71,7 @@ class StudyRun:
             ) from None
         self.given_up = tuple(chunks.given_up)
         index.read_new()
-        write_tables(self.folder, self.cells, chunks.keys, index, self.output.samples)
+        write_tables(self.folder, self.cells, chunks.keys, index, self.output.sample_format)
 
     def _count_done(self, chunks: Chunks) -> int:
         """How many cells are done. Sets the keys of all of them."""

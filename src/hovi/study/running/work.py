@@ -27,12 +27,17 @@ from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.study.cells.field_path import FieldPath
 from hovi.study.cells.template import Template
+from hovi.study.running.guesses import GuessCosts, Motions
 from hovi.study.running.measures import row_of
 from hovi.study.storage.journal import JournalWriter, StorageError, Stored
 from hovi.study.storage.rows import FAILED, REFUSED, UNREACHABLE, PlanRow
-from hovi.study.storage.samples import Samples
+from hovi.study.storage.samples import SampleFormat, Samples
 from hovi.system.blas_threads import one_blas_thread
 from hovi.version import __version__
+
+
+LOWER = 1e-6
+"""Share by which a minimum from a plan's own guess has to cost less than one from a parent's."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +45,28 @@ class Output:
     """What is stored of each motion.
 
     motions: whether the whole motion. samples: number of samples, 0 for none.
+    sample_format: of the file of all samples.
     """
 
     motions: bool = True
     samples: int = 0
+    sample_format: SampleFormat = "parquet"
+
+
+@dataclass(frozen=True)
+class Guess:
+    """The motion of another plan. key: of that plan. motion: where it is."""
+
+    key: str
+    motion: Stored
 
 
 @dataclass(frozen=True)
 class CellJob:
     """A cell to be planned: see Cell.
 
-    attempt: 1 for the first one. guess: where the motion is from which it starts; None for none.
-    follows: whether it starts from the motion of the job before it in the chunk.
+    attempt: 1 for the first one. guesses: of which it starts from the cheapest.
+    own_guess: whether it starts from its own guess as well, and the lower minimum is taken.
     """
 
     number: int
@@ -59,8 +74,8 @@ class CellJob:
     values: tuple[tuple[FieldPath, Any], ...]
     ends: tuple[str, ...] = ()
     attempt: int = 1
-    guess: Stored | None = None
-    follows: bool = False
+    guesses: tuple[Guess, ...] = ()
+    own_guess: bool = True
 
 
 @dataclass(frozen=True)
@@ -96,19 +111,11 @@ class StudyWork:
     def __call__(self, chunk: tuple[CellJob, ...], left: float | None = None) -> list[Receipt]:
         """Plan the cells of a chunk. Raises StorageError, and MemoryError."""
         desk = _desk(self.folder, self.run, self.template.hash)
-        receipts: list[Receipt] = []
-        before: Trajectory | None = None
-        for job in chunk:
-            guess = before if job.follows else self._stored_motion(job.guess)
-            receipt, before = self._do(job, guess, desk)
-            receipts.append(receipt)
-        return receipts
+        return [self._do(job, desk) for job in chunk]
 
-    def _do(
-        self, job: CellJob, guess: Trajectory | None, desk: _Desk
-    ) -> tuple[Receipt, Trajectory | None]:
+    def _do(self, job: CellJob, desk: _Desk) -> Receipt:
         began, wall, processor = datetime.now(UTC), time.perf_counter(), time.process_time()
-        row, motion = self._planned(job, guess, desk)
+        row, motion = self._planned(job, desk)
         seconds = time.perf_counter() - wall
         spent = {"seconds": seconds, "processor_seconds": time.process_time() - processor}
         stored = samples = None
@@ -135,19 +142,18 @@ class StudyWork:
         }
         desk.writer.add(entry)
         reason = "" if row.success else row.reason or row.status
-        receipt = Receipt(job.number, job.key, row.status, seconds, reason, stored)
-        return receipt, motion if row.success else None
+        if motion is not None and stored is not None and row.success:
+            desk.motions.put(stored, motion)
+        return Receipt(job.number, job.key, row.status, seconds, reason, stored)
 
-    def _planned(
-        self, job: CellJob, guess: Trajectory | None, desk: _Desk
-    ) -> tuple[PlanRow, Trajectory | None]:
+    def _planned(self, job: CellJob, desk: _Desk) -> tuple[PlanRow, Trajectory | None]:
         """The row of a cell and its motion."""
         began = time.perf_counter()
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
                 task = self._task(job, desk)
-                solution = _solved(task, guess)
+                solution, parent = _solved(task, job, desk)
             except UnreachableError as error:
                 return self._without_motion(UNREACHABLE, error), None
             except HoviError as error:
@@ -161,7 +167,7 @@ class StudyWork:
         texts = [str(each.message) for each in caught if issubclass(each.category, HoviWarning)]
         seconds, limit = time.perf_counter() - began, task.options.time_limit_seconds
         row = row_of(solution, " ".join(dict.fromkeys(texts)), seconds, limit)
-        return row, solution.trajectory
+        return dataclasses.replace(row, parent=parent), solution.trajectory
 
     def _without_motion(self, status: str, reason: Any) -> PlanRow:
         """The row of a cell without a motion; its reason names no folder of this machine."""
@@ -178,11 +184,6 @@ class StudyWork:
                 task = dataclasses.replace(task, **ends)
         return task
 
-    def _stored_motion(self, stored: Stored | None) -> Trajectory | None:
-        if stored is None:
-            return None
-        return motion_from(stored.read(Path(self.folder)))
-
 
 @dataclass(frozen=True, eq=False)
 class _Desk:
@@ -190,21 +191,35 @@ class _Desk:
 
     writer: JournalWriter
     cache: SceneCache
+    motions: Motions
+    costs: GuessCosts
 
 
 @functools.lru_cache(maxsize=4)
 def _desk(folder: str, run: str, template: str) -> _Desk:
-    return _Desk(JournalWriter(Path(folder)), SceneCache())
+    return _Desk(JournalWriter(Path(folder)), SceneCache(), Motions(Path(folder)), GuessCosts())
 
 
-def _solved(task: Task, guess: Trajectory | None) -> Solution:
-    """The plan, from a guess if there is one, and from its own one where that finds no minimum."""
+def _solved(task: Task, job: CellJob, desk: _Desk) -> tuple[Solution, str | None]:
+    """The plan, and the key of the one from whose motion it started.
+
+    From the cheapest guess, and from the task's own one where that finds no minimum, or where the
+    job asks for both, of which the lower minimum is taken.
+    """
     several: dict[str, Any] = {"processes": 1} if task.options.starts > 1 else {}
-    if guess is not None:
-        solution = plan_task(task, guess=guess, **several)
-        if solution.success or solution.status is Status.INTERRUPTED:
-            return solution
-    return plan_task(task, **several)
+    read = [(each.key, desk.motions.get(each.motion, task.held_scene)) for each in job.guesses]
+    known = [(key, motion) for key, motion in read if motion is not None]
+    warm = None
+    if known:
+        parent, motion = known[desk.costs.cheapest(task, [motion for _, motion in known])]
+        warm = plan_task(task, guess=motion, **several)
+        if warm.status is Status.INTERRUPTED or (warm.success and not job.own_guess):
+            return warm, parent
+    own = plan_task(task, **several)
+    if warm is None or not warm.success:
+        return own, None
+    least = warm.cost - LOWER * abs(warm.cost)
+    return (own, None) if own.success and own.cost < least else (warm, parent)
 
 
 def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:

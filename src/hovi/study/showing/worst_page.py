@@ -1,10 +1,14 @@
-"""One page with replays of several motions of a study."""
+"""One page with replays of several motions of a study, which bring what they share once."""
 
 from __future__ import annotations
 
 import html
+import json
+import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from hovi.errors import DisplayError, StudyError
 from hovi.study.showing.plans import Plans
@@ -12,6 +16,10 @@ from hovi.study.study import Study
 from hovi.system.files import reason, whole_file
 from hovi.viewing.replay_session import page_of
 
+SHARED_LENGTH = 100
+"""Characters from which a piece that several replays have is stored once."""
+_PIECES = re.compile(r"(?<=[\n\"'])")
+"""Where replays are cut: lines, and the strings in them, of which meshes are some."""
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>
@@ -21,10 +29,27 @@ summary {{ cursor: pointer; padding: 0.4em 0; }}
 </style></head><body>
 <h1>{title}</h1>
 {motions}
+<script>
+const SHARED = {shared};
+const REPLAYS = {replays};
+function show(details) {{
+    const old = details.querySelector("iframe");
+    if (old) old.remove();
+    if (!details.open) return;
+    const frame = document.createElement("iframe");
+    frame.setAttribute("sandbox", "allow-scripts");
+    const pieces = REPLAYS[Number(details.dataset.replay)];
+    frame.srcdoc = pieces.map(each => typeof each === "number" ? SHARED[each] : each).join("");
+    details.append(frame);
+}}
+for (const details of document.querySelectorAll("details")) {{
+    details.addEventListener("toggle", () => show(details));
+    show(details);
+}}
+</script>
 </body></html>
 """
-_MOTION = """<details{opened}><summary>{label}</summary>
-<iframe loading="lazy" sandbox="allow-scripts" srcdoc="{source}"></iframe></details>
+_MOTION = """<details data-replay="{number}"{opened}><summary>{label}</summary></details>
 """
 
 
@@ -36,9 +61,12 @@ def write_worst(plans: Plans, path: Path, count: int = 10) -> int:
     rows = plans.worst(count)
     if not rows:
         raise StudyError(f"the study in {plans.folder} has no minimum to be replayed.")
-    motions = [_motion(plans, row, number == 0) for number, row in enumerate(rows)]
+    motions = [_motion(plans, row, number) for number, row in enumerate(rows)]
+    shared, replays = shared_pieces([_replay(plans, row) for row in rows])
     title = f"the {len(rows)} costliest of {len(plans):,} plans"
-    page = _PAGE.format(title=title, motions="".join(motions))
+    page = _PAGE.format(
+        title=title, motions="".join(motions), shared=_script(shared), replays=_script(replays)
+    )
     try:
         with whole_file(path) as stream:
             stream.write(page.encode())
@@ -47,16 +75,41 @@ def write_worst(plans: Plans, path: Path, count: int = 10) -> int:
     return len(rows)
 
 
-def _motion(plans: Plans, row: int, opened: bool) -> str:
-    trajectory = Study.motion(plans.folder, plans.columns["key"][row])
-    source = page_of(trajectory).offline_html()
+def shared_pieces(texts: Sequence[str]) -> tuple[list[str], list[list[str | int]]]:
+    """The long pieces that occur more than once, and each text as pieces and numbers of these."""
+    cut = [_PIECES.split(text) for text in texts]
+    often = Counter(piece for pieces in cut for piece in pieces if len(piece) >= SHARED_LENGTH)
+    shared = [piece for piece, times in often.items() if times > 1]
+    numbers = {piece: number for number, piece in enumerate(shared)}
+    return shared, [_joined([numbers.get(piece, piece) for piece in pieces]) for pieces in cut]
+
+
+def _joined(pieces: Sequence[str | int]) -> list[str | int]:
+    """The same with texts that follow each other as one."""
+    found: list[str | int] = []
+    for piece in pieces:
+        last = found[-1] if found else None
+        if isinstance(piece, str) and isinstance(last, str):
+            found[-1] = last + piece
+        else:
+            found.append(piece)
+    return found
+
+
+def _script(data: Any) -> str:
+    """Data as an expression of JavaScript, in which nothing ends the script's element."""
+    return json.dumps(data).replace("<", "\\u003c")
+
+
+def _replay(plans: Plans, row: int) -> str:
+    return page_of(Study.motion(plans.folder, plans.columns["key"][row])).offline_html()
+
+
+def _motion(plans: Plans, row: int, number: int) -> str:
     label = f"cell {plans.columns['cell'][row]}: cost {plans.columns['cost'][row]:.6g}"
     label += "".join(f", {_parameter(name, plans, row)}" for name in _shown(plans.parameters))
-    return _MOTION.format(
-        label=html.escape(label),
-        source=html.escape(source, quote=True),
-        opened=" open" if opened else "",
-    )
+    opened = " open" if number == 0 else ""
+    return _MOTION.format(label=html.escape(label), number=number, opened=opened)
 
 
 def _parameter(name: str, plans: Plans, row: int) -> str:

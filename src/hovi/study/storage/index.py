@@ -36,10 +36,11 @@ class _Line:
 class Index:
     """The lines of all journals of a study, of which only their places are kept.
 
-    folder: of the study.
+    folder: of the study. samples: how many of each motion are wanted, 0 for none.
     """
 
     folder: Path
+    samples: int = 0
     _lines: dict[str, _Line] = field(default_factory=dict)
     _runs: list[tuple[int, int, int]] = field(default_factory=list)
     _files: list[Path] = field(default_factory=list)
@@ -48,7 +49,8 @@ class Index:
     def read_new(self) -> list[str]:
         """Read what was added to the journals; the keys of plans that are new. Raises StudyError.
 
-        Of a plan that was done twice, the line that has more is taken, or else the first one.
+        Of a plan that was done twice, the line that has as many samples as are wanted is taken,
+        then the one that has a motion, or else the first one.
         """
         found = []
         try:
@@ -58,12 +60,10 @@ class Index:
             raise _unreadable(self.folder, refused) from None
         return found
 
-    def has(self, key: str, motion: bool, samples: int) -> bool:
-        """Whether a plan is done that was asked for its motion and samples if they are wanted."""
+    def has(self, key: str, motion: bool) -> bool:
+        """Whether a plan is done that was asked for its samples, and for its motion if wanted."""
         line = self._lines.get(key)
-        if line is None:
-            return False
-        return line.asked[0] >= motion and (samples == 0 or line.asked[1] == samples)
+        return line is not None and line.asked[0] >= motion and self._is_sampled(line.asked)
 
     def __contains__(self, key: str) -> bool:
         return key in self._lines
@@ -79,7 +79,8 @@ class Index:
         entry = self._entry(line.file, line.offset, line.length)
         assert entry is not None
         row = PlanRow.from_dict(entry["row"])
-        return Done(row, _stored(entry["motion"]), _stored(entry["samples"]))
+        samples = _stored(entry["samples"]) if self._is_sampled(line.asked) else None
+        return Done(row, _stored(entry["motion"]), samples)
 
     def runs(self) -> Iterator[dict[str, Any]]:
         """The runs of all plans, also of those that were lost. Raises StudyError."""
@@ -118,9 +119,15 @@ class Index:
         if asked is None:
             return None
         before = self._lines.get(key)
-        if before is None or asked > before.asked:
+        if before is None or self._rank(asked) > self._rank(before.asked):
             self._lines[key] = _Line(file, offset, len(line), asked)
         return key
+
+    def _is_sampled(self, asked: tuple[bool, int]) -> bool:
+        return self.samples in (0, asked[1])
+
+    def _rank(self, asked: tuple[bool, int]) -> tuple[bool, bool]:
+        return self._is_sampled(asked), asked[0]
 
     def _entry(self, file: int, offset: int, length: int) -> dict[str, Any] | None:
         try:

@@ -23,6 +23,7 @@ class PlanRow:
         without limits. least_distance: to obstacles and between links, in [m], None without.
     q_start, q_goal: first and last configuration.
     reproducible: False if the time that a plan takes on this machine may have changed it.
+    parent: the key of the plan from whose motion it started; None for its own guess.
     version: of hovi.
     """
 
@@ -45,6 +46,7 @@ class PlanRow:
     q_start: list[float] | None = None
     q_goal: list[float] | None = None
     reproducible: bool = True
+    parent: str | None = None
     version: str = ""
 
     def to_dict(self) -> dict[str, Any]:

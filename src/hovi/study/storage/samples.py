@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,11 @@ import numpy.typing as npt
 from hovi.discrete.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
+SampleFormat = Literal["parquet", "zarr"]
+"""In which format the samples of all motions are written."""
 _HEAD = struct.Struct("<4i")
+HEAD_BYTES = _HEAD.size
+"""Bytes that `shape_of` needs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +46,16 @@ class Samples:
         body = np.concatenate([self.t[:, None], *columns], axis=1)
         return head + np.ascontiguousarray(body, "<f8").tobytes()
 
+    @staticmethod
+    def shape_of(content: bytes) -> tuple[int, int, int, int]:
+        """M, nq, nv and the width of tau, from the first bytes."""
+        count, nq, nv, outputs = _HEAD.unpack_from(content)
+        return count, nq, nv, outputs
+
     @classmethod
     def from_bytes(cls, content: bytes) -> Self:
         """From bytes. Raises ValueError for others."""
-        count, nq, nv, outputs = _HEAD.unpack_from(content)
+        count, nq, nv, outputs = cls.shape_of(content)
         body = np.frombuffer(content, "<f8", offset=_HEAD.size).astype(np.float64)
         rows = body.reshape(count, 1 + nq + 2 * nv + outputs)
         parts = np.split(rows, np.cumsum([1, nq, nv, nv]), axis=1)

@@ -1,4 +1,4 @@
-"""The tables of a study: plans.parquet, runs.parquet and samples.parquet.
+"""The tables of a study: plans.parquet, runs.parquet, and the samples of all motions.
 
 plans.parquet has the cells in their order, whoever planned them and whenever: equal plans give
 equal bytes.
@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import chain, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,35 +20,39 @@ from hovi.errors import StudyError
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.parameters import Parameter, parameters_of
 from hovi.study.storage.index import Index
-from hovi.study.storage.samples import Samples
+from hovi.study.storage.journal import Stored
+from hovi.study.storage.samples import HEAD_BYTES, SampleFormat, Samples
+from hovi.study.storage.zarr_samples import SampledPlan, widest, write_zarr
 from hovi.system.files import names_file, reason, whole_file
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-PLANS, RUNS, SAMPLES = "plans.parquet", "runs.parquet", "samples.parquet"
+PLANS, RUNS = "plans.parquet", "runs.parquet"
+SAMPLES: dict[SampleFormat, str] = {"parquet": "samples.parquet", "zarr": "samples.zarr.zip"}
 ROWS = 5_000
 """Rows of a row group of plans.parquet and runs.parquet, which are in memory at once."""
-SAMPLED_PLANS = 500
-"""Plans whose samples are a row group."""
+SAMPLED_PLANS, SAMPLED_ROWS = 500, 50_000
+"""Plans and samples that are a row group or a chunk, whichever are fewer."""
 Keys = npt.NDArray[np.bytes_]
 Row = dict[str, Any]
 Item = TypeVar("Item")
 
 
-def write_tables(folder: Path, cells: Cells, keys: Keys, index: Index, samples: int) -> None:
-    """Write the tables, each as a whole.
+def write_tables(
+    folder: Path, cells: Cells, keys: Keys, index: Index, sample_format: SampleFormat
+) -> None:
+    """Write the tables, each as a whole; the samples only if the index is of plans with samples.
 
-    keys: of the cells, empty where they are not known yet. samples: of each motion, 0 for none.
+    keys: of the cells, empty where they are not known yet.
     Raises StudyError if they cannot be written.
     """
     for number in np.flatnonzero(keys == b""):
         keys[number] = cells.key(int(number)).encode()
     _write(folder / PLANS, plan_schema(cells), _batches(_plan_rows(cells, keys, index), ROWS))
     _write(folder / RUNS, _run_schema(), _batches(_run_rows(index), ROWS))
-    if samples:
-        plans = _batches(_sample_rows(folder, keys, index), SAMPLED_PLANS)
-        _write(folder / SAMPLES, _sample_schema(), (list(chain(*each)) for each in plans))
+    if index.samples:
+        _write_samples(folder, keys, index, sample_format)
 
 
 def read_table(path: Path) -> pa.Table:
@@ -116,13 +121,7 @@ def _plan_rows(cells: Cells, keys: Keys, index: Index) -> Iterator[Row]:
         row = done.row.to_dict()
         row["motion_duration"] = row.pop("duration")
         row["motion_intervals"] = row.pop("intervals")
-        parent = cells.parent(number)
-        own = {
-            "cell": number,
-            "key": key.decode(),
-            "parent": None if parent is None else keys[parent].decode(),
-            "scene": cells.template.hash,
-        }
+        own = {"cell": number, "key": key.decode(), "scene": cells.template.hash}
         yield row | own | _parameters(cells, number, parameters)
 
 
@@ -172,17 +171,39 @@ def _sample_schema() -> pa.Schema:
     )
 
 
-def _sample_rows(folder: Path, keys: Keys, index: Index) -> Iterator[list[Row]]:
-    """Of each minimum, a row for each time."""
-    names = ("t", "q", "v", "a", "tau")
+def _write_samples(folder: Path, keys: Keys, index: Index, sample_format: SampleFormat) -> None:
+    size = max(1, min(SAMPLED_PLANS, SAMPLED_ROWS // index.samples))
+    path, groups = folder / SAMPLES[sample_format], _batches(_sampled(folder, keys, index), size)
+    if sample_format == "parquet":
+        rows = (list(chain(*map(_sample_rows, group))) for group in groups)
+        _write(path, _sample_schema(), rows)
+        return
+    heads = (replace(each, length=HEAD_BYTES) for _, _, each in _places(keys, index))
+    shape = widest(Samples.shape_of(head.read(folder)) for head in heads)
+    with _writing(path) as stream:
+        write_zarr(stream, groups, shape, index.samples, size)
+
+
+def _places(keys: Keys, index: Index) -> Iterator[tuple[int, str, Stored]]:
+    """The cell and the key of each minimum, and where its samples are."""
     for number, key in enumerate(keys):
         done = index.done(key.decode())
-        if done is None or done.samples is None or not done.row.success:
-            continue
-        sampled = Samples.from_bytes(done.samples.read(folder))
-        columns = [x.tolist() for x in (sampled.t, sampled.q, sampled.v, sampled.a, sampled.tau)]
-        own = {"cell": number, "key": key.decode()}
-        yield [own | dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+        if done is not None and done.samples is not None and done.row.success:
+            yield number, key.decode(), done.samples
+
+
+def _sampled(folder: Path, keys: Keys, index: Index) -> Iterator[SampledPlan]:
+    for number, key, stored in _places(keys, index):
+        yield SampledPlan(number, key, Samples.from_bytes(stored.read(folder)))
+
+
+def _sample_rows(plan: SampledPlan) -> Iterator[Row]:
+    """A row for each time."""
+    names = ("t", "q", "v", "a", "tau")
+    columns = [getattr(plan.samples, name).tolist() for name in names]
+    own = {"cell": plan.cell, "key": plan.key}
+    for row in zip(*columns, strict=True):
+        yield own | dict(zip(names, row, strict=True))
 
 
 def _write(path: Path, schema: pa.Schema, groups: Iterator[list[Row]]) -> None:
@@ -198,9 +219,16 @@ def _write(path: Path, schema: pa.Schema, groups: Iterator[list[Row]]) -> None:
 def _table_writer(path: Path, schema: pa.Schema) -> Iterator[Any]:
     import pyarrow.parquet as pq
 
+    with _writing(path) as stream, pq.ParquetWriter(stream, schema, compression="zstd") as to:
+        yield to
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[BinaryIO]:
+    """A file that is written whole. Raises StudyError."""
     try:
-        with whole_file(path) as stream, pq.ParquetWriter(stream, schema, compression="zstd") as to:
-            yield to
+        with whole_file(path) as stream:
+            yield stream
     except OSError as refused:
         raise StudyError(
             f"{path} cannot be written: {reason(refused)}; make room and start the study again."
