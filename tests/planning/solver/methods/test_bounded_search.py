@@ -1,19 +1,24 @@
-"""The scale of a barrier: the objective spread over the duration of a motion."""
+"""Solves within limits: the scale of a barrier, and conditions at nodes."""
 
 from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.state import State
+from hovi.effects import Gravity
+from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
 from hovi.planning.solver.methods.bounded_search import mean_density
-from hovi.planning.solver.solver import guess_path
+from hovi.planning.solver.solver import guess_path, solve_on_grid
+from hovi.planning.solver.status import Status
+from hovi.robot.loading import load_robot
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
 from samples.paper_arm import HANG, REACH_Q
@@ -33,3 +38,22 @@ def test_a_barrier_begins_at_the_mean_of_the_cost_over_time_whatever_its_sign(
         signed = dataclasses.replace(outputs, value=sign * outputs.value)
         mean = outputs.value / T
         assert mean_density(signed, objective.bounds.measure) == pytest.approx(mean, rel=1e-12)
+
+
+def test_a_goal_for_a_frame_takes_hardly_more_steps_than_one_for_joints() -> None:
+    """The steps meet the conditions themselves, instead of rounds with their multipliers."""
+    robot = load_robot("ur5")
+    scene = Scene(robot, [Gravity()])
+    start, end = State([0.0, -1.2, 1.0, 0.2, 0.4, 0.0]), [0.9, -0.8, 0.7, 0.1, 0.6, 0.3]
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.5, 12, galerkin(2, 2, 8)))
+    limits = as_limits(robot, "urdf")
+    to_joints = solve_on_grid(TrajectoryProblem(ld, start, State(end), limits), "cubic")
+    position = robot.frame_pose("tool0", np.array(end))[:3, 3]
+    goal = FrameGoal("tool0", position=position, guess=end)
+    problem = TrajectoryProblem(ld, start, goal, limits)
+    to_frame = solve_on_grid(problem, "cubic")
+    assert (to_joints.status, to_frame.status) == (Status.MINIMUM, Status.MINIMUM)
+    assert to_frame.cost < to_joints.cost
+    assert to_frame.nit <= to_joints.nit + 25
+    reached = robot.frame_pose("tool0", to_frame.trajectory.q[-1])[:3, 3]
+    assert abs(reached - position).max() < 1e-10
