@@ -34,6 +34,7 @@ from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.margins import Margins, margins_of
+from hovi.planning.solver.outcome.solution_summary import SolutionSummary
 from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.receding.ends import (
     as_goal,
@@ -60,8 +61,8 @@ STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(SolutionSummary):
     """The solution of a trajectory problem, or the best motion found.
 
     success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
