@@ -143,8 +143,11 @@ def test_the_replay_plays_in_the_converted_tutorial(converted: Path, tmp_path: P
         frame = "document.querySelector('iframe[srcdoc]')"
         tab.until(f"{frame} !== null")
         tab.value(f"{frame}.scrollIntoView({{block: 'center'}})")
-        tab.until(f"{frame}.contentWindow.eval('typeof viewer') == 'object'")
-        pictures = [tab.screenshot(tmp_path / f"{k}.png") for k in range(6)]
-        moved = [(np.abs(each - pictures[0]) > 30).sum() for each in pictures]
-        assert max(moved) > 500
+        inside = f"{frame}.contentWindow.eval"
+        tab.until(f"{inside}('typeof controls') == 'object'")
+        pictures = []
+        for number, t in enumerate((0.0, 0.7)):
+            tab.value(f"{inside}('controls.seek({t}); viewer.render(); 1')")
+            pictures.append(tab.screenshot(tmp_path / f"{number}.png"))
+        assert (np.abs(pictures[1] - pictures[0]) > 30).sum() > 500
         assert not [url for url in tab.requests if "127.0.0.1" in url]
