@@ -17,7 +17,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import hovi
-from hovi.errors import DisplayError
+from hovi.errors import DisplayError, InputError
 from oracles.headless_browser import CHROMIUM, headless_browser
 
 TUTORIAL = Path(__file__).resolve().parents[2] / "docs" / "tutorial.ipynb"
@@ -99,6 +99,9 @@ def test_motions_of_other_joints_are_not_compared(
 ) -> None:
     with pytest.raises(DisplayError, match="same robot"):
         hovi.plot(solution, compare=[reach])
+    for wrong in (5, ["motion.npz"]):
+        with pytest.raises(InputError):
+            hovi.plot(solution, compare=wrong)  # type: ignore[arg-type]
 
 
 def test_an_embedded_page_is_the_offline_page(reach: hovi.Solution, tmp_path: Path) -> None:

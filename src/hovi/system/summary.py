@@ -6,7 +6,7 @@ import html
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-LONGEST = 96
+LONGEST = 120
 """Length to which texts are cut, in characters."""
 
 

@@ -31,7 +31,7 @@ from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
-from hovi.viewing.curves.joint_panels import joint_figure
+from hovi.viewing.curves.joint_panels import compared, joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
@@ -93,10 +93,7 @@ def plot(
     compare: others of the same joints. Each joint has its panels then, with limits dashed.
     Raises DisplayError.
     """
-    both = (trajectory, *compare)
-    motions = [each.trajectory if isinstance(each, Solution) else each for each in both]
-    for each in motions:
-        expect(each, Trajectory, "the trajectory of a solution")
+    motions = compared(trajectory, compare)
     if len(motions) == 1:
         figure = motion_figure(motions[0])
     else:

@@ -167,7 +167,7 @@ class Solution(SolutionSummary):
             TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
             equations to 1e-6; if there is none, this motion as it is, and the message says what it
             misses.
-        options: as for `solve`.
+        options: as for `solve`. Self-collision that was left out is not looked for, as `plan` does.
         Raises InputError if this solution has no problem, UnreachableError for a start at a frame
         that no configuration meets.
         """

@@ -9,8 +9,9 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hovi.discrete.trajectory import Trajectory
-from hovi.errors import DisplayError
+from hovi.errors import DisplayError, InputError, expect
 from hovi.planning.problem.limits import KINDS, Limits
+from hovi.planning.solver.solver import Solution
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import unwrapped
 
@@ -24,6 +25,20 @@ _COLUMNS = (
     ("v", ("velocity [rad/s]", "velocity [m/s]")),
     ("tau", ("torque [N m]", "force [N]")),
 )
+
+
+def compared(
+    motion: Trajectory | Solution, others: Sequence[Trajectory | Solution]
+) -> list[Trajectory]:
+    """The motions to plot. Raises InputError."""
+    if isinstance(others, Trajectory | Solution):
+        others = (others,)
+    if not isinstance(others, Sequence):
+        raise InputError(f"compare must be a list of motions, got {type(others).__name__}.")
+    given = [each.trajectory if isinstance(each, Solution) else each for each in (motion, *others)]
+    for each in given:
+        expect(each, Trajectory, "the trajectory of a solution")
+    return given
 
 
 def joint_figure(
