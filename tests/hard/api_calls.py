@@ -845,7 +845,7 @@ def _files() -> list[Call]:
         own(trajectory, "to_joint_trajectory", folder() / "all.json", 50.0, efforts=True),
         own(trajectory, "to_mcap", folder() / "all.mcap", 50.0),
         own(trajectory, "to_mujoco", folder() / "all.xml", 50.0),
-        call(hovi.plot, trajectory, folder() / "motion.svg"),
+        call(hovi.plot, trajectory, folder() / "motion.svg", compare=[trajectory]),
         call(
             hovi.replay,
             trajectory,

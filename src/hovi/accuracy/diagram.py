@@ -10,10 +10,11 @@ from hovi.accuracy.measures import MEASURES, shown_sizes, size
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
 from hovi.accuracy.tolerance_method import Choice
+from hovi.system.summary import Summarized, Summary
 
 
-@dataclass(frozen=True, eq=False)
-class Diagram:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagram(Summarized):
     """Runs of several methods on one scene, from one guess, on one machine.
 
     scene: its name. guess: "near" or "cubic". resolved: the motion that errors refer to.
@@ -37,6 +38,14 @@ class Diagram:
     complete: bool = True
     seconds: float = 0.0
     clock: str = "wall"
+
+    def _summary(self) -> Summary:
+        counts = {method: len(self.of(method)) for method in self.methods}
+        rows = [("guess", self.guess)]
+        rows += [(name, f"{count} runs") for name, count in list(counts.items())[:5]]
+        more = f" of {len(counts)} methods" if len(counts) > 5 else ""
+        took = f"{len(self.runs)} runs{more}, {self.seconds:.3g} s"
+        return Summary(f"Diagram of {self.scene!r}: {took}", tuple(rows))
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.schemes import Scheme, galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
+from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]
 
@@ -24,8 +25,8 @@ MIN_STEP, MAX_STEP = 1e-12, 1e9
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class Grid:
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Summarized):
     """Intervals of time, each with its own length and scheme.
 
     steps: lengths of the intervals, shape (N,), in [s].
@@ -137,6 +138,15 @@ class Grid:
         """T, in [s]."""
         return float(self.t[-1])
 
+    def _summary(self) -> Summary:
+        return Summary(f"Grid: {self.duration:g} s, {self.in_words}")
+
+    @property
+    def in_words(self) -> str:
+        """The number of intervals, and the schemes."""
+        names = ", ".join(dict.fromkeys(scheme.name for scheme, _ in self.groups))
+        return f"{self.intervals} {'interval' if self.intervals == 1 else 'intervals'} of {names}"
+
     @unchecked
     def require_path(self, path: DiscretePath, nq: int, nv: int) -> None:
         """Raise InputError unless a path has the order, intervals and inner modes of this grid.
@@ -235,8 +245,8 @@ def _groups(schemes: tuple[Scheme, ...]) -> tuple[tuple[Scheme, npt.NDArray[np.i
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class DiscretePath:
+@dataclass(frozen=True, eq=False, repr=False)
+class DiscretePath(Summarized):
     """The coordinates of a discrete motion on a grid, for a Lagrangian of order k.
 
     The regularized coordinates, for k = 2 z0 = (q1 - q0 - h v0)/h^2 and z1 = (v1 - v0)/h, are
@@ -264,6 +274,10 @@ class DiscretePath:
             array = getattr(self, name)
             if not array.flags.c_contiguous:
                 object.__setattr__(self, name, np.ascontiguousarray(array))
+
+    def _summary(self) -> Summary:
+        (nodes, nq), nv = self.q.shape, self.v.shape[1]
+        return Summary(f"DiscretePath: {nodes} nodes, nq = {nq}, nv = {nv}, order {self.order}")
 
     @property
     def order(self) -> int:

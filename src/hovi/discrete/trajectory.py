@@ -22,6 +22,7 @@ from hovi.discrete.node_continuity import require_continuous
 from hovi.discrete.output.export_methods import ExportMethods
 from hovi.discrete.output.interpolant import interpolant_rows
 from hovi.discrete.output.path_sampler import PathSampler
+from hovi.discrete.output.trajectory_summary import TrajectorySummary
 from hovi.discrete.stored_torque import StoredTorque
 from hovi.discrete.trajectory_file import (
     digest,
@@ -64,8 +65,8 @@ class Sample(NamedTuple):
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class Trajectory(ExportMethods):
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(ExportMethods, TrajectorySummary):
     """A motion of a scene's robot on a grid, with its costates.
 
     grid: the intervals, each with its step and scheme.

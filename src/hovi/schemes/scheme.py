@@ -16,13 +16,14 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.schemes.interval_curve import jet_rows, require_positions
 from hovi.schemes.polynomials import interval_rows, legendre
+from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class Scheme:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scheme(Summarized):
     """The discrete Lagrangian L_d = h sum_j w_j L(q_j, v_j, a_j) as numbers.
 
     In scaled variables the j-th point is (q_j - q0, h v_j, h^2 a_j) = table[j] @ (h v0, Z0, Z1, c),
@@ -41,6 +42,11 @@ class Scheme:
     points: Array
     weights: Array
     table: Array
+
+    def _summary(self) -> Summary:
+        kind = f"order {self.order}" if self.order else "no order"
+        points = f"{len(self.points)} points, {self.inner_modes} inner modes"
+        return Summary(f"Scheme {self.name!r}: {kind}, {points}")
 
     @property
     def inner_modes(self) -> int:

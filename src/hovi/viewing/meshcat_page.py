@@ -8,6 +8,7 @@ written without a server, or served by `meshcat_server` on the loopback interfac
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import importlib.util
 import json
@@ -41,6 +42,23 @@ _PLAY = """for (const message of {messages}) {{
     viewer.handle_command_bytearray(Uint8Array.from(atob(message), c => c.charCodeAt(0)));
 }}
 viewer.animator.mixer.timeScale = {speed};"""
+
+
+_UNPACK = """<!DOCTYPE html><meta charset="utf-8"><script>
+const packed = Uint8Array.from(atob("{packed}"), c => c.charCodeAt(0));
+const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+new Response(stream).text().then(text => {{
+    document.open(); document.write(text); document.close();
+}});
+</script>"""
+
+
+def packed(page: str) -> str:
+    """A page that unpacks another one, which is compressed: robots are mostly their meshes."""
+    # No time in it: the same page gives the same bytes.
+    return _UNPACK.format(
+        packed=base64.b64encode(gzip.compress(page.encode(), 9, mtime=0)).decode()
+    )
 
 
 class Command(Protocol):

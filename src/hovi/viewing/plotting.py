@@ -28,9 +28,12 @@ from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import DisplayError, expect
 from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS, Limits
+from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.viewing.curves.joint_panels import compared, joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
+from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 from hovi.viewing.distance_panel import draw_distances
 from hovi.viewing.figures import align_zeros, write_figure
@@ -76,14 +79,29 @@ _VELOCITY = _Panel(KINDS.index("v"), ("velocity [deg/s]", np.degrees(1.0)), ("ve
 _EFFORT = _Panel(KINDS.index("tau"), ("torque [N m]", 1.0), ("force [N]", 1.0))
 
 
-@check_arguments_except("trajectory")
-def plot(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
-    """Write `motion_figure` to a file.
+@check_arguments_except("trajectory", "compare")
+def plot(
+    trajectory: Trajectory | Solution,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    compare: Sequence[Trajectory | Solution] = (),
+) -> Figure:
+    """The curves of a motion: positions, velocities and efforts over time, and its limits.
 
-    path: a PNG, PDF or SVG by its suffix; it is written completely or not at all. Raises
-        DisplayError.
+    trajectory: a motion, or a solution. Notebooks show the figure that is returned.
+    path: a PNG, PDF or SVG by its suffix to write, completely or not at all; None for no file.
+    compare: others of the same joints. Each joint has its panels then, with limits dashed.
+    Raises DisplayError.
     """
-    write_figure(motion_figure(trajectory), path)
+    motions = compared(trajectory, compare)
+    if len(motions) == 1:
+        figure = motion_figure(motions[0])
+    else:
+        labels = [f"{k + 1}: {each.duration:g} s" for k, each in enumerate(motions)]
+        figure = joint_figure(motions, labels, [imposed_limits(each) for each in motions])
+    if path is not None:
+        write_figure(figure, path)
+    return figure
 
 
 def plot_angles(trajectory: Trajectory, path: str | os.PathLike[str]) -> None:
@@ -110,7 +128,7 @@ def motion_figure(trajectory: Trajectory) -> Figure:
     expect(trajectory, Trajectory, "the trajectory of a solution")
     curve, kept = _sampled_motion(trajectory), kept_distances(trajectory)
     panels = 3 if kept is None else 4
-    figure = Figure(figsize=(8.0, 2.5 * panels), layout="constrained")
+    figure = ShownFigure(figsize=(8.0, 2.5 * panels), layout="constrained")
     axes = figure.subplots(panels, sharex=True)
     q = _coordinates(trajectory, curve.motion.q)
     values = (q, curve.motion.v, curve.motion.tau)

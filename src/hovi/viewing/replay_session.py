@@ -24,7 +24,7 @@ from hovi.system.terminal import has_browser, terminal_script, wait_at_exit, wai
 from hovi.viewing.animation import animation_of, frame_times
 from hovi.viewing.drawing import drawn, ghost_color
 from hovi.viewing.highlights import AT_LIMIT_NOTE, Highlights
-from hovi.viewing.meshcat_page import Page
+from hovi.viewing.meshcat_page import Page, packed
 from hovi.viewing.meshcat_server import ServedPage
 from hovi.viewing.panel.panel import Curves, Panel, View, joints_of, labels_of, names_of
 from hovi.viewing.recorded_limits import MovingObjects, imposed_limits
@@ -51,6 +51,7 @@ class Replay:
     page: the page's content; a ServedPage when it is served at `url`.
     highlights: links highlighted at limits; None where no joint is ever at a limit.
     ghosts: the motions that are compared with it, and what draws them.
+    speed: motion seconds per second, at first.
     """
 
     trajectory: Trajectory
@@ -59,6 +60,7 @@ class Replay:
     page: Page
     highlights: Highlights | None = None
     ghosts: tuple[tuple[Trajectory, MeshcatVisualizer], ...] = ()
+    speed: float = 1.0
 
     def play(self, *, speed: float = 1.0, loop: bool = False, rate: float = _FRAME_RATE) -> None:
         """Move the robot on the page in real time from here, by the monotonic clock.
@@ -109,12 +111,12 @@ class Replay:
             self.page.send(meshcat.commands.SetProperty("time", t, meshcat.path.Path(("hovi",))))
 
     def _repr_html_(self) -> str:
-        """An iframe: of the address when the page is served, of the page itself otherwise."""
-        if isinstance(self.page, ServedPage):
-            source = f'src="{self.url}"'
-        else:
-            source = f'srcdoc="{html_text.escape(self.page.offline_html())}"'
-        return f'<iframe {source} style="width:100%;height:480px;border:none"></iframe>'
+        """An iframe with the page itself, which plays wherever the notebook goes.
+
+        It does not need the server, which a browser on another machine cannot reach.
+        """
+        page = html_text.escape(packed(self.page.offline_html(self.speed)))
+        return f'<iframe srcdoc="{page}" style="width:100%;height:600px;border:none"></iframe>'
 
     def __enter__(self) -> Self:
         """The replay, closed at the end of the block."""
@@ -254,7 +256,7 @@ def _fill(
     page.panel = _panel(trajectory, robot, compare, scene.view, speed, trace)
     motions = ((trajectory, scene.visualizer), *scene.ghosts)
     page.keep(animation_of(motions, loop, scene.tracks))
-    return Replay(trajectory, scene.visualizer, page.web_url, page, highlights, scene.ghosts)
+    return Replay(trajectory, scene.visualizer, page.web_url, page, highlights, scene.ghosts, speed)
 
 
 def _panel(

@@ -16,6 +16,7 @@ from hovi.checks.shapes import numbers_of, require_shape
 from hovi.errors import InputError, nearest, warn
 from hovi.planning.problem.arms.limit_set import KIND_NAMES, OF_ORDER_3, is_limit_set, limit_set
 from hovi.planning.problem.arms.limit_set import NAMES as ARMS
+from hovi.planning.problem.notation.summaries import LimitsSummary
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees, speeds_in_degrees
 from hovi.robot.space.coordinates import Coordinates
@@ -36,8 +37,8 @@ TOLERANCE = 1e-6
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class Limits:
+@dataclass(frozen=True, eq=False, repr=False)
+class Limits(LimitsSummary):
     """lower <= (q, v, a, tau, jerk, d tau / dt) <= upper; infinite where there is no limit.
 
     lower, upper: shape (6, nv), one row per kind, in [rad], [rad/s], [rad/s^2], [N m], [rad/s^3]

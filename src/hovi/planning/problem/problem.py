@@ -29,6 +29,7 @@ from hovi.planning.problem.goals import Via, goal_state
 from hovi.planning.problem.hessian_structure import ActionStructure
 from hovi.planning.problem.limits import Limits, no_limits
 from hovi.planning.problem.node_conditions import NodeCondition
+from hovi.planning.problem.notation.summaries import ProblemSummary
 from hovi.planning.problem.seams import Hold, ViaPoints, curve_through, holding
 from hovi.planning.problem.torque_moments import TorqueMoments
 from hovi.robot.mass_matrix import MassMatrix
@@ -51,8 +52,8 @@ nearly the same error, which their difference would not show."""
 
 
 @check_arguments
-@dataclass(frozen=True, eq=False)
-class TrajectoryProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrajectoryProblem(ProblemSummary):
     """Make the discrete action stationary between two given states.
 
     The discrete Euler-Lagrange equations D1 L_d(k) + D3 L_d(k-1) = 0 and
@@ -69,8 +70,7 @@ class TrajectoryProblem:
         (2, k, nv).
     conditions: equations at nodes. holds: what is fixed where segments meet.
     unreachable: why the goal cannot be met, or "".
-    turns: full turns of the initial guess beyond the shortest path, as rotation vectors over 2 pi,
-        shape (nv,).
+    turns: full turns of the guess beyond the shortest path, rotation vectors over 2 pi, (nv,).
     Raises InputError, ModelError or SchemeError if the input defines no problem.
     """
 

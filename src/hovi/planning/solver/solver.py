@@ -34,6 +34,7 @@ from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
 from hovi.planning.solver.outcome.margins import Margins, margins_of
+from hovi.planning.solver.outcome.solution_summary import SolutionSummary
 from hovi.planning.solver.outcome.violation import violation_of
 from hovi.planning.solver.receding.ends import (
     as_goal,
@@ -60,8 +61,8 @@ STATIONARY_DECREASE = 1e-9
 """Predicted relative decrease of a Newton step below which a motion counts as stationary."""
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(SolutionSummary):
     """The solution of a trajectory problem, or the best motion found.
 
     success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
@@ -166,7 +167,7 @@ class Solution:
             TIME_LIMIT, and the motion the best one that meets the ends, the limits and the
             equations to 1e-6; if there is none, this motion as it is, and the message says what it
             misses.
-        options: as for `solve`.
+        options: as for `solve`. Self-collision that was left out is not looked for, as `plan` does.
         Raises InputError if this solution has no problem, UnreachableError for a start at a frame
         that no configuration meets.
         """

@@ -1,0 +1,41 @@
+"""What a terminal or a notebook shows of a motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from hovi.system.summary import Summarized, Summary
+
+if TYPE_CHECKING:
+    from hovi.robot.robot import Robot
+
+DIGITS = 6
+"""Significant digits of numbers."""
+
+
+class TrajectorySummary(Summarized):
+    """A motion: robot, duration, grid and what is recorded of its solution."""
+
+    grid: Any
+    metadata: Mapping[str, Any]
+
+    @property
+    def robot(self) -> Robot | None:
+        """The robot; None without one."""
+        raise NotImplementedError
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """One name per velocity."""
+        raise NotImplementedError
+
+    def _summary(self) -> Summary:
+        name = "a robot" if self.robot is None else repr(self.robot.name)
+        rows = [("grid", self.grid.in_words), ("joints", ", ".join(self.coordinate_names))]
+        for key in ("status", "cost"):
+            value = self.metadata.get(key)
+            if value is not None:
+                shown = f"{value:.{DIGITS}g}" if isinstance(value, float) else str(value)
+                rows.append((key, shown))
+        return Summary(f"Trajectory of {name}, {self.grid.duration:g} s", tuple(rows))
