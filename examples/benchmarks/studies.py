@@ -3,7 +3,8 @@
     python studies.py throughput [COUNT]   # UR5 reaches: single plans, one worker, two workers
     python studies.py killed [COUNT]       # ended ten times at random, against an undisturbed run
     python studies.py cluster [COUNT]      # two-link reaches on a local Dask cluster, peak memory
-    python studies.py warm [SIDE] [ROBOT]  # a grid of goals of a ur5 or panda, from neighbours' motions
+    python studies.py restarted [COUNT]    # the same, with a scheduler that is killed in the middle
+    python studies.py warm [SIDE] [ROBOT]  # a grid of goals (ur5, panda), from neighbours' motions
     python studies.py cost [COUNT]         # what a plan costs beside its own time, for the docs
 
 Processor time is that of all processes together; wall time depends on what else the machine does.
@@ -12,6 +13,7 @@ Processor time is that of all processes together; wall time depends on what else
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import resource
 import signal
@@ -30,6 +32,7 @@ from measuring import print_machine, print_table
 
 from hovi.planning.task_file.scene_cache import SceneCache
 from hovi.planning.task_file.task_plan import plan_task
+from hovi.study.running.progress import StudyProgress
 from hovi.study.study import Study
 from hovi.workers.pool import end_idle_workers
 
@@ -204,6 +207,62 @@ def cluster(count: int) -> None:
     print_table([f"{count:,} two-link reaches on Dask", ""], rows)
 
 
+def restarted(count: int) -> None:
+    """Two-link reaches on 2 Dask workers, whose scheduler is killed and started again halfway."""
+    folder, peak, crew = Path(tempfile.mkdtemp()), {}, {}
+    about = folder / "scheduler.json"
+
+    def start(name: str, *arguments: str) -> None:
+        command = [sys.executable, "-m", "dask", *arguments, "--no-dashboard"]
+        output = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        crew[name] = subprocess.Popen(command, cwd=folder, **output)
+
+    def start_all(port: int) -> str:
+        about.unlink(missing_ok=True)
+        start("scheduler", "scheduler", "--host", f"127.0.0.1:{port}", "--scheduler-file", about)
+        while not (about.exists() and about.read_text().endswith("}")):
+            time.sleep(0.1)
+        address = json.loads(about.read_text())["address"]
+        for name in ("worker 1", "worker 2"):
+            start(name, "worker", address, "--nthreads", "1")
+        return address
+
+    def watch(state: StudyProgress) -> None:
+        for name, pid in [("parent", os.getpid()), *((n, c.pid) for n, c in crew.items())]:
+            used = max(map(memory_of, [pid, *descendants(pid)] if name != "parent" else [pid]))
+            peak[name.split()[0]] = max(peak.get(name.split()[0], 0.0), used)
+        if state.done >= count // 2 and not killed:
+            killed.append(state.done)
+            crew["scheduler"].kill()
+            crew["scheduler"].wait()
+            start_all(int(address.rpartition(":")[2]))
+
+    killed: list[int] = []
+    address, own = start_all(0), time.process_time()
+    wall = time.perf_counter()
+    study = two_link_reaches(count)
+    report = study.run(folder / "out", 2, scheduler=address, progress=watch)
+    wall, own = time.perf_counter() - wall, time.process_time() - own
+    for each in crew.values():
+        each.terminate()
+    runs, plans = Study.load_runs(folder / "out"), Study.load(folder / "out")
+    rows = [
+        ["plans that were done when the scheduler was killed", f"{killed[0]:,}"],
+        ["plans done", f"{report.done:,}"],
+        ["rows of plans.parquet, cells that occur twice", f"{len(plans):,}, "],
+        ["plans that were computed twice", str(int(runs["key"].duplicated().sum()))],
+        ["wall time [s]; processor time:", f"{wall:.0f}"],
+        [
+            "of a plan in its worker [ms]",
+            f"{1e3 * runs['processor_seconds'].mean():.2f}",
+        ],
+        ["of the parent per plan [ms]", f"{1e3 * own / count:.2f}"],
+        *([f"peak memory of the {name} [MB]", f"{most:.0f}"] for name, most in peak.items()),
+    ]
+    rows[2][1] += str(int(plans["cell"].duplicated().sum()))
+    print_table([f"{count:,} two-link reaches on Dask, scheduler restarted", ""], rows)
+
+
 def descendants(pid: int) -> list[int]:
     try:
         own = [int(each) for each in children_of(pid)]
@@ -285,6 +344,7 @@ def main() -> None:
         "throughput": (throughput, 1000),
         "killed": (killed, 300),
         "cluster": (cluster, 100_000),
+        "restarted": (restarted, 100_000),
         "warm": (warm, 30),
         "cost": (cost, 2000),
     }

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
+import gc
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,60 +11,11 @@ import pytest
 
 from hovi.workers.lost import Lost
 from hovi.workers.source import Listed, Source, Taken
-from oracles.processes import children, is_running, wait_until
+from oracles.dask_cluster import Cluster
 
 pytest.importorskip("distributed")
 
 from hovi.workers.cluster import PER_WORKER, ClusterError, results_in_cluster
-
-PORT_FILE = "scheduler.json"
-QUIET = {"DASK_LOGGING__DISTRIBUTED": "critical", "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "20"}
-
-
-class Cluster:
-    """A scheduler and workers as processes of their own. threads: of both workers together."""
-
-    threads = 2
-
-    def __init__(self, folder: Path) -> None:
-        self.folder, self.started = folder, list[subprocess.Popen[bytes]]()
-        self.scheduler = self.start_scheduler(0)
-        for _ in range(self.threads):
-            self.start("worker", self.address, "--nthreads", "1", "--no-dashboard")
-
-    def start(self, *arguments: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", *arguments]
-        process = subprocess.Popen(
-            command,
-            cwd=self.folder,
-            env=os.environ | QUIET,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        self.started.append(process)
-        return process
-
-    def start_scheduler(self, port: int) -> subprocess.Popen[bytes]:
-        about = self.folder / PORT_FILE
-        about.unlink(missing_ok=True)
-        process = self.start(
-            "scheduler", "--host", f"127.0.0.1:{port}", "--no-dashboard", "--scheduler-file", about
-        )
-        wait_until(lambda: about.exists() and about.read_text().endswith("}"))
-        import json
-
-        self.address = json.loads(about.read_text())["address"]
-        return process
-
-    def end(self) -> None:
-        everyone = [pid for process in self.started for pid in children(process.pid)]
-        for process in self.started:
-            process.kill()
-        for pid in everyone:
-            if is_running(pid):
-                os.kill(pid, signal.SIGKILL)
-        for process in self.started:
-            process.wait()
 
 
 @pytest.fixture(scope="module")
@@ -153,10 +101,10 @@ def test_an_exception_of_the_work_is_raised_here(cluster: Cluster) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of its sockets
 def test_a_scheduler_that_is_started_again_gets_its_items_once_more(tmp_path: Path) -> None:
     own = Cluster(tmp_path)
     try:
-        port = int(own.address.rpartition(":")[2])
 
         def work(i: int, left: float | None) -> int:
             import time
@@ -169,14 +117,11 @@ def test_a_scheduler_that_is_started_again_gets_its_items_once_more(tmp_path: Pa
             assert number not in found
             found[number] = result
             if len(found) == 8:
-                own.scheduler.kill()
-                own.scheduler.wait()
-                own.scheduler = own.start_scheduler(port)
-                for _ in range(2):
-                    own.start("worker", own.address, "--nthreads", "1", "--no-dashboard")
+                own.start_again()
         assert found == {i: i for i in range(20)}
     finally:
         own.end()
+        gc.collect()  # of connections that the scheduler broke
 
 
 def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ class _Crew(Generic[Item, Result]):
             self.client.close(timeout=2)
         self.client, self.sent = self._connected(), {}
         for number, item in sent:
-            self._submit(number, item)
+            self._submit(number, self.source.again(number, item))
 
     def _result(self, future: Future) -> Any:
         error = future.exception() if future.status == "error" else None

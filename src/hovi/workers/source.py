@@ -29,6 +29,13 @@ class Source(ABC, Generic[Item]):
     def may_give_more(self) -> bool:
         """Whether there is an item now, or may be one after the loss of an item."""
 
+    def again(self, number: int, content: Item) -> Item:
+        """What is left to do of an item that is sent again, as it is unknown what became of it.
+
+        number: of the item, in the order of `take`.
+        """
+        return content
+
 
 class Listed(Source[Item]):
     """The items of a sequence."""

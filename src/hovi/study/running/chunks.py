@@ -33,6 +33,7 @@ class Chunks(Source[Chunk]):
     not done is the one that it was planning, and only that one counts as an attempt.
     index: what is done. output: what is stored of each motion. workers: their number.
     given_up: cells whose workers died too often, and why.
+    without_receipt: how many cells of chunks that were sent again had been done.
     """
 
     cells: Cells
@@ -40,6 +41,7 @@ class Chunks(Source[Chunk]):
     output: Output
     workers: int
     given_up: list[tuple[CellJob, str]] = field(default_factory=list)
+    without_receipt: int = 0
     _flying: dict[int, Chunk] = field(default_factory=dict)
     _taken: int = 0
     _seconds: float | None = None
@@ -71,10 +73,22 @@ class Chunks(Source[Chunk]):
     def finished(self, number: int, receipts: list[Receipt]) -> None:
         """A chunk is done. number: of the chunk, in the order of `take`."""
         chunk = self._flying.pop(number)
-        mean = sum(each.seconds for each in receipts) / max(len(receipts), 1)
-        self._seconds = mean if self._seconds is None else 0.7 * self._seconds + 0.3 * mean
+        if receipts:
+            mean = sum(each.seconds for each in receipts) / len(receipts)
+            self._seconds = mean if self._seconds is None else 0.7 * self._seconds + 0.3 * mean
         for job, receipt in zip(chunk, receipts, strict=True):
             self.job_done(job, receipt.motion if receipt.success else None)
+
+    def again(self, number: int, content: Chunk) -> Chunk:
+        """The jobs of a chunk without a row; the others are done."""
+        self.index.read_new()
+        left = tuple(job for job in content if not self.is_stored(job.key))
+        for job in content:
+            if job not in left:
+                self.without_receipt += 1
+                self.job_done(job, self.stored_motion(job.key))
+        self._flying[number] = left
+        return left
 
     def lost(self, number: int, reason: str) -> tuple[CellJob | None, list[CellJob]]:
         """The worker of a chunk died; returns the job that it was at, and those done before."""

@@ -88,6 +88,8 @@ class StudyRun:
                     self._lost(chunks, number, result.reason)
                 else:
                     chunks.finished(number, result)
+                    self.progress.take(chunks.without_receipt)
+                    chunks.without_receipt = 0
                     self._tell(result)
         while (taken := chunks.take()) is not None:  # no worker could be started
             receipts = work(taken.content)

@@ -35,7 +35,6 @@ from hovi.study.storage.samples import SampleFormat, Samples
 from hovi.system.blas_threads import one_blas_thread
 from hovi.version import __version__
 
-
 LOWER = 1e-6
 """Share by which a minimum from a plan's own guess has to cost less than one from a parent's."""
 
