@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
+import logging
 import time
 from collections.abc import Callable, Generator, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
 from distributed import Client, Future, LocalCluster, wait
@@ -53,10 +54,23 @@ def results_in_cluster(
     Raises ClusterError, and what `work` raises.
     """
     if address != LOCAL:
-        yield from _Crew[Item, Result](source, work, address).results()
+        with _without_logs():
+            yield from _Crew[Item, Result](source, work, address).results()
         return
-    with _local_cluster(workers) as cluster:
+    with _without_logs(), _local_cluster(workers) as cluster:
         yield from _Crew[Item, Result](source, work, cluster.scheduler_address).results()
+
+
+@contextmanager
+def _without_logs() -> Iterator[None]:
+    """Without tracebacks of the client about a scheduler that is gone, which is waited for."""
+    logger = logging.getLogger("distributed.client")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 def _local_cluster(workers: int) -> Any:
