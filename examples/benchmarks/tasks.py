@@ -231,7 +231,7 @@ def summary(results: dict[str, dict[str, Any]], peers: dict[str, dict[str, Any]]
     text = (
         f"{len(fast)} of {len(results)} tasks end in a minimum within 10 s each, {len(minima)} "
         f"within {LIMIT:.0f} s; the median time is {np.median(times):.2f} s. "
-        f"The least clearance is {min(near, default=np.nan):.3f} of the margin."
+        f"The least clearance of a minimum is {min(near, default=np.nan):.3f} of the margin."
     )
     both = [
         (x["effort"], peers[k]["effort"])

@@ -182,7 +182,12 @@ class _Iteration(BoundedSteps[X]):
         before = outcome.outputs.value
         if step.reaction is not None:
             before += self.objective.hold(outcome.x, step.reaction)
-        outputs = self.objective.outputs(x)
+        try:
+            outputs = self.objective.outputs(x)
+        except BaseException:  # the multipliers stay those of the current point
+            if step.reaction is not None:
+                self.objective.hold(outcome.x, -step.reaction)
+            raise
         old = before + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
         new, moved = math.inf, barrier
         if np.isfinite(outputs.value):
@@ -213,6 +218,8 @@ class _Iteration(BoundedSteps[X]):
             return False
         self.objective.accept(moved_step, model)
         outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
+        if step.reaction is not None:  # by other multipliers costs cannot be compared
+            outcome.kept = None
         outcome.keep_best(self.objective.bounds)
         if self.cautious:
             self._reduce_mu(step)

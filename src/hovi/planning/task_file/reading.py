@@ -130,7 +130,7 @@ def _obstacles(
 ) -> Sequence[Obstacle]:
     if not table.obstacles and not options.clearance.wanted:
         return ()
-    from hovi.planning.task_file.obstacle_tables import read_obstacles  # 20 ms
+    from hovi.planning.task_file.obstacle_tables import read_obstacles  # most tasks have none
 
     return read_obstacles(table.obstacles, options.clearance, robot, toml)
 

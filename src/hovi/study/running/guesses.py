@@ -20,11 +20,12 @@ from hovi.discrete.trajectory_file import read_arrays, require_unchanged, scheme
 from hovi.errors import HoviError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.task_file.task import Task
+from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.study.storage.journal import Stored
 
-MOST = 256
+MAX_MOTIONS = 256
 """Motions that a worker keeps; those that were not used for the longest time are dropped."""
 _PATH = ("q", "v", "z", "inner", "higher")
 _ARRAYS = ("steps", "q", "v", "z", "inner", "momenta")
@@ -42,7 +43,7 @@ class Motions:
         """Keep a motion."""
         self._kept[stored] = motion
         self._kept.move_to_end(stored)
-        while len(self._kept) > MOST:
+        while len(self._kept) > MAX_MOTIONS:
             self._kept.popitem(last=False)
 
     def get(self, stored: Stored, scene: Scene) -> Trajectory | None:
@@ -93,7 +94,8 @@ class GuessCosts:
         """
         scene, grid, path = task.held_scene, guess.grid, guess.path
         try:
-            ends = _end(task.start, guess, 0), _end(task.goal, guess, -1)
+            robot = scene.robot
+            ends = _end(task.start, guess, 0, robot), _end(task.goal, guess, -1, robot)
             boundary = *ends[0], *ends[1]
             T = guess.duration if isinstance(task.duration, tuple) else task.duration
             if guess.duration != T:
@@ -117,9 +119,8 @@ def _are_equal(one: Grid, other: Grid) -> bool:
     return np.array_equal(one.steps, other.steps) and one.schemes == other.schemes
 
 
-def _end(end: State | FrameGoal, guess: Trajectory, node: int) -> tuple[Array, Array]:
+def _end(end: State | FrameGoal, guess: Trajectory, node: int, robot: Robot) -> tuple[Array, Array]:
     """q and v of an end of the task, of the guess where it is a frame's target."""
     if isinstance(end, State):
-        assert guess.robot is not None
-        return end.on(guess.robot, "an end")
+        return end.on(robot, "an end")
     return guess.q[node], guess.v[node]

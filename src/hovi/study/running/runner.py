@@ -66,8 +66,9 @@ class StudyRun:
             self.interrupted = True
         except StorageError as full:
             raise StudyError(
-                f"the study in {self.folder} cannot be written: {full}. {self.progress.done} of "
-                f"{self.cells.count} plans are done; make room and start it again."
+                f"the study in {self.folder} ends here: {full}. {self.progress.done} of "
+                f"{self.cells.count} plans are done; see that the folder has room and can be read, "
+                "then start it again."
             ) from None
         self.given_up = tuple(chunks.given_up)
         index.read_new()

@@ -35,7 +35,7 @@ from hovi.study.storage.samples import SampleFormat, Samples
 from hovi.system.blas_threads import one_blas_thread
 from hovi.version import __version__
 
-LOWER = 1e-6
+LEAST_GAIN = 1e-6
 """Share by which a minimum from a plan's own guess has to cost less than one from a parent's."""
 
 
@@ -81,7 +81,7 @@ class CellJob:
 class Receipt:
     """What the parent is told of a plan that is done and stored.
 
-    reason: of a failure; "" for a success. motion: where it is, which the next one starts from.
+    reason: of a failure; "" for a success. motion: where it is, which its children start from.
     """
 
     number: int
@@ -206,8 +206,7 @@ def _solved(task: Task, job: CellJob, desk: _Desk) -> tuple[Solution, str | None
     job asks for both, of which the lower minimum is taken.
     """
     several: dict[str, Any] = {"processes": 1} if task.options.starts > 1 else {}
-    read = [(each.key, desk.motions.get(each.motion, task.held_scene)) for each in job.guesses]
-    known = [(key, motion) for key, motion in read if motion is not None]
+    known = _guesses(task, job, desk)
     warm = None
     if known:
         parent, motion = known[desk.costs.cheapest(task, [motion for _, motion in known])]
@@ -215,10 +214,19 @@ def _solved(task: Task, job: CellJob, desk: _Desk) -> tuple[Solution, str | None
         if warm.status is Status.INTERRUPTED or (warm.success and not job.own_guess):
             return warm, parent
     own = plan_task(task, **several)
-    if warm is None or not warm.success:
+    if warm is None or not warm.success or own.status is Status.INTERRUPTED:
         return own, None
-    least = warm.cost - LOWER * abs(warm.cost)
+    least = warm.cost - LEAST_GAIN * abs(warm.cost)
     return (own, None) if own.success and own.cost < least else (warm, parent)
+
+
+def _guesses(task: Task, job: CellJob, desk: _Desk) -> list[tuple[str, Trajectory]]:
+    """The motions of parents with their keys. Raises StorageError: the fault is not the cell's."""
+    try:
+        read = [(each.key, desk.motions.get(each.motion, task.held_scene)) for each in job.guesses]
+    except (OSError, ValueError, HoviError) as error:
+        raise StorageError(f"the motion of a parent could not be read: {error}") from error
+    return [(key, motion) for key, motion in read if motion is not None]
 
 
 def _met(task: Task, target: FrameGoal, other: State | FrameGoal) -> State:

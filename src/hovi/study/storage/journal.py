@@ -23,7 +23,7 @@ _CRC = 8
 
 
 class StorageError(Exception):
-    """A journal could not be written, as where a disk is full."""
+    """A journal could not be written, as where a disk is full, or not be read."""
 
 
 @dataclass(frozen=True)

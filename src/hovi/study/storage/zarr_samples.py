@@ -106,6 +106,7 @@ class _Store:
         for name in sorted(self._made):
             entry = ZipInfo(name)  # of 1980
             entry.external_attr = _MODE << 16
+            entry.create_system = 3  # of Unix, on every system
             self.archive.writestr(entry, self._made[name].to_bytes())
         self._made.clear()
 

@@ -56,14 +56,15 @@ def joint_figure(
     size = (11.0, 1.0 + 1.7 * len(names))
     figure = ShownFigure(figsize=size, layout="constrained")
     axes = figure.subplots(len(names), len(_COLUMNS), sharex=True, squeeze=False)
-    for number, (motion, limit) in enumerate(zip(motions, limits, strict=True)):
+    for number, motion in enumerate(motions):
         color, style = _COLORS[number % 4], _STYLES[number % 4]
         for column, values in enumerate(_values(motion)):
             for joint, ax in enumerate(axes[:, column]):
                 t = np.linspace(0.0, motion.duration, len(values))
                 ax.plot(t, values[:, joint], style, color=color, label=labels[number])
-                if limit is not None:
-                    _draw_limits(ax, limit, _COLUMNS[column][0], joint, color)
+    for column, (kind, _) in enumerate(_COLUMNS):
+        for joint, ax in enumerate(axes[:, column]):
+            _draw_limits(ax, limits, kind, joint)
     for joint, row in enumerate(axes):
         robot = motions[0].robot
         sliding = robot is not None and bool(robot.sliding[joint])
@@ -86,11 +87,14 @@ def _values(motion: Trajectory) -> tuple[Array, Array, Array]:
     return q, sample.v, tau
 
 
-def _draw_limits(ax: Axes, limits: Limits, kind: str, joint: int, color: str) -> None:
-    """Dashed lines at limits that are within a range of the curves."""
+def _draw_limits(ax: Axes, limits: Sequence[Limits | None], kind: str, joint: int) -> None:
+    """Dashed lines at limits of the motions that are within a range of all curves."""
     row = KINDS.index(kind)
     low, high = ax.get_ylim()
     reach = high - low
-    for bound in (limits.lower[row, joint], limits.upper[row, joint]):
-        if low - reach <= bound <= high + reach:
-            ax.axhline(bound, color=color, linestyle=(0, (4, 3)), linewidth=0.9, gid="limit")
+    for number, limit in enumerate(limits):
+        sides = () if limit is None else (limit.lower[row, joint], limit.upper[row, joint])
+        for bound in sides:
+            if low - reach <= bound <= high + reach:
+                dashes, color = (0, (4, 3)), _COLORS[number % 4]
+                ax.axhline(bound, color=color, linestyle=dashes, linewidth=0.9, gid="limit")

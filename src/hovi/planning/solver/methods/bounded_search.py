@@ -13,6 +13,7 @@ from hovi.discrete.instants import Instants
 from hovi.discrete.state import State
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.barrier import WARM_START_MARGIN, Barrier
+from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
@@ -207,7 +208,7 @@ class BoundedSearch:
         return dataclasses.replace(self.options, time_limit=self.deadline.seconds_left)
 
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
-        """Solve with bounds at the quadrature points, in rounds if there are constraints."""
+        """Solve with bounds at the quadrature points; in rounds for passive torques."""
         if not self.problem.constrained:
             return self.minimized(self.objective(None), path, self.remaining_options(), start)
         if len(self.problem.passive) == 0:
@@ -297,7 +298,9 @@ class BoundedSearch:
         if outcome.model.factor(0.0) is not None:
             return 0
         mergeable = self.problem.plain and self.problem.ld.k == 2
-        if not mergeable and isinstance(outcome.model, BandModel):
+        if isinstance(outcome.model, EquationModel) or (
+            not mergeable and isinstance(outcome.model, BandModel)
+        ):
             return outcome.model.negative_eigenvalues()
         objective = self.objective(None, "tree")
         model = objective.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))

@@ -53,8 +53,8 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
     It is solved without distances, until it can be seen whether it keeps them. If it is far from
-    that, it is moved out of the obstacles, and so is the guess if that takes a detour; the rough
-    motion with distances that costs least is solved to its end.
+    that, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
+    rough motion, by bounds and then by cost, is solved to its end; the other where that diverges.
     """
     assert search.near is not None
     free = _without_distances(search, guess)

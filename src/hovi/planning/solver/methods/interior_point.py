@@ -26,7 +26,7 @@ from hovi.system.interruption import record_interrupt
 
 
 class InteriorPoint(Method):
-    """A primal-dual interior-point method, within an augmented Lagrangian for constraints.
+    """A primal-dual interior-point method; passive torques by an augmented Lagrangian around it.
 
     First a motion within bounds at the quadrature points is found; then bounds are tightened and
     intervals halved until the limits hold everywhere to their tolerance.
