@@ -27,6 +27,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import (
@@ -42,6 +43,7 @@ from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
+Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
 INITIAL_MU = 0.1
@@ -179,14 +181,11 @@ class _Iteration(BoundedSteps[X]):
         barrier = outcome.barrier.with_mu(step.mu)
         moved_step = step.share * trial.step
         x = self.objective.retract(outcome.x, moved_step, model)
-        before = outcome.outputs.value
-        if step.reaction is not None:
-            before += self.objective.hold(outcome.x, step.reaction)
+        before = outcome.outputs.value + self._hold(step.reaction, 1.0)
         try:
             outputs = self.objective.outputs(x)
         except BaseException:  # the multipliers stay those of the current point
-            if step.reaction is not None:
-                self.objective.hold(outcome.x, -step.reaction)
+            self._hold(step.reaction, -1.0)
             raise
         old = before + barrier.merit(outcome.outputs.y, self.penalty, along, 0.0)
         new, moved = math.inf, barrier
@@ -212,8 +211,7 @@ class _Iteration(BoundedSteps[X]):
         if ratio <= 1e-4:
             if not self.cautious:  # the same again, as a plain step
                 self.radius = last
-            if step.reaction is not None:
-                self.objective.hold(outcome.x, -step.reaction)
+            self._hold(step.reaction, -1.0)
             self.cautious = True
             return False
         self.objective.accept(moved_step, model)
@@ -228,6 +226,12 @@ class _Iteration(BoundedSteps[X]):
         self.violations.append(float(outcome.violation.max(initial=0.0)))
         self._mark(x)
         return True
+
+    def _hold(self, reaction: Array | None, sign: float) -> float:
+        """Change multipliers of equations by a step's, or take it back; returns what that adds."""
+        if reaction is None:
+            return 0.0
+        return self.objective.hold(self.outcome.x, sign * reaction)
 
     def _mark(self, x: X) -> None:
         """Mark a point: the last one before the product falls to half of what it was at first."""

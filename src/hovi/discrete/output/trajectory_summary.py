@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -21,14 +22,14 @@ class TrajectorySummary(Summarized):
     metadata: Mapping[str, Any]
 
     @property
+    @abstractmethod
     def robot(self) -> Robot | None:
         """The robot; None without one."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def coordinate_names(self) -> tuple[str, ...]:
         """One name per velocity."""
-        raise NotImplementedError
 
     def _summary(self) -> Summary:
         name = "a robot" if self.robot is None else repr(self.robot.name)

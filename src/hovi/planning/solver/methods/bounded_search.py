@@ -298,9 +298,7 @@ class BoundedSearch:
         if outcome.model.factor(0.0) is not None:
             return 0
         mergeable = self.problem.plain and self.problem.ld.k == 2
-        if isinstance(outcome.model, EquationModel) or (
-            not mergeable and isinstance(outcome.model, BandModel)
-        ):
+        if not mergeable and isinstance(outcome.model, BandModel | EquationModel):
             return outcome.model.negative_eigenvalues()
         objective = self.objective(None, "tree")
         model = objective.model(outcome.x, *outcome.barrier.condensed(outcome.outputs.y))
