@@ -31,6 +31,7 @@ from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.joint_panels import compared, joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.shown_figure import ShownFigure
@@ -44,7 +45,6 @@ from hovi.viewing.segment_marks import draw_segments
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")
 """The color-blind safe palette of Okabe and Ito."""
 _LINE_STYLES = ("-", "--", ":", "-.")
 _CURVE_POINTS = 2_000
@@ -305,7 +305,7 @@ def _lines(
     members: npt.NDArray[np.intp],
 ) -> None:
     t, y = curve.t, scale * y
-    styles = [(c, style) for style, c in itertools.product(_LINE_STYLES, _COLORS)]
+    styles = [(c, style) for style, c in itertools.product(_LINE_STYLES, COLORS)]
     gap = np.full((len(t), 1), np.nan)
     broken = np.hstack([t, gap]).ravel()
     limited: list[Curve] = []
@@ -376,7 +376,7 @@ def _sweep(ax: Axes3D, t: Array, points: Array, dark: Mask) -> None:
         mesh = np.concatenate([times, plane], axis=2)
         corners = [mesh[:-1, :-1], mesh[:-1, 1:], mesh[1:, 1:], mesh[1:, :-1]]
         patches.append(np.stack(corners, axis=2).reshape(-1, 4, 3))
-        light = 0.75 * np.array(to_rgb(_COLORS[link % len(_COLORS)])) + 0.25
+        light = 0.75 * np.array(to_rgb(COLORS[link % len(COLORS)])) + 0.25
         colors.append(np.tile(np.where(dark[:, None], 0.35 * light, light), (_STRIPS, 1)))
     faces = np.concatenate(colors)
     ax.add_collection3d(

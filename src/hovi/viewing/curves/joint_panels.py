@@ -12,6 +12,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, InputError, expect
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
+from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.shown_figure import ShownFigure
 from hovi.viewing.curves.unwrapped_angles import unwrapped
 
@@ -19,7 +20,6 @@ Array = npt.NDArray[np.float64]
 
 _SAMPLES = 600
 _STYLES = ("-", "--", ":", "-.")
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _COLUMNS = (
     ("q", ("angle [rad]", "position [m]")),
     ("v", ("velocity [rad/s]", "velocity [m/s]")),
@@ -57,7 +57,7 @@ def joint_figure(
     figure = ShownFigure(figsize=size, layout="constrained")
     axes = figure.subplots(len(names), len(_COLUMNS), sharex=True, squeeze=False)
     for number, motion in enumerate(motions):
-        color, style = _COLORS[number % 4], _STYLES[number % 4]
+        color, style = COLORS[number % 4], _STYLES[number % 4]
         for column, values in enumerate(_values(motion)):
             for joint, ax in enumerate(axes[:, column]):
                 t = np.linspace(0.0, motion.duration, len(values))
@@ -96,5 +96,5 @@ def _draw_limits(ax: Axes, limits: Sequence[Limits | None], kind: str, joint: in
         sides = () if limit is None else (limit.lower[row, joint], limit.upper[row, joint])
         for bound in sides:
             if low - reach <= bound <= high + reach:
-                dashes, color = (0, (4, 3)), _COLORS[number % 4]
+                dashes, color = (0, (4, 3)), COLORS[number % 4]
                 ax.axhline(bound, color=color, linestyle=dashes, linewidth=0.9, gid="limit")

@@ -20,13 +20,12 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]
 
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#333333")
-"""The color-blind safe palette of Okabe and Ito."""
 _CURVE_TIMES = 361
 _JOINT_TIMES = 121
 _MAX_JOINTS = 40
