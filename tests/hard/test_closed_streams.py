@@ -18,8 +18,8 @@ from pathlib import Path
 
 import pytest
 
-from hovi.cli.reports import progress as reports
 from hovi.discrete.trajectory import Trajectory
+from hovi.system import progress as reports
 
 CLOSED = "error: cannot write the output: stdout is closed.\n"
 COMMAND = """

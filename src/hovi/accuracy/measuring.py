@@ -12,7 +12,7 @@ from hovi.accuracy.method import Method, Prepared, Stopwatch
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
-from hovi.planning.search.job import Progress
+from hovi.system.progress import Progress
 
 INTERVALS = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))
 """Numbers of intervals: 4, 6, 8, 12, 16, ..."""

@@ -18,13 +18,14 @@ from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS
 from hovi.planning.refinement.hp_refinement import galerkin_with_more_points
 from hovi.planning.refinement.inactive_limits import far_from_limits
 from hovi.planning.search.homotopies import lighter_rotors
-from hovi.planning.search.job import Job, Progress, split_for_charts
+from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.options import DEFAULT_TOLERANCE, PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
 from hovi.system.interruption import raise_if_interrupted
+from hovi.system.progress import Progress
 
 LIMITED_TOLERANCE = 1e-2
 """Relative tolerance of the cost of a motion within limits before it is resolved; without limits

@@ -32,9 +32,9 @@ from hovi.accuracy.variational_method import LIMITED_SCHEMES, SCHEMES, Variation
 from hovi.discrete.guess import Curve
 from hovi.errors import InputError, UnmeasurableError, nearest
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.search.job import Progress
 from hovi.planning.task_file.task import Task
 from hovi.system.interruption import interruptible
+from hovi.system.progress import Progress, shows_progress, silent
 
 MEASURING_SHARE = 0.9
 """Fraction of the budget after which methods are no longer measured; the rest is for
@@ -66,6 +66,7 @@ Peer = Callable[[Setting], Method]
 
 
 @interruptible
+@shows_progress
 def work_precision(
     task: Task,
     *,
@@ -104,7 +105,7 @@ def work_precision(
         )
     if clock not in CLOCKS:
         raise InputError(f"there is no clock {clock!r}: {nearest(clock, CLOCKS)}")
-    time, report = Budget(budget), progress or _no_progress
+    time, report = Budget(budget), progress or silent
     reference = find_reference(task, time, report)
     problem, resolved = reference.problem, reference.resolved
     curve = guess_curve(guess, problem, resolved.trajectory)
@@ -214,7 +215,3 @@ def _default_note(default: Choice) -> Sequence[str]:
     if default.counts:
         return ()
     return (f"plan's default found {default.found} from this guess: {default.message}",)
-
-
-def _no_progress(text: str, fraction: float) -> None:
-    """Discard progress reports."""

@@ -15,7 +15,7 @@ from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.reading import parsed, read_toml
 from hovi.study.cells.cells import Cells
 from hovi.study.cells.extras import require_extra
-from hovi.study.running.progress import OnProgress
+from hovi.study.running.progress import OnProgress, told
 from hovi.study.running.runner import StudyRun
 from hovi.study.running.work import Output, motion_from
 from hovi.study.storage.folder import About, used_alone
@@ -143,7 +143,8 @@ class Study:
         scheduler: the address of a Dask scheduler, such as "tcp://127.0.0.1:8786", whose workers
             see the same files; or "local" for one on this machine with as many workers.
         replace: continue in the folder whatever it holds; plans of other cells leave the tables.
-        progress: called with a StudyProgress after each chunk and each failure.
+        progress: called with a StudyProgress after each chunk and each failure; in a notebook, a
+            line under the cell by default.
         Raises StudyError if the folder cannot be written or is in use.
         """
         require_extra("pyarrow", "study")
@@ -162,9 +163,9 @@ class Study:
         chosen = Path(folder).absolute()
         if not replace:
             chosen = _own_folder(chosen, about)
-        with used_alone(chosen):
+        with used_alone(chosen), told(progress) as on_progress:
             about.write(chosen)
-            run = StudyRun(self.cells, chosen, self.output, workers, scheduler, progress)
+            run = StudyRun(self.cells, chosen, self.output, workers, scheduler, on_progress)
             run.run()
         return StudyReport(
             chosen,

@@ -15,7 +15,6 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.effects import Effect, Touch
 from hovi.errors import InputError, SceneError
 from hovi.flows.execution.tracking import play
-from hovi.planning.search.job import Progress
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
 from hovi.planning.task_file.task_plan import plan_task
@@ -24,6 +23,7 @@ from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
+from hovi.system.progress import Progress, shows_progress, silent
 
 Array = npt.NDArray[np.float64]
 
@@ -95,6 +95,7 @@ class EffectStudy:
 
 
 @interruptible
+@shows_progress
 def study_effects(
     task: Task,
     candidates: Iterable[Effect] | None = None,
@@ -112,7 +113,7 @@ def study_effects(
     a frame that cannot move.
     """
     task.require_one_motion("a study of effects")
-    report = progress or (lambda text, share: None)
+    report = progress or silent
     deadline, scene = Deadline(time_limit), task.scene
     tried = tuple(
         effect_candidates(scene.robot, scene.passive) if candidates is None else candidates

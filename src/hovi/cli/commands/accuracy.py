@@ -57,9 +57,9 @@ def accuracy(
     from hovi.accuracy import work_precision
     from hovi.accuracy.tables import as_json
     from hovi.cli.arguments.files import find_scene
-    from hovi.cli.reports.progress import progress
     from hovi.errors import InputError, UnmeasurableError
     from hovi.planning.task_file.reading import load_task
+    from hovi.system.progress import progress
 
     if out is not None and out.exists() and not out.is_dir():
         raise InputError(f"--out {str(out)!r} is a file; name a folder.")

@@ -42,8 +42,8 @@ def effects(
     from hovi.accuracy.effect_study.tables import plot_study, study_json
     from hovi.cli.arguments.durations import positive_seconds
     from hovi.cli.arguments.files import check_output, find_scene
-    from hovi.cli.reports.progress import progress
     from hovi.planning.task_file.reading import load_task
+    from hovi.system.progress import progress
 
     limit = None if time_limit is None else positive_seconds("--time-limit", time_limit)
     if out is not None:

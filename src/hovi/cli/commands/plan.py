@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     from hovi.cli.reports.limit_margins import KnownMargins
     from hovi.discrete.trajectory import Trajectory
     from hovi.planning.refinement.certificate import Certificate
-    from hovi.planning.search.job import Progress
     from hovi.planning.solver.solver import Solution
     from hovi.planning.task_file.task import Task
     from hovi.system.deadline import Deadline
+    from hovi.system.progress import Progress
 
 GUESSES = ("cubic", "minimum-jerk")
 MAX_CERTIFIED_INTERVALS = 2000
@@ -75,7 +75,7 @@ def plan(
     Exit code 0 for a minimum, 1 when none was found, 2 for invalid input.
     """
     from hovi.cli.arguments.files import check_output
-    from hovi.cli.reports.progress import progress
+    from hovi.system.progress import progress
 
     if out is not None:
         check_output(out, ".npz")
@@ -148,10 +148,10 @@ def _guess(guess: str) -> str | Trajectory:
 def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
     """Plan, write, print; returns the exit code."""
     from hovi.cli.reports.plan import as_json, print_report
-    from hovi.cli.reports.progress import progress
     from hovi.errors import TrajectoryFileError
     from hovi.planning.task_file.task_plan import plan_task
     from hovi.system.deadline import Deadline
+    from hovi.system.progress import progress
 
     deadline = Deadline(task.options.time_limit_seconds)
     if not json:

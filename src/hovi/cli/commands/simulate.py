@@ -44,9 +44,9 @@ def simulate(
     Exit code 0, or 2 for invalid input.
     """
     from hovi.cli.arguments.files import check_output, find_scene
-    from hovi.cli.reports.progress import progress
     from hovi.errors import InputError
     from hovi.planning.task_file.reading import load_task
+    from hovi.system.progress import progress
 
     if out is not None:
         check_output(out, ".npz")

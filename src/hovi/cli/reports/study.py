@@ -9,15 +9,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from hovi.cli.reports.progress import progress
 from hovi.cli.reports.terminal_table import print_table, terminal_table
 from hovi.study.running.progress import duration_text
 from hovi.system.files import finite
+from hovi.system.progress import progress
 
 if TYPE_CHECKING:
-    from hovi.planning.search.job import Progress
     from hovi.study.running.progress import StudyProgress
     from hovi.study.study import StudyReport
+    from hovi.system.progress import Progress
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C."""
@@ -53,7 +53,7 @@ class Told:
             with suppress(OSError):  # stderr may be closed
                 print(line, file=sys.stderr, flush=True)
         elif self._report is not None:
-            self._report(state.text(), state.done / max(state.count, 1))
+            self._report(state.text(), state.fraction)
 
 
 def print_ending(report: StudyReport, out: Path) -> int:

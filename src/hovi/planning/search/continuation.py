@@ -16,11 +16,12 @@ from hovi.planning.search.homotopies import (
     narrowing_limits,
     other_durations,
 )
-from hovi.planning.search.job import Job, Progress
+from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
+from hovi.system.progress import Progress
 
 HOMOTOPIES: dict[str, Homotopy] = {
     "inertia": lighter_rotors,

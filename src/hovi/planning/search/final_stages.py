@@ -21,7 +21,7 @@ from hovi.planning.refinement.inactive_limits import (
     without_limits,
 )
 from hovi.planning.search.free_duration import FreeDuration, SolveFor
-from hovi.planning.search.job import Job, Progress, split_for_charts
+from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Pool, default_processes, distinct
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -29,6 +29,7 @@ from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interrupted
+from hovi.system.progress import Progress
 
 NAMED_GUESSES = ("cubic", "minimum-jerk")
 MAX_CHART_ROUNDS = 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any, Self
@@ -25,8 +25,6 @@ from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 
-Progress = Callable[[str, float], None]
-"""Called with a line of text and the completed fraction, in [0, 1]."""
 MAX_CHART_INTERVALS = 2000
 """Maximum number of intervals after halving for the orientations of the initial guess."""
 

@@ -23,12 +23,13 @@ from hovi.errors import ChartError
 from hovi.planning.paths.first_guesses import FirstGuesses
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.job import Job, Progress
+from hovi.planning.search.job import Job
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import record_interrupt
+from hovi.system.progress import Progress
 from hovi.workers.lost import Lost
 
 Array = npt.NDArray[np.float64]

@@ -24,7 +24,7 @@ from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
 from hovi.planning.search.group import in_group
-from hovi.planning.search.job import Job, Progress, split_for_charts
+from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.search.search import Search
@@ -39,6 +39,7 @@ from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
+from hovi.system.progress import Progress, shows_progress, silent
 
 MAX_GUESS_INTERVALS = 400
 """Largest number of intervals of a guess on whose grid a refinement begins."""
@@ -81,6 +82,7 @@ def _with_option_keywords(
 @check_arguments_except("scene", "start", "goal", "duration", "options")
 @one_blas_thread
 @interruptible
+@shows_progress
 def plan(
     scene: Scene,
     start: End,
@@ -102,7 +104,8 @@ def plan(
         such as {"frame": "tool0", "position": [0.4, 0.2, 0.3]}.
     duration: T in [s], or a text such as "1.5 s", "500 ms" or "2 min"; or a pair (lower, upper)
         of these for a free duration.
-    progress: called with a line of text and the completed fraction, in [0, 1].
+    progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
+        line under the cell by default.
     options: a PlanOptions; the following keywords override it.
     {options}
     Raises InputError, ModelError, SceneError or SchemeError for invalid input, UnreachableError for
@@ -291,7 +294,3 @@ def warn_of_ends(robot: Robot, start: State, goal: State | FrameGoal, options: P
     given = [start, *(via.goal for via in stops), goal]
     states = [each for each in given if isinstance(each, State)]
     warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
-
-
-def silent(text: str, fraction: float) -> None:
-    """Ignore progress."""

@@ -23,13 +23,14 @@ from hovi.planning.search.final_stages import (
     with_more_points,
 )
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.job import Job, Progress, split_for_charts
+from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.multistart import Exploration, Pool, default_processes, explore
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
+from hovi.system.progress import Progress
 
 COARSE_INTERVALS = 80
 """Number of intervals of the coarse grid, used first for grids with more than twice as many."""

@@ -13,10 +13,10 @@ from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.search.group import in_group
-from hovi.planning.search.job import Acting, Progress
+from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.planner import holding, plan, run, silent, warn_of_ends, with_notes
+from hovi.planning.search.planner import holding, plan, run, warn_of_ends, with_notes
 from hovi.planning.search.search import Search
 from hovi.planning.sequence.branches import End
 from hovi.planning.sequence.segment import Segment, Table, checked_segments, goals_of, names_of
@@ -26,6 +26,7 @@ from hovi.scene.scene import Scene
 from hovi.system.blas_threads import one_blas_thread
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
+from hovi.system.progress import Progress, shows_progress, silent
 
 Keywords = ParamSpec("Keywords")
 
@@ -63,6 +64,7 @@ def _with_option_keywords(
 @check_arguments_except("scene", "start", "segments", "options")
 @one_blas_thread
 @interruptible
+@shows_progress
 def plan_sequence(
     scene: Scene,
     start: Start,
@@ -84,7 +86,8 @@ def plan_sequence(
     segments: hovi.Segment(goal, duration, effects=..., limits=..., name=...), or tables as in a
         scene file, {"goal": {"q": ...}, "duration": "1 s", ...}, in order of time; the last one
         needs a goal.
-    progress: called with a line of text and the completed fraction, in [0, 1].
+    progress: called with a line of text and the completed fraction, in [0, 1]; in a notebook, a
+        line under the cell by default.
     options: a PlanOptions; the following keywords override it. The `intervals` are those of all
         segments together, and the times of `via` count from the start of the first.
     {options}

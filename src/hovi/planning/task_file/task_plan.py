@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from hovi.checks.arguments import check_arguments
-from hovi.planning.search.job import Progress
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution
 from hovi.planning.task_file.task import Task
+from hovi.system.progress import Progress
 
 
 @check_arguments

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from hovi.study.running.work import Receipt
+from hovi.system.progress import reported
 
 RATE_SECONDS = 30.0
 """Time over which the rate is taken, in [s]."""
@@ -51,6 +53,11 @@ class StudyProgress:
         rate = self.rate
         return None if not rate else (self.count - self.done) / rate
 
+    @property
+    def fraction(self) -> float:
+        """The share of the cells that is done, in [0, 1]."""
+        return self.done / max(self.count, 1)
+
     def text(self) -> str:
         """In a line."""
         parts = [f"{self.done:,} of {self.count:,} plans"]
@@ -66,6 +73,16 @@ class StudyProgress:
 
 
 OnProgress = Callable[[StudyProgress], None]
+
+
+@contextmanager
+def told(given: OnProgress | None) -> Iterator[OnProgress]:
+    """Whom a run tells its state: what was given, else a line in a notebook, else nobody."""
+    if given is not None:
+        yield given
+        return
+    with reported(None, "starting workers") as report:
+        yield lambda state: report(state.text(), state.fraction)
 
 
 def duration_text(seconds: float) -> str:

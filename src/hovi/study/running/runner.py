@@ -39,8 +39,8 @@ class StudyRun:
     folder: Path
     output: Output
     workers: int
-    scheduler: str | None = None
-    on_progress: OnProgress | None = None
+    scheduler: str | None
+    on_progress: OnProgress
     progress: StudyProgress = field(init=False)
     given_up: tuple[tuple[CellJob, str], ...] = ()
     interrupted: bool = False
@@ -139,5 +139,4 @@ class StudyRun:
             writer.close()
 
     def _report(self) -> None:
-        if self.on_progress is not None:
-            self.on_progress(self.progress)
+        self.on_progress(self.progress)

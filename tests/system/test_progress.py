@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hovi.cli.application import main
-from hovi.cli.reports import progress as reports
+from hovi.system import progress as reports
 from oracles.processes import wait_until
 
 
