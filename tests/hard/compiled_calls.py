@@ -24,7 +24,16 @@ import pinocchio as pin
 
 from hard.mutated_bytes import mutated_bytes
 from hard.verdict import Mutant, Verdict
-from hovi._native import band, barrier, distances, dynamics, groups, intervals, kinematics
+from hovi._native import (
+    band,
+    barrier,
+    distances,
+    dynamics,
+    groups,
+    integration,
+    intervals,
+    kinematics,
+)
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.dynamics.joint_tree import read_joint_tree
 from hovi.dynamics.kinematic_chain import KinematicChain, read_kinematic_chain
@@ -254,6 +263,16 @@ def _inputs(*names: str) -> dict[str, Kind]:
 
 _TARGETS = ("lower_targets", "upper_targets")
 _BARRIER: dict[str, Any] = {"letters": {"R": (0, 9)}}
+
+
+def _still(t: float, y: Array) -> Array:
+    """Rates that any number of steps is right for."""
+    return np.zeros_like(y)
+
+
+def _is_integrable(arguments: Arguments, sizes: Sizes) -> bool:
+    tolerances = arguments["relative"], arguments["absolute"]
+    return bool(arguments["begin"] < arguments["end"] and all(each > 0.0 for each in tolerances))
 
 
 def _keeps_a_share(arguments: Arguments, sizes: Sizes) -> bool:
@@ -711,6 +730,12 @@ ENTRIES: dict[str, Entry] = {
     "intervals.predict": Entry(
         intervals.predict,
         {**_RESIDUALS, "jacobian": _in("P n k"), "change": _in("P k"), "out": _out("P n")},
+    ),
+    "integration.integrate": Entry(
+        integration.integrate,
+        {"y": _updated("n")},
+        {"rates": _still, "begin": 0.0, "end": 1.0, "relative": 1e-6, "absolute": 1e-9},
+        fits=_is_integrable,
     ),
     "barrier.condense": Entry(
         barrier.condense,

@@ -87,7 +87,7 @@ def _replay(replay: DynamicsReplay) -> str:
         deviations.append(f"{1e3 * replay.slide:.1e} mm")
     deviations.append(f"{replay.frame} by {1e3 * replay.largest_tip:.1e} mm")
     return (
-        "DOP853 on ABA under the planned torques, started at every node, misses the next by "
+        "odeint on ABA under the planned torques, started at every node, misses the next by "
         f"{', '.join(deviations)}: {NOT_OPTIMALITY}"
     )
 

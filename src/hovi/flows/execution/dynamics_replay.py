@@ -1,4 +1,4 @@
-"""Forward-simulates the planned torques with Pinocchio's ABA and SciPy, and compares.
+"""Forward-simulates the planned torques with Pinocchio's ABA and Boost's odeint, and compares.
 
 The forward dynamics are integrated from every node to the next by an independent method. This
 verifies dynamics and torques, not optimality: the inverse dynamics of any curve reproduce it.
@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
+from hovi._native.integration import integrate
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
 from hovi.robot.frame_distance import FrameDistance
@@ -66,7 +67,9 @@ class DynamicsReplay:
 
 
 def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> DynamicsReplay:
-    """Simulate all intervals under the planned torques at once, by SciPy's DOP853.
+    """Simulate all intervals under the planned torques at once, by Boost's odeint.
+
+    Its Runge-Kutta-Fehlberg method of order 8 (7) chooses the steps.
 
     a = ABA(q, v, tau - torques of effects), with tau of the interpolant at the same times and zero
     at passive joints; each interval starts at its node, in the chart of that node.
@@ -74,8 +77,6 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
     The intervals of a segment are simulated in its own scene.
     Raises InputError with the reason if this is not possible.
     """
-    from scipy.integrate import solve_ivp  # slow to import, and only needed here
-
     robot, parts = _parts_of(trajectory)
     robot.measured_frames(
         frame
@@ -94,19 +95,12 @@ def replay_dynamics(trajectory: Trajectory, frame: str | None = None) -> Dynamic
         a = np.concatenate([each(*(row[each.index] for row in given)) for each in forward])
         return np.concatenate([chart_rates(robot, start, x, hv), h * h * a]).ravel()
 
-    first = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
-    done = solve_ivp(
-        rates,
-        (0.0, 1.0),
-        first,
-        "DOP853",
-        t_eval=[1.0],
-        rtol=RELATIVE_TOLERANCE,
-        atol=ABSOLUTE_TOLERANCE,
-    )
-    if not done.success or not np.isfinite(done.y).all():
-        raise InputError(f"SciPy's DOP853 did not reach the end of an interval: {done.message}")
-    x, hv = done.y[:, -1].reshape(2, N, n)
+    y = np.concatenate([np.zeros((N, n)), h * trajectory.v[:-1]]).ravel()
+    try:
+        integrate(rates, y, 0.0, 1.0, RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE)
+    except RuntimeError as stuck:
+        raise InputError(f"odeint did not reach the end of an interval: {stuck}") from None
+    x, hv = y.reshape(2, N, n)
     arrived = robot.integrate(start, x)
     tip = FrameDistance.between(robot, arrived, trajectory.q[1:], frame)
     return DynamicsReplay(

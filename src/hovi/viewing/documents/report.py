@@ -135,7 +135,7 @@ def _replayed(trajectory: Trajectory) -> str:
     if not replay.sliding.all():
         misses = f"{replay.angle:.1e} rad, {misses}"
     return (
-        "SciPy's DOP853 on Pinocchio's ABA, from every node, misses the next by "
+        "Boost's odeint on Pinocchio's ABA, from every node, misses the next by "
         f"{misses}: this certifies dynamics and torques, not optimality"
     )
 
