@@ -239,8 +239,16 @@ class _Search:
         steps, left = self.max_iterations, self.deadline.seconds_left
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
-        barrier = self.tolerance.barrier
-        return solve_on_grid(problem, guess, max_iterations=steps, time_limit=left, barrier=barrier)
+        # From the guess anew, a motion would be moved out of its obstacles once more.
+        near = True if problem.distances is not None else None
+        return solve_on_grid(
+            problem,
+            guess,
+            max_iterations=steps,
+            time_limit=left,
+            near=near,
+            barrier=self.tolerance.barrier,
+        )
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
         """The chosen solution with its accuracy."""

@@ -14,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.optimize.trust_region import Stop
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods import cleared_motion
 
 INSTANTS = 2_000
@@ -82,3 +83,20 @@ def test_a_fixed_set_of_rows_is_that_of_the_coarser_motion(around: hovi.Task) ->
     assert near.size > 0
     assert found.problem is not None
     assert fixed.extend(found.problem, found.trajectory.path, 1.0) == 0
+
+
+def test_a_finer_grid_is_begun_from_the_known_motion(
+    around: hovi.Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is not moved out of its obstacles once more."""
+    moved, push = [], cleared_motion.pushed_out
+
+    def watched(problem: TrajectoryProblem, *given: Any) -> Any:
+        moved.append(problem.grid.intervals)
+        return push(problem, *given)
+
+    monkeypatch.setattr(cleared_motion, "pushed_out", watched)
+    found = hovi.plan_task(around, tolerance=1e-4)
+    assert found.success
+    assert len(found.trajectory.grid.steps) > max(moved)
+    assert len(set(moved)) == 1

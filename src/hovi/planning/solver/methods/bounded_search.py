@@ -183,7 +183,8 @@ class BoundedSearch:
         last = outcome.barrier.mu / density
         before = [(level, x) for level, x in self.points if level > last]
         points = (*before, (last, outcome.x))
-        barrier = outcome.barrier if self.problem.distances is None else None
+        apart = self.problem.distances is None or (self.near is not None and self.near.size == 0)
+        barrier = outcome.barrier if apart else None
         return CentralPath(points, self.rows, barrier, self.margins, self.near)
 
     def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:

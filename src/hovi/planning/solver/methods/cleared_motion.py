@@ -39,6 +39,8 @@ FIRST_MU = 0.1
 """First barrier parameter from a motion that was moved, relative to the cost's mean density."""
 ROUGH_STEPS = 100
 """Maximum number of its steps."""
+SECOND_STEPS, LEAST_SECOND_STEPS = 3, 20
+"""The same for a second rough motion: per step of the first one, and at least."""
 ROUGH_VIOLATION = 0.05
 """Largest violation of a bound, relative to its range, from which a rough motion is solved on."""
 ROUGH_TOLERANCE = 1e-4
@@ -62,7 +64,10 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
         return free
     rough = [_rough_with_distances(search, free.x)]
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
-        rough.append(_rough_with_distances(search, guess))
+        steps = ROUGH_STEPS
+        if rough[0] is not None:
+            steps = max(SECOND_STEPS * rough[0].outcome.iterations, LEAST_SECOND_STEPS)
+        rough.append(_rough_with_distances(search, guess, min(steps, ROUGH_STEPS)))
     for found in sorted(filter(None, rough), key=lambda each: each.rank):
         outcome = found.solved(search)
         if outcome.stop is not Stop.DIVERGED:
@@ -124,8 +129,13 @@ class _Rough:
         return search.solve(x, barrier.of(np.append(np.arange(points), points + kept)))
 
 
-def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough | None:
-    """A rough motion near a path that is moved out of obstacles; None if there is none."""
+def _rough_with_distances(
+    search: BoundedSearch, path: DiscretePath, most: int = ROUGH_STEPS
+) -> _Rough | None:
+    """A rough motion near a path that is moved out of obstacles; None if there is none.
+
+    most: maximum number of steps.
+    """
     problem, distances = search.problem, search.problem.distances
     assert distances is not None
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
@@ -134,7 +144,7 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
         return None
     search.near.extend(problem, moved, AHEAD)
     known = first_multipliers(problem, moved) if problem.constrained else None
-    outcome, known = _rough(search, moved, known, FIRST_MU)
+    outcome, known = _rough(search, moved, known, FIRST_MU, most)
     violation = float(outcome.violation.max(initial=0.0))
     if outcome.stop is Stop.DIVERGED or violation > ROUGH_VIOLATION:
         return None
@@ -145,16 +155,23 @@ def _rough_with_distances(search: BoundedSearch, path: DiscretePath) -> _Rough |
 
 
 def _rough(
-    search: BoundedSearch, path: DiscretePath, known: Multipliers | None, mu: float | None
+    search: BoundedSearch,
+    path: DiscretePath,
+    known: Multipliers | None,
+    mu: float | None,
+    most: int = ROUGH_STEPS,
 ) -> tuple[Bounded, Multipliers | None]:
     """A solve up to a large barrier parameter, and the multipliers of conditions then.
 
     known: multipliers of constraints. mu: the first such parameter, None for a start at the guess.
+    most: maximum number of steps.
     """
     whole = search.remaining_options()
-    most = min(ROUGH_STEPS, whole.max_iterations)
     options = dataclasses.replace(
-        whole, barrier=ROUGH_BARRIER, decrease=ROUGH_DECREASE, max_iterations=most
+        whole,
+        barrier=ROUGH_BARRIER,
+        decrease=ROUGH_DECREASE,
+        max_iterations=min(most, whole.max_iterations),
     )
     tolerance = None if known is None or len(search.problem.passive) > 0 else ROUGH_TOLERANCE
     objective, start = search.objective(known, node_tolerance=tolerance), None
