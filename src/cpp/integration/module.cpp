@@ -3,11 +3,12 @@
 #include <nanobind/ndarray.h>
 
 #include <boost/numeric/odeint/integrate/integrate_adaptive.hpp>
-#include <boost/numeric/odeint/stepper/generation.hpp>
+#include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -44,14 +45,32 @@ class Rates {
   nb::object function_;
 };
 
+using Stepper = odeint::runge_kutta_fehlberg78<State>;
+using Checker =
+    odeint::default_error_checker<double, Stepper::algebra_type, Stepper::operations_type>;
+
+// The error of a step over the tolerances, infinite where it is no number: odeint drops NaN.
+class FiniteChecker : public Checker {
+ public:
+  using Checker::Checker;
+
+  template <typename Algebra, typename Time>
+  double error(Algebra& algebra, const State& y, const State& rates, State& error, Time h) const {
+    const double value = Checker::error(algebra, y, rates, error, h);
+    for (const double entry : error)
+      if (!std::isfinite(entry)) return std::numeric_limits<double>::max();
+    return value;
+  }
+};
+
 void integrate(nb::object rates, Output<1> y, double begin, double end, double relative,
                double absolute) {
   y.require_kind("y");
   if (!(begin < end)) refuse("begin must be less than end.");
   if (!(relative > 0.0 && absolute > 0.0)) refuse("tolerances must be positive.");
   State state(y.data(), y.data() + y.size());
-  const auto stepper =
-      odeint::make_controlled<odeint::runge_kutta_fehlberg78<State>>(absolute, relative);
+  const odeint::controlled_runge_kutta<Stepper, FiniteChecker> stepper(
+      FiniteChecker(absolute, relative));
   constexpr double first_share = 0.1;  // of the whole, which the step control corrects
   odeint::integrate_adaptive(stepper, Rates(std::move(rates)), state, begin, end,
                              first_share * (end - begin));
