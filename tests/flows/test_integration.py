@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -54,9 +56,9 @@ def test_errors_of_the_rates_pass_through() -> None:
 
 
 @pytest.mark.parametrize("wrong", [np.zeros(3), np.zeros((2, 1)), [0.0, 0.0], 1.0, None])
-def test_rates_of_another_kind_are_refused(wrong: object) -> None:
+def test_rates_of_another_kind_are_refused(wrong: Any) -> None:
     with pytest.raises(ValueError, match=r"rates must return .* of shape \(2,\)"):
-        integrate(lambda t, y: wrong, np.zeros(2), 0.0, 1.0, 1e-6, 1e-6)  # type: ignore[arg-type,return-value]
+        integrate(lambda t, y: wrong, np.zeros(2), 0.0, 1.0, 1e-6, 1e-6)
 
 
 def test_an_interval_backwards_is_refused() -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-if importlib.util.find_spec("ipykernel") is None:
-    pytest.skip("no Jupyter", allow_module_level=True)
-
-from jupyter_client.manager import KernelManager, start_new_kernel
+pytest.importorskip("ipykernel")
+manager: Any = pytest.importorskip("jupyter_client.manager")
 
 SOON = "import hovi\nimport hovi.system.progress as p\np.BAR_DELAY = 0.01\n"
 EFFECTS = "from hovi.accuracy.effect_study.study import study_effects\n"
@@ -20,11 +17,10 @@ TASK = "task = hovi.load_task(hovi.example('two_link_swing_up.toml'))\n"
 
 @pytest.fixture(scope="module")
 def kernel() -> Iterator[Any]:
-    manager, client = start_new_kernel()
-    assert isinstance(manager, KernelManager)
+    running, client = manager.start_new_kernel()
     yield client
     client.stop_channels()
-    manager.shutdown_kernel(now=True)
+    running.shutdown_kernel(now=True)
 
 
 def shown_by(kernel: Any, code: str) -> list[dict[str, str]]:

@@ -49,7 +49,7 @@ using Stepper = odeint::runge_kutta_fehlberg78<State>;
 using Checker =
     odeint::default_error_checker<double, Stepper::algebra_type, Stepper::operations_type>;
 
-// The error of a step over the tolerances, infinite where it is no number: odeint drops NaN.
+// The error of a step over the tolerances, huge where it is not finite: odeint drops NaN.
 class FiniteChecker : public Checker {
  public:
   using Checker::Checker;
@@ -86,5 +86,6 @@ NB_MODULE(integration, module) {
              "absolute"_a,
              "Replace y at `begin` by that at `end`, where y' = rates(t, y), by Runge, Kutta and "
              "Fehlberg's method of order 8 (7): |error| of a step <= absolute + relative (|y| + "
-             "|h y'|), entry by entry. Raises RuntimeError where steps become too short or y is not finite.");
+             "|h y'|), entry by entry. Raises RuntimeError where steps become too short or y is "
+             "not finite.");
 }

@@ -45,11 +45,12 @@ def shows_progress(function: Callable[Arguments, Result]) -> Callable[Arguments,
     In a notebook it is then a line under the cell, which appears when the function takes longer
     than a second, and goes when it ends. Elsewhere nothing is shown.
     """
-    signature = inspect.signature(function)
 
     @functools.wraps(function)
     def showing(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
-        given = signature.bind(*args, **kwargs)
+        if not _in_notebook():
+            return function(*args, **kwargs)
+        given = inspect.signature(function).bind(*args, **kwargs)
         with reported(given.arguments.get("progress")) as report:
             given.arguments["progress"] = report
             return function(*given.args, **given.kwargs)

@@ -239,7 +239,8 @@ class _Search:
         steps, left = self.max_iterations, self.deadline.seconds_left
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
-        # From the guess anew, a motion would be moved out of its obstacles once more.
+        # Or a motion would be moved out of its obstacles once more. Within limits alone a solve
+        # from the guess takes fewer steps.
         near = True if problem.distances is not None else None
         return solve_on_grid(
             problem,
