@@ -304,7 +304,11 @@ def warm(side: int, robot: str = "ur5") -> None:
     print(
         f"\nthe same minima or lower in {100 * (1 - len(worse) / len(found)):.1f} % of the cells;"
     )
-    print(f"lower ones in {int((found['cost'] < cold['cost'] * (1 - 1e-6)).sum())}.")
+    both = cold["success"] & found["success"]
+    print(f"lower ones in {int((both & (found['cost'] < cold['cost'] * (1 - 1e-6))).sum())} of the")
+    print(f"{int(both.sum())} where both have one.")
+    higher = (100 * (found["cost"] / cold["cost"] - 1))[both & ~same]
+    print(f"Higher by {higher.median():.2g} % in the median and {higher.max():.2g} % at most:")
     for cell in worse["cell"]:
         print(f"cell {cell}: {cold['cost'][cell]:.6g} cold, {found['cost'][cell]:.6g} warm")
 
