@@ -236,20 +236,23 @@ class _Search:
         self, problem: TrajectoryProblem, guess: Trajectory | DiscretePath, last: Candidate
     ) -> Solution:
         """Solve with the remaining time, from the last candidate's motion or a finer one."""
-        steps, left = self.max_iterations, self.deadline.seconds_left
+        steps = self.max_iterations
         if last.whirl is not None:
             steps = min(steps, MAX_WORK // problem.grid.intervals)
-        # Or a motion would be moved out of its obstacles once more. Within limits alone a solve
-        # from the guess takes fewer steps.
-        near = True if problem.distances is not None else None
-        return solve_on_grid(
-            problem,
-            guess,
-            max_iterations=steps,
-            time_limit=left,
-            near=near,
-            barrier=self.tolerance.barrier,
-        )
+        # A motion would be moved out of its obstacles once more, were it not for `near`. Within
+        # limits alone a solve from the guess takes fewer steps, where it ends well.
+        for near in (True,) if problem.distances is not None else (None, True):
+            solution = solve_on_grid(
+                problem,
+                guess,
+                max_iterations=steps,
+                time_limit=self.deadline.seconds_left,
+                near=near,
+                barrier=self.tolerance.barrier,
+            )
+            if solution.status is not Status.INFEASIBLE:  # the last grid has a motion
+                break
+        return solution
 
     def _finished(self, chosen: Candidate, reason: str) -> Solution:
         """The chosen solution with its accuracy."""
