@@ -42,6 +42,8 @@ MAX_EXPANSION = 50
 """Maximum ratio of unpacked to packed size; real data compresses less."""
 _MARGIN = 2**16  # overhead of zip and npy
 _HEADER = "header"
+_ZIP = b"PK"
+"""What every zip file, and so every npz, begins with."""
 _HASH = "sha256"
 _DOUBLES = np.dtype("<f8")
 _BYTES = np.dtype("u1")
@@ -98,6 +100,10 @@ def read_arrays(
     label = f"trajectory file {Path(path).name!r}"
     try:
         require_file(path, MAX_BYTES + _MARGIN)
+        if _first_bytes(path) != _ZIP:
+            raise TrajectoryFileError(
+                f"{label} is not a motion: expected an .npz file, as `hovi plan --out` writes it."
+            )
         with zipfile.ZipFile(path) as archive:
             members = {info.filename: info for info in archive.infolist()}
             if len(members) < len(archive.infolist()):
@@ -119,6 +125,11 @@ def read_arrays(
         raise TrajectoryFileError(f"{label} is damaged: {error}.") from error
     header = _decode_header(_decode_array(raw.pop(_HEADER), _BYTES, f"{label}, header"), label)
     return header, {name: _decode_doubles(raw[name], f"{label}, {name!r}") for name in raw}
+
+
+def _first_bytes(path: str | os.PathLike[str]) -> bytes:
+    with Path(path).open("rb") as stream:
+        return stream.read(len(_ZIP))
 
 
 def require_unchanged(header: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:

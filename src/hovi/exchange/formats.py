@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hovi.checks.arguments import check_arguments_except
+from hovi.discrete.output.caution import warn_of_caution
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
 
@@ -38,9 +39,11 @@ class ExportFormat:
         """Write a motion, completely or not at all.
 
         rate: samples per second; that of the format when None. options: of the writer.
+        Warns of a motion that its plan called no minimum, or in which links enter each other.
         Raises InputError for an invalid rate and for a motion that the format cannot hold,
         DisplayError when the file cannot be written or an optional library is missing.
         """
+        warn_of_caution(trajectory.metadata)
         module, name = self.writer.split(":")
         write = getattr(importlib.import_module(module), name)
         write(trajectory, path, self.rate if rate is None else rate, **options)
@@ -73,6 +76,18 @@ def export_format(name: str) -> ExportFormat:
     return by_name[name]
 
 
+def format_of_file(path: Path) -> ExportFormat:
+    """The format of a file by its extension. Raises InputError for one of no format."""
+    by_suffix = {each: chosen for chosen in FORMATS for each in chosen.suffixes}
+    suffix = path.suffix.lower()
+    if suffix not in by_suffix:
+        raise InputError(
+            f"the file {path.name!r} has the extension of no export format: "
+            f"{nearest(suffix, by_suffix)}"
+        )
+    return by_suffix[suffix]
+
+
 @check_arguments_except("trajectory")
 def export(
     trajectory: Trajectory,
@@ -93,18 +108,11 @@ def export(
     missing.
     """
     expect(trajectory, Trajectory, "the trajectory of a solution")
-    suffix = Path(path).suffix.lower()
     if format is None:
-        by_suffix = {each: chosen for chosen in FORMATS for each in chosen.suffixes}
-        if suffix not in by_suffix:
-            raise InputError(
-                f"the file {Path(path).name!r} has the extension of no export format: "
-                f"{nearest(suffix, by_suffix)}"
-            )
-        chosen = by_suffix[suffix]
+        chosen = format_of_file(Path(path))
     else:
         chosen = export_format(format)
-        if suffix not in chosen.suffixes:
+        if Path(path).suffix.lower() not in chosen.suffixes:
             raise InputError(
                 f"a file of the format {format!r} must end in {' or '.join(chosen.suffixes)}, not "
                 f"{Path(path).name!r}."

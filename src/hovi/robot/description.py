@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -21,6 +22,8 @@ from hovi.robot.urdf.spelling import ignored_names
 
 Array = npt.NDArray[np.float64]
 
+_MOST_FRAMES = 12
+_WIDTH = 79
 _ROW = "  {:<{width}}  {:<11}{:>10}{:>10}{:>11}{:>10}"
 
 
@@ -90,7 +93,18 @@ def _place(model: pin.Model, source: RobotSource, tips: Sequence[str]) -> str:
     joints = [f"{name} at {at:g}" if at else name for name, at in source.held.items()]
     locked = f"; locked: {', '.join(joints)}" if joints else ""
     ends = f"Tip frame{'' if len(tips) == 1 else 's'}: {', '.join(tips)}"
-    return f"Base: {base}{locked}. {ends} ({_count(model.nframes, 'frame')})."
+    return f"Base: {base}{locked}. {ends}.\n{_frames(model)}"
+
+
+def _frames(model: pin.Model) -> str:
+    """The links that goals may name, from the tips to the base; frames of joints are left out."""
+    joints = pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT
+    frames = reversed(list(model.frames)[1:])
+    names = [frame.name for frame in frames if frame.type not in joints]
+    rest = len(names) - _MOST_FRAMES
+    more = f", and {rest} more in robot.frame_names" if rest > 0 else ""
+    listed = ", ".join(names[:_MOST_FRAMES]) or "none"
+    return textwrap.fill(f"Frames: {listed}{more}.", _WIDTH, subsequent_indent="  ")
 
 
 def _opt_in_parts(model: pin.Model) -> Iterator[str]:

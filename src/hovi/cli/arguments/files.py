@@ -21,6 +21,8 @@ def find_scene(scene: str) -> Path:
     if scene in example_scenes():
         return example(f"{scene}.toml")
     hint = nearest(path.stem, example_scenes())
+    if path.suffix and not hint.startswith("did you mean"):  # a path: the names would not help
+        raise SceneError(f"there is no scene file {scene!r}; check the path.")
     raise SceneError(
         f"there is no scene file {scene!r}; among the scenes shipped with hovi, {hint}"
     )

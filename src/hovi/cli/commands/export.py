@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from hovi.exchange.formats import ExportFormat
 
 
 def export(
@@ -14,7 +17,8 @@ def export(
         Path | None, typer.Argument(metavar="OUT", help="Short for --out.")
     ] = None,
     format_: Annotated[
-        str | None, typer.Option("--format", metavar="NAME", help="Format, such as csv.")
+        str | None,
+        typer.Option("--format", metavar="NAME", help="Such as csv; default: by the name of OUT."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -32,25 +36,28 @@ def export(
     Formats: csv, numpy, parquet, joint-trajectory, mcap, mujoco, rerun, video, gif.
     """
     from hovi.cli.arguments.files import check_output, load_trajectory
-    from hovi.exchange.formats import export_format
 
-    chosen = export_format(_format_name(format_, csv))
-    target = check_output(
-        _output(positional, out) or _beside(file, chosen.suffix), *chosen.suffixes
-    )
+    given = _output(positional, out)
+    chosen = _format(format_, csv, given)
+    target = check_output(given or _beside(file, chosen.suffix), *chosen.suffixes)
     _require_other_file(target, file)
     chosen.write(load_trajectory(file), target, rate)
     print(f"wrote {target}")
 
 
-def _format_name(name: str | None, csv: bool) -> str:
+def _format(name: str | None, csv: bool, out: Path | None) -> ExportFormat:
+    """The format with a name, or that of the output file."""
     from hovi.errors import InputError
+    from hovi.exchange.formats import FORMATS, export_format, format_of_file
 
-    if name is None and not csv:
-        raise InputError("no export format was given; use --format NAME or --csv.")
     if csv and name not in (None, "csv"):
         raise InputError(f"two formats were given; use --csv or --format {name}.")
-    return name or "csv"
+    if name is not None or csv:
+        return export_format(name or "csv")
+    if out is not None:
+        return format_of_file(out)
+    names = ", ".join(each.name for each in FORMATS)
+    raise InputError(f"no export format was given; use --format with one of {names}.")
 
 
 def _beside(file: Path, suffix: str) -> Path:

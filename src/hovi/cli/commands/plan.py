@@ -146,7 +146,8 @@ def _guess(guess: str) -> str | Trajectory:
 
 
 def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
-    """Plan, write, print; returns the exit code."""
+    """Plan, write, print; returns the exit code. Where there is no motion, nothing is written."""
+    from hovi.cli.reports.limit_margins import is_guess
     from hovi.cli.reports.plan import as_json, print_report
     from hovi.errors import TrajectoryFileError
     from hovi.planning.task_file.task_plan import plan_task
@@ -158,7 +159,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
         _note_assumptions(task)
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
-    written, save_error = out, None
+    written, save_error = None if is_guess(solution) else out, None
     if written is not None:
         try:
             solution.trajectory.save(written)
@@ -172,6 +173,8 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
             print(as_json(solution, task, written, margins, certificate))
         else:
             print_report(solution, task, written, margins, certificate)
+            if out is not None and is_guess(solution):
+                print("wrote nothing, as there is no motion")
     finally:  # also where nobody reads the report
         if save_error is not None:
             raise save_error

@@ -80,7 +80,6 @@ def print_report(
     for label, text in _summary(solution, task, margins):
         print(f"{label:9s}{text}")
     if is_guess(solution):
-        _print_file(out, solution)
         return
     arm = limit_set_of(task)
     if arm is not None:
@@ -123,10 +122,11 @@ def _estimate(solution: Solution, certificate: Certificate | None) -> float | No
 
 def _summary(solution: Solution, task: Task, margins: KnownMargins) -> list[tuple[str, str]]:
     """Labels and their text."""
+    rows = [("status", str(solution.status)), ("message", solution.message)]
+    if is_guess(solution):
+        return rows
     grid = solution.trajectory.grid
-    rows = [
-        ("status", str(solution.status)),
-        ("message", solution.message),
+    rows += [
         ("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"),
         ("effort", "none" if solution.effort is None else f"{solution.effort:.10g}"),
         ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
@@ -151,8 +151,6 @@ def _usable(violation: str) -> str:
 
 def _infeasible_note(solution: Solution) -> str:
     """A note on the cost of an infeasible problem; "" otherwise."""
-    if is_guess(solution):
-        return " of the guess, as there is no motion"
     unfit = solution.status == Status.INFEASIBLE
     return " of the motion below, which violates the constraints" if unfit else ""
 

@@ -9,6 +9,7 @@ from typing import Any, ParamSpec, Protocol, cast
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.grid import Grid
+from hovi.discrete.output.caution import CAUTION
 from hovi.discrete.state import State, warn_of_degrees
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, SceneError, expect, warn
@@ -20,6 +21,7 @@ from hovi.planning.problem.presolve.findings import findings
 from hovi.planning.problem.presolve.length_slips import grasped_slips
 from hovi.planning.problem.units import Duration, as_duration
 from hovi.planning.refinement.adaptive import first_grid
+from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
@@ -160,11 +162,19 @@ def with_notes(
     weighted = options.weight is not None
     of_scenes = [assumptions(scene, found.trajectory, weighted) for scene in scenes]
     said = [each for each in of_scenes[0] if all(each in others for others in of_scenes)]
+    against = [] if found.success else [found.message]
     if not options.self_collision and found.status not in UNSEEN:
-        said.append(self_collision_sentence(found.trajectory))
+        entered = self_collision_sentence(found.trajectory)
+        said.append(entered)
+        against.append(entered)
     message = " ".join([found.message, *filter(None, said)])
     setup = found.setup_seconds if setup_seconds is None else setup_seconds
-    return dataclasses.replace(found, message=message, setup_seconds=setup)
+    found = dataclasses.replace(found, message=message, setup_seconds=setup)
+    caution = " ".join(filter(None, against))
+    if not caution:
+        return found
+    motion = with_metadata(found.trajectory, **{CAUTION: caution})
+    return dataclasses.replace(found, trajectory=motion)
 
 
 def run(search: Search, began: float) -> Solution:

@@ -189,6 +189,11 @@ def _validated(data: Mapping[str, Any], toml: TomlText) -> ShapedTable:
 
 
 def _syntax_sentence(toml: TomlText, reason: str) -> str:
+    if toml.path.suffix.lower() != ".toml":
+        return (
+            f'a scene file ends in .toml and names its robot, such as robot = "arm.urdf", but '
+            f"{toml.path.name!r} is no TOML; `hovi info` describes a robot."
+        )
     place = re.search(r" \(at line (\d+), column (\d+)\)$", reason)
     if place is None:
         return f"{toml.path} is not valid TOML: {reason.removesuffix('.')}."

@@ -84,7 +84,8 @@ def angles_in_degrees(
         return ""
     i = int(found[0])
     largest = float(q[np.argmax(np.abs(q[:, i])), i])
-    more = f", as {len(found) - 1} more are" if len(found) > 1 else ""
+    count = len(found) - 1
+    more = f" ({count} more {'joint' if count == 1 else 'joints'} too)" if count else ""
     return (
         f"{names[i]} is {largest:g} rad in a given configuration{more}, which looks like degrees: "
         f"{largest:g} degrees are {np.radians(largest):.4g} rad"

@@ -19,6 +19,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.measures.motion_effort import effort_of
 from hovi.discrete.measures.motion_extremes import extremes
+from hovi.discrete.output.caution import caution_of
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, HoviError, expect
 from hovi.flows.execution.dynamics_replay import DynamicsReplay, replay_dynamics
@@ -105,6 +106,9 @@ def _curves(trajectory: Trajectory) -> str:
 def _certificate(trajectory: Trajectory) -> Iterator[Row]:
     """What was recorded when the motion was planned, and what is checked now."""
     data = trajectory.metadata
+    caution = caution_of(data)
+    if caution:
+        yield "caution", caution
     recorded = {
         "cost": "cost (discrete action)",
         "error_estimate": "estimated error of the cost, relative",
