@@ -412,14 +412,24 @@ def test_export_writes_a_table(run: Run, motion: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--csv"], ["--format", "csv"], ["--csv", "--format", "csv"]]
+    "arguments", [[], ["--csv"], ["--format", "csv"], ["--csv", "--format", "csv"]]
 )
-def test_an_export_format_is_given_by_name_or_option(
+def test_an_export_format_is_given_by_name_option_or_file(
     arguments: list[str], run: Run, motion: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "reach.csv"
     assert run("export", motion, *arguments, "--out", target)[0] == 0
     assert target.read_text().startswith("t,q_")
+
+
+def test_nothing_is_written_where_there_is_no_motion(run: Run, tmp_path: Path) -> None:
+    scene, out = tmp_path / "fast.toml", tmp_path / "fast.npz"
+    text = example("ur5_reach_limited.toml").read_text()
+    scene.write_text(re.sub("(?m)^duration = .*$", "duration = 0.01", text))
+    code, said, _ = run("plan", scene, "--out", out)
+    assert (code, out.exists()) == (1, False)
+    assert "infeasible" in said
+    assert "wrote nothing, as there is no motion" in said
 
 
 def test_every_format_has_a_file_name_of_its_own(run: Run, motion: Path, tmp_path: Path) -> None:
@@ -574,7 +584,11 @@ COMMANDS: dict[str, tuple[Sequence[str], list[str]]] = {
     "no such scene, to info": (["info", "two_link_swingup"], ["'two_link_swing_up'"]),
     "no such URDF": (["info", "nowhere.urdf"], ["nowhere.urdf"]),
     "no such motion": (["plot", "nowhere.npz"], ["nowhere.npz"]),
-    "no format": (["export", "nowhere.npz"], ["--csv"]),
+    "no format": (["export", "nowhere.npz"], ["--format", "csv", "joint-trajectory"]),
+    "an extension of no format": (["export", "m.npz", "--out", "m.cvs"], ["'.csv'"]),
+    "a robot as a scene": (["plan", str(example("two_link.urdf"))], ["no TOML", "hovi info"]),
+    "a scene as a motion": (["replay", str(example("ur5_reach.toml"))], ["not a motion"]),
+    "a path to nothing": (["plan", "nowhere/scene.toml"], ["check the path"]),
     "no such format": (["export", "nowhere.npz", "--format", "cvs"], ["'cvs'", "'csv'"]),
     "two formats": (["export", "m.npz", "--csv", "--format", "npy"], ["--csv", "--format npy"]),
     "two files": (["export", "m.npz", "a.csv", "--csv", "--out", "b.csv"], ["a.csv", "b.csv"]),

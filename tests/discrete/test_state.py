@@ -26,7 +26,7 @@ def test_ends_in_degrees_cause_a_warning(arm_scene: Scene) -> None:
     with pytest.warns(HoviWarning) as caught:
         plan(arm_scene, [0.0, 0.0], [90.0, -45.0], 1.0, intervals=4, max_iterations=1)
     assert [str(each.message) for each in caught] == [
-        "shoulder is 90 rad in a given configuration, as 1 more are, which looks like degrees: "
+        "shoulder is 90 rad in a given configuration (1 more joint too), which looks like degrees: "
         "90 degrees are 1.571 rad; configurations are in radians."
     ]
 

@@ -317,8 +317,16 @@ def test_inconsistent_files_are_refused(saved: Path, name: str) -> None:
         Trajectory.load(saved)
 
 
-@pytest.mark.parametrize("content", [b"", b"PK", b"hello", b"\x93NUMPY" * 100, b"\0" * 10_000])
+@pytest.mark.parametrize("content", [b"", b"hello", b"\x93NUMPY" * 100, b"\0" * 10_000])
 def test_files_of_another_kind_are_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "motion.npz"
+    path.write_bytes(content)
+    with pytest.raises(TrajectoryFileError, match=r"'motion\.npz' is not a motion: expected"):
+        Trajectory.load(path)
+
+
+@pytest.mark.parametrize("content", [b"PK", b"PK\x03\x04" * 100])
+def test_an_incomplete_archive_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "motion.npz"
     path.write_bytes(content)
     with pytest.raises(TrajectoryFileError, match=r"'motion\.npz' is not a complete npz file"):

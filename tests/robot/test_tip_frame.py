@@ -219,9 +219,11 @@ def test_frames_are_named_in_sentences() -> None:
 
 def test_the_command_names_all_tips(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["info", "baxter"]) == 0
-    assert "Tip frames: left_gripper, right_gripper (" in capsys.readouterr().out
+    assert "Tip frames: left_gripper, right_gripper.\n" in capsys.readouterr().out
     assert main(["info", "ur5"]) == 0
-    assert "Tip frame: tool0 (" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "Tip frame: tool0.\nFrames: tool0, ee_link, wrist_3_link, " in out
+    assert "wrist_3_joint," not in out.partition("Frames:")[2]
 
 
 # Distances
