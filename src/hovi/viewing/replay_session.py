@@ -249,8 +249,8 @@ def _fill(
     loop: bool,
 ) -> Replay:
     """Draw motions on a page, with all that is shown beside them."""
-    warn_of_caution(trajectory.metadata)
     robot = _robot(trajectory)
+    warn_of_caution(trajectory.metadata)
     others = [(each, _robot(each)) for each in compare]
     highlights = Highlights.of(trajectory, robot, frame_times(trajectory))
     page.title, page.note = _title(trajectory, robot), _note(trajectory, robot, highlights)
