@@ -72,7 +72,8 @@ enum class Known : std::int64_t { exactly, far, not_at_all };
 
 // points: configurations, (P, nq). pairs: numbers of k pairs. force: weights of the second
 // derivatives, (P, k), or null. wanted: which distances are, (P, k), or null for all; others count
-// as far. rounding: eps of rounding.hpp, in [m]; 0 for the shapes as they are.
+// as far. rounding: eps of rounding.hpp, (P, k), in [m], 0 for shapes as they are, or null for all of
+// them.
 struct Request {
   std::size_t points;
   const double* q;
@@ -81,7 +82,7 @@ struct Request {
   double reach;
   const double* force;
   const bool* wanted;
-  double rounding;
+  const double* rounding;
 };
 
 // distance, known: (P, k). jacobian: (P, k, nv), or null; zero where the distance is not known

@@ -257,8 +257,9 @@ void measure(const Model& model, const Request& request, const Answer& answer, d
       Known known = Known::far;
       answer.distance[at] = request.reach;
       if (!request.wanted || request.wanted[at])
-        known = measure_pair(model, pair, work, request.reach, request.rounding, work.memory[k],
-                             contact, answer.distance[at]);
+        known = measure_pair(model, pair, work, request.reach,
+                             request.rounding ? request.rounding[at] : 0.0, work.memory[k], contact,
+                             answer.distance[at]);
       answer.known[at] = static_cast<std::int64_t>(known);
       if (!answer.jacobian) continue;
       double* const slope = answer.jacobian + at * nv;

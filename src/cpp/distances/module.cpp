@@ -166,20 +166,24 @@ Request request_of(const PairDistances& self, const Input<2>& q, const Index& ch
   const std::size_t pairs = chosen.shape(0);
   for (std::size_t k = 0; k < pairs; ++k)
     natural("chosen", chosen.data()[k], static_cast<std::int64_t>(self.size()));
-  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr, 0.0};
+  return {points, q.data(), pairs, chosen.data(), reach, nullptr, nullptr, nullptr};
 }
 
-double rounding_of(double rounding) {
-  if (!(0.0 <= rounding && rounding <= most_rounding)) refuse("rounding must be from 0 to 1 m.");
-  return rounding;
+const double* rounding_of(const std::optional<Input<2>>& rounding, std::size_t points,
+                          std::size_t pairs) {
+  const double* const sizes = data_or_null("rounding", rounding, {points, pairs});
+  for (std::size_t i = 0; sizes && i < points * pairs; ++i)
+    if (!(0.0 <= sizes[i] && sizes[i] <= most_rounding)) refuse("rounding must be from 0 to 1 m.");
+  return sizes;
 }
 
 void values(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const Output<2>& distances, const IndexOut2& known,
-            const std::optional<Mask2>& wanted, double rounding) {
+            const std::optional<Mask2>& wanted,
+            const std::optional<Input<2>>& rounding) {
   Request request = request_of(self, q, chosen, reach);
   request.wanted = data_or_null("wanted", wanted, {request.points, request.pairs});
-  request.rounding = rounding_of(rounding);
+  request.rounding = rounding_of(rounding, request.points, request.pairs);
   distances.require("distances", {request.points, request.pairs});
   known.require("known", {request.points, request.pairs});
   const nb::gil_scoped_release released;
@@ -189,10 +193,11 @@ void values(const PairDistances& self, const Input<2>& q, const Index& chosen, d
 void expand(const PairDistances& self, const Input<2>& q, const Index& chosen, double reach,
             const std::optional<Input<2>>& force, const Output<2>& distances,
             const IndexOut2& known, const Output<3>& jacobian, const Output<3>& curvature,
-            const std::optional<Mask2>& wanted, double rounding) {
+            const std::optional<Mask2>& wanted,
+            const std::optional<Input<2>>& rounding) {
   Request request = request_of(self, q, chosen, reach);
-  request.rounding = rounding_of(rounding);
   const std::size_t P = request.points, K = request.pairs, nv = self.nv();
+  request.rounding = rounding_of(rounding, P, K);
   request.force = data_or_null("force", force, {P, K});
   request.wanted = data_or_null("wanted", wanted, {P, K});
   distances.require("distances", {P, K});
@@ -216,7 +221,7 @@ NB_MODULE(distances, m) {
       .def_prop_ro("nv", &PairDistances::nv)
       .def_prop_ro("size", &PairDistances::size)
       .def("values", &values, "q"_a, "chosen"_a, "reach"_a, "distances"_a, "known"_a,
-           "wanted"_a = nb::none(), "rounding"_a = 0.0)
+           "wanted"_a = nb::none(), "rounding"_a = nb::none())
       .def("expand", &expand, "q"_a, "chosen"_a, "reach"_a, "force"_a.none(), "distances"_a,
-           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(), "rounding"_a = 0.0);
+           "known"_a, "jacobian"_a, "curvature"_a, "wanted"_a = nb::none(), "rounding"_a = nb::none());
 }

@@ -15,6 +15,8 @@ constexpr int most_iterations = 500;
 // ends, for polyhedra and for round cores, at which Newton's method takes over, and up to which a
 // distance is used if the iteration stagnates.
 constexpr double tight_gap = 1e-14, round_gap = 1e-12, coarse_gap = 1e-5, allowed_gap = 1e-9;
+// The same, in [m], where the cores nearly touch.
+constexpr double allowed_error = 1e-12;
 // Distance of cores in [m], below which they count as overlapping: the normal would be rounding.
 constexpr double least_distance = 1e-9;
 
@@ -133,11 +135,13 @@ inline Known find_nearest(const Model& model, const Placed& placed, double reach
     if (bound > reach) return Known::far;
     const bool found = square - below <= gap * square || holds_last(simplex);
     if (!found) {
-      face = nearest_face(simplex);
-      if (face.count == 0) return Known::not_at_all;
-      const Vector next = face.nearest(simplex.y);
+      const Face nearer = nearest_face(simplex);
+      // A flat tetrahedron may seem to have the origin inside although the cores are apart.
+      if (nearer.count == 0 && bound <= 0.0) return Known::not_at_all;
+      const Vector next = nearer.nearest(simplex.y);
       const double smaller = dot(next, next);
-      if (smaller < square) {
+      if (nearer.count > 0 && smaller < square) {
+        face = nearer;
         w = next;
         square = smaller;
         continue;
@@ -145,7 +149,8 @@ inline Known find_nearest(const Model& model, const Placed& placed, double reach
     }
     simplex.count = last;
     const double allowed = gap > allowed_gap ? gap : allowed_gap;
-    return square - bound * size <= allowed * square ? Known::exactly : Known::not_at_all;
+    const bool near = square - bound * size <= allowed * square || size - bound <= allowed_error;
+    return near ? Known::exactly : Known::not_at_all;
   }
   simplex.count = 0;
   return Known::not_at_all;

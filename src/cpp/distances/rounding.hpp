@@ -21,14 +21,18 @@ namespace hovi::distances {
 namespace {
 
 // Differences of heights, over eps, from which vertices have no weight.
-constexpr double most_below = 40.0;
+constexpr double most_below = 25.0;
 constexpr int rounding_steps = 40, rounding_halvings = 20;
-// Step of n at which Newton's method ends.
-constexpr double rounding_step = 1e-12;
-// Vertices that may gain weight while n turns by less than the first of these are looked at, by the
-// second if n turns further.
-constexpr double turns[] = {0.02, 0.3};
+// Step of n at which Newton's method ends: what remains is of the order of its square over eps.
+constexpr double rounding_step = 1e-10;
+// Vertices that may gain weight while n turns by less than this are looked at: by less of a turn
+// where these are too many, and by more of one where n turns further.
+constexpr double first_turn = 0.02, most_turn = 0.3;
+constexpr int turn_changes = 12;
 constexpr std::size_t most_candidates = 512;
+// Shapes of many vertices are rounded less, since more of them are near to each other: by these
+// sizes in [m], over the number of vertices, and at least.
+constexpr double rounding_of_all = 0.064, least_rounding = 2e-5;
 
 // The value of a support function, its gradient in the shape's frame, and its Hessian in the plane
 // of two directions.
@@ -162,22 +166,25 @@ inline void solve_plane(const Plane& M, double x, double y, double* out) {
   out[1] = inverse * (M.xx * y - M.xy * x);
 }
 
-// Newton's method for the largest separation near that of a contact, which becomes that of the
-// rounded shapes. It stays as it is where that fails, or would need many vertices.
-// False if n turns too far for the vertices that are looked at.
-inline bool round_within(const Model& model, const Placed& placed, double eps, double most,
-                         Contact& c) {
+enum class Rounded { found, too_many_vertices, turns_further, failed };
+
+// Newton's method for the largest separation near that of a contact, from a direction, which
+// becomes the one that it ends at. The contact becomes that of the rounded shapes if it is found
+// while n turns by less than `most`.
+inline Rounded round_within(const Model& model, const Placed& placed, double eps, double most,
+                            Vector& n, Contact& c) {
   Candidates near[2];
-  if (!find_candidates(model, *placed.first, turned_back(placed.at_first.rotation, c.n), eps,
-                       most, near[0]) ||
-      !find_candidates(model, *placed.second, -turned_back(placed.at_second.rotation, c.n), eps,
-                       most, near[1]))
-    return true;
-  Separation s = separation(near, placed, c.n, eps);
+  if (!find_candidates(model, *placed.first, turned_back(placed.at_first.rotation, n), eps, most,
+                       near[0]) ||
+      !find_candidates(model, *placed.second, -turned_back(placed.at_second.rotation, n), eps, most,
+                       near[1]))
+    return Rounded::too_many_vertices;
+  Separation s = separation(near, placed, n, eps);
+  const Vector before = n;
   Plane M;
   bool found = false;
   for (int step = 0; step < rounding_steps && !found; ++step) {
-    if (!stiffness(s, M)) return true;
+    if (!stiffness(s, M)) return Rounded::failed;
     const Vector w = placed.difference(s.own_first, s.own_second);
     double move[2];
     solve_plane(M, dot(w, s.tangent[0]), dot(w, s.tangent[1]), move);
@@ -194,10 +201,14 @@ inline bool round_within(const Model& model, const Placed& placed, double eps, d
     if (!better) break;
     s = next;
     found = size < rounding_step;
+    const Vector turn = s.n - before;
+    if (dot(turn, turn) > most * most) {  // on from the edge of what is looked at
+      const Vector edge = before + (0.9 * most / length(turn)) * turn;
+      n = (1.0 / length(edge)) * edge;
+      return Rounded::turns_further;
+    }
   }
-  const Vector turn = s.n - c.n;
-  if (dot(turn, turn) > most * most) return false;
-  if (!stiffness(s, M)) return true;
+  if (!stiffness(s, M)) return Rounded::failed;
   c.own_first = s.own_first;
   c.own_second = s.own_second;
   c.first = s.first;
@@ -210,11 +221,28 @@ inline bool round_within(const Model& model, const Placed& placed, double eps, d
   c.tangent[1] = s.tangent[1];
   c.bend[0] = s.at_first;
   c.bend[1] = s.at_second;
-  return true;
+  return Rounded::found;
 }
 
-inline void round_off(const Model& model, const Placed& placed, double eps, Contact& c) {
-  if (!round_within(model, placed, eps, turns[0], c)) round_within(model, placed, eps, turns[1], c);
+// By how much a shape is rounded where it is by `size` at most.
+inline double rounding_of(const Shape& shape, double size) {
+  if (shape.kind == ShapeKind::cylinder) return size;
+  const double share = rounding_of_all / double(shape.count);
+  const double most = share > least_rounding ? share : least_rounding;
+  return size < most ? size : most;
+}
+
+// The contact of the rounded shapes; it stays as it is where that is not found.
+inline void round_off(const Model& model, const Placed& placed, double size, Contact& c) {
+  const double eps = rounding_of(*placed.first, rounding_of(*placed.second, size));
+  Vector n = c.n;
+  double turn = first_turn, most = most_turn;
+  for (int change = 0; change < turn_changes; ++change) {
+    const Rounded how = round_within(model, placed, eps, turn, n, c);
+    if (how == Rounded::found || how == Rounded::failed) return;
+    if (how == Rounded::too_many_vertices) most = turn = 0.25 * turn;
+    if (how == Rounded::turns_further) turn = 4.0 * turn < most ? 4.0 * turn : most;
+  }
 }
 
 // Adds force d'' of rounded shapes to a matrix (nv, nv). work: at least 6 x columns.

@@ -44,7 +44,7 @@ class PairDistances:
         distances: Array,
         known: Index,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> None: ...
     def expand(
         self,
@@ -57,5 +57,5 @@ class PairDistances:
         jacobian: Array,
         curvature: Array,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> None: ...

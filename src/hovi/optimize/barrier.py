@@ -129,17 +129,20 @@ class Barrier:
         zl, zu = np.maximum(self.zl, mu / below), np.maximum(self.zu, mu / above)
         return dataclasses.replace(self, bounds=bounds, s=s, zl=zl, zu=zu, mu=mu)._clipped()
 
-    def refined(self, bounds: Bounds, y: Array, kept: Index, origin: Index) -> Barrier:
+    def refined(
+        self, bounds: Bounds, y: Array, kept: Index, origin: Index, before: Array
+    ) -> Barrier:
         """The barrier after some outputs were replaced: see Refinement.
 
         New slacks are at their outputs, as far as these are inside, and on the central path, or
-        with the multiplier of the output at whose place they are if that is larger.
-        y: all outputs, (R,).
+        with the multiplier of the output at whose place they are if that is larger. The slack of an
+        output that has moved away from its bounds has moved with it.
+        y: all outputs, (R,). before: those that are kept, as they were.
         """
         old, known = len(kept), origin >= 0
         margin = float(np.clip(ADDED_MARGIN * self.mu / self.scale, 1e-10, INITIAL_MARGIN))
         inside = np.where(np.arange(len(y)) >= old, margin, 0.0)
-        s = np.append(self.s[kept], y[old:])
+        s = np.append(self.s[kept] + self._moved_inside(y[:old] - before, kept), y[old:])
         whole = Barrier._at(
             bounds, np.clip(s, bounds.lower + inside, bounds.upper - inside), self.mu, self.scale
         )
@@ -147,6 +150,13 @@ class Barrier:
             z[:old] = former[kept]
             z[old:] = np.maximum(z[old:], np.where(known, former[origin], 0.0))
         return whole._clipped()
+
+    def _moved_inside(self, change: Array, kept: Index) -> Array:
+        """The change of outputs that have one bound and move away from it; 0 of others."""
+        bounds = self.bounds
+        free_above, free_below = ~bounds.has_upper[kept], ~bounds.has_lower[kept]
+        up, down = np.where(free_above, change, 0.0), np.where(free_below, change, 0.0)
+        return np.maximum(up, 0.0) + np.minimum(down, 0.0)
 
     def of(self, chosen: Index) -> Barrier:
         """The slacks and multipliers of some outputs; without force for the number -1."""

@@ -62,10 +62,15 @@ they are and to the mean density, and its largest value, relative to the mean de
 LEAST_REOPENED, LARGEST_REOPENED, MAX_REOPENINGS = 1e-5, 0.1, 6
 """Where outputs may be missed for a while: the least such parameter, the largest |y - s| at which
 slacks are moved away from their bounds instead of ending as diverged, and how many times."""
+REOPENED_LEVEL = 0.3
+"""The least such parameter, relative to the mean product of multipliers and gaps."""
 MARKED_AGAIN = 1.5
 """Product up to which a later point takes the place of a marked one, relative to its first."""
 MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
+ALIKE, MOST_GROWTH = 0.05, 4.0
+"""Relative difference of the actual and the predicted decrease up to which the radius grows by the
+second of these."""
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
@@ -78,6 +83,9 @@ DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
 """Multiplier, relative to the mean density, above which the bounds are taken as impossible."""
+SHORT_LENGTH, NO_LENGTH = 1e-4, 1e-8
+"""Length of a step, relative to a radius of at least 1, that is no progress where bounds are not
+met, and its length that is none anywhere."""
 MAX_STALLED_STEPS = 12
 """Consecutive steps without progress after which the iteration ends as diverged."""
 MAX_UNMET = 4
@@ -200,13 +208,17 @@ class _Iteration(BoundedSteps[X]):
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         length = trial.norm * step.share
-        last, radius = self.radius, next_radius(self.radius, length, ratio)
+        tried = length if step.decrease > 0.0 else trial.norm * min(step.along.primal, 1.0)
+        last, radius = self.radius, next_radius(self.radius, tried, ratio)
+        if abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+            radius = max(radius, MOST_GROWTH * last)
         matched = outcome.violation.max(initial=0.0) <= MATCHED
         if matched and not trial.newton and step.share < SHORT_SHARE:
             radius = min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
-        stalled = ratio <= 1e-4 or (length < 1e-4 * max(1.0, radius) and not outcome.feasible)
+        short = length < SHORT_LENGTH * max(1.0, radius)
+        stalled = ratio <= 1e-4 or (short and not (outcome.feasible and length > NO_LENGTH))
         self.stalled = self.stalled + 1 if stalled else 0
         if ratio <= 1e-4:
             if not self.cautious:  # the same again, as a plain step
@@ -258,7 +270,8 @@ class _Iteration(BoundedSteps[X]):
         if not objective.reopens or self.reopenings >= MAX_REOPENINGS or outside > LARGEST_REOPENED:
             return False
         self.reopenings += 1
-        share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED)
+        level = REOPENED_LEVEL * self.product / self.density
+        share = max(min(REOPENED * outside, MOST_REOPENED), LEAST_REOPENED, level)
         mu, margin = share * self.density, max(REOPENED * outside, LEAST_REOPENED)
         bounds, y = objective.bounds, outcome.outputs.y
         outcome.barrier = Barrier.central(bounds, y, mu, outcome.barrier.scale, margin)
@@ -317,8 +330,9 @@ class _Iteration(BoundedSteps[X]):
         outputs = self.objective.outputs(outcome.x)  # these may run out of time, so first of all
         if kept is not None:
             kept = kept[0], self.objective.outputs(kept[0])
+        before = outcome.outputs.y[found.kept]
         barrier = outcome.barrier.refined(
-            self.objective.bounds, outputs.y, found.kept, found.origin
+            self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
         outside = float(barrier.outside(outputs.y)[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density

@@ -66,13 +66,13 @@ class CompiledDistances:
         chosen: Index,
         reach: float,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> tuple[Array, Index]:
         """Distances of chosen pairs at configurations (P, nq), and how each is known, (P, k).
 
         reach: distance in [m], beyond which a lower bound of at least that is enough.
         wanted: which distances are, (P, k), all if None; others count as FAR at the reach.
-        rounding: see Distances.rounded.
+        rounding: see Distances.values.
         """
         distances = np.empty((len(q), len(chosen)))
         known = np.empty(distances.shape, dtype=np.int64)
@@ -87,7 +87,7 @@ class CompiledDistances:
         reach: float,
         force: Array | None = None,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> tuple[Array, Index, Array, Array]:
         """As values, with d' (P, k, nv) and the sum of force d'' (P, nv, nv), where exact.
 

@@ -100,7 +100,6 @@ class Distances:
         self.moving = frozenset(moving)
         self._measured = PairDistances(robot, geometry, moving)
         self._chosen = np.arange(len(pairs))
-        self._rounding = 0.0
 
     def restricted(self, pairs: Sequence[int]) -> Distances:
         """The distances of some of the pairs, by their numbers."""
@@ -110,18 +109,6 @@ class Distances:
         chosen.allowance = self.allowance[list(pairs)]
         chosen._chosen = np.ascontiguousarray(self._chosen[list(pairs)])
         return chosen
-
-    def rounded(self, size: float) -> Distances:
-        """The distances of shapes that are made slightly larger, and smooth, for solvers.
-
-        Where faces or edges are parallel, distances have kinks, since the nearest points jump.
-        Those of rounded shapes have none, and are smaller by at most `size` times the logarithm of
-        the number of vertices that are as near. What Coal measures stays as it is.
-        size: in [m].
-        """
-        rounded = copy.copy(self)
-        rounded._rounding = size
-        return rounded
 
     def at(self, q: Array, t: npt.ArrayLike) -> Array:
         """Configurations (P, nq) with their times, shape (P,) or one for all, in [s].
@@ -151,16 +138,24 @@ class Distances:
             raise InputError("distances to obstacles that move need times: see Distances.at.")
         return np.concatenate([q[:, :nq], *(path.poses(q[:, nq]) for path in self.paths)], axis=1)
 
-    def values(self, q: Array, reach: float = np.inf, wanted: Mask | None = None) -> Array:
+    def values(
+        self,
+        q: Array,
+        reach: float = np.inf,
+        wanted: Mask | None = None,
+        rounding: Array | None = None,
+    ) -> Array:
         """Signed distances with allowances at configurations (P, nq), shape (P, K), in [m].
 
-        Configurations along a motion take less time than others.
+        Configurations along a motion take less time than others. Where faces or edges are parallel,
+        distances have kinks, since the nearest points jump. Those of shapes that are rounded, and
+        so slightly larger, have none; they are smaller by at most the rounding times the logarithm
+        of the number of vertices that are as near. What Coal measures is not rounded.
         reach: distance beyond which a lower bound of at least that is returned, in [m].
         wanted: which distances are, shape (P, K), all if None; of others the reach is returned.
+        rounding: size by which shapes are rounded at most, shape (P, K), in [m]; none if None.
         """
-        distances = self._measured.values(
-            self._placed(q), self._chosen, reach, wanted, self._rounding
-        )
+        distances = self._measured.values(self._placed(q), self._chosen, reach, wanted, rounding)
         return distances + self.allowance if self.allowance.any() else distances
 
     def expand(self, q: Array, reach: float = np.inf) -> tuple[Array, Array]:
@@ -184,16 +179,17 @@ class Distances:
         force: Array | None,
         reach: float = np.inf,
         wanted: Mask | None = None,
+        rounding: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives, and the sum of force d'': see `expand`, `curvature`.
 
-        wanted: as for `values`.
+        wanted, rounding: as for `values`.
 
         Second derivatives are exact for one pair of nearest points, which moves along the vertices,
         edges, faces and round surfaces that it lies on; cylinders that overlap have none.
         """
         placed = self._placed(q)
-        found = self._measured.expand(placed, self._chosen, reach, force, wanted, self._rounding)
+        found = self._measured.expand(placed, self._chosen, reach, force, wanted, rounding)
         distances, jacobian, curvature = found
         if self.allowance.any():
             distances = distances + self.allowance

@@ -51,19 +51,20 @@ class PairDistances:
         pairs: Index,
         reach: float,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> Array:
         """Distances of pairs, by number, at configurations (P, nq), shape (P, k), in [m].
 
         reach: distance in [m], beyond which a lower bound of at least that is returned.
         wanted: which distances are, (P, k), all if None; of others the reach is returned.
-        rounding: see Distances.rounded.
+        rounding: see Distances.values.
         """
         distances = np.empty((len(q), len(pairs)))
         self._coal.reset()
         for part in self._parts(len(q), len(pairs)):
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
-            distances[part] = self._part_values(q[part], pairs, reach, some, rounding)
+            sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
+            distances[part] = self._part_values(q[part], pairs, reach, some, sizes)
         return distances
 
     def expand(
@@ -73,7 +74,7 @@ class PairDistances:
         reach: float,
         force: Array | None,
         wanted: Mask | None = None,
-        rounding: float = 0.0,
+        rounding: Array | None = None,
     ) -> tuple[Array, Array, Array]:
         """Distances, their derivatives (P, k, nv), and the sum of force d'', (P, nv, nv).
 
@@ -87,7 +88,8 @@ class PairDistances:
         for part in self._parts(P, k):
             weights = None if force is None else np.ascontiguousarray(force[part])
             some = None if wanted is None else np.ascontiguousarray(wanted[part])
-            found = self._part_expanded(q[part], pairs, reach, weights, some, rounding)
+            sizes = None if rounding is None else np.ascontiguousarray(rounding[part])
+            found = self._part_expanded(q[part], pairs, reach, weights, some, sizes)
             distances[part], jacobian[part], curvature[part] = found
         return distances, jacobian, curvature
 
@@ -96,7 +98,12 @@ class PairDistances:
         return [slice(first, first + size) for first in range(0, points, size)]
 
     def _part_values(
-        self, q: Array, pairs: Index, reach: float, wanted: Mask | None, rounding: float
+        self,
+        q: Array,
+        pairs: Index,
+        reach: float,
+        wanted: Mask | None,
+        rounding: Array | None,
     ) -> Array:
         raise_if_late()
         if self._compiled is None:
@@ -118,7 +125,7 @@ class PairDistances:
         reach: float,
         force: Array | None,
         wanted: Mask | None,
-        rounding: float,
+        rounding: Array | None,
     ) -> tuple[Array, Array, Array]:
         raise_if_late()
         P, k, nv = len(q), len(pairs), self._nv

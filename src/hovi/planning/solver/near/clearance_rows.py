@@ -36,8 +36,13 @@ from hovi.scene.lagrangian import PointTerms
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-ROUNDING = 2e-5
-"""Size by which shapes are rounded in rows, in [m]: see Distances.rounded."""
+ROUNDED_SHARE, LEAST_ROUNDING, MOST_ROUNDING = 0.1, 2e-5, 1e-3
+"""Size by which the shapes of a row are rounded, as a share of what the row is above its bound, and
+the least and the largest, in [m]: see Distances.values."""
+SHARPENED = 0.5
+"""Ratio of such a size to the present one below which it takes its place."""
+MOST_INFLATION = 10.0
+"""Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
 GUARD = 0.05
@@ -54,24 +59,24 @@ class ClearanceRows:
 
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
-        self.fixed, self.guard = False, GUARD
+        self.guard = GUARD
         self.probing = self.blocked = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._seen: tuple[DiscretePath, Array] | None = None
-        self._set(problem, np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0, dtype=np.intp))
+        self._last: tuple[DiscretePath, Array] | None = None
+        none = np.zeros(0, dtype=np.intp)
+        self._set(problem, none, np.zeros(0), none, np.zeros(0))
 
-    def copied(self, fixed: bool = False) -> ClearanceRows:
-        """The same rows, to be extended on their own, or not at all."""
-        rows = copy.copy(self)
-        rows.fixed = fixed
-        return rows
+    def copied(self) -> ClearanceRows:
+        """The same rows, to be extended on their own."""
+        return copy.copy(self)
 
     def on(self, problem: TrajectoryProblem) -> ClearanceRows:
         """The same rows of another problem, on as many intervals."""
         rows = copy.copy(self)
         rows._followed = None
-        rows._set(problem, self.intervals, self.positions, self.pairs)
+        rows._set(problem, self.intervals, self.positions, self.pairs, self.rounding)
         return rows
 
     @property
@@ -86,19 +91,25 @@ class ClearanceRows:
 
     def values(self, path: DiscretePath) -> Array:
         """y of every row, shape (E,)."""
+        if self._last is None or self._last[0] is not path:
+            self._last = path, self._values(path)
+        return self._last[1]
+
+    def _values(self, path: DiscretePath) -> Array:
         if self.size == 0:
             return np.zeros(0)
-        d = self._some.values(self._configurations(path), self._reach, self._wanted)
+        q = self._configurations(path)
+        d = self._some.values(q, self._reach, self._wanted, self._sizes)
         return saturated(self._excess(d))[0]
 
     def expanded(self, path: DiscretePath, force: Array, coordinates: Coordinates) -> ExpandedRows:
         """The rows with their derivatives. force: weights of their curvature, shape (E,)."""
         weights = np.zeros(self._wanted.shape)
         q, sums = self._configurations(path), self._sums
-        values = self._some.values(q, self._reach, self._wanted)
+        values = self._some.values(q, self._reach, self._wanted, self._sizes)
         _, slope, bend = saturated(self._excess(values))
         weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
-        found = self._some.expansion(q, weights, self._reach, self._wanted)
+        found = self._some.expansion(q, weights, self._reach, self._wanted, self._sizes)
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
         bent = ((force * bend)[:, None] * J)[:, :, None] * J[:, None]
         table = np.ascontiguousarray(self._batch.tables[coordinates][:, 0])
@@ -131,14 +142,25 @@ class ClearanceRows:
         While they are `probing`, the first motion that does not keep its distances sets `blocked`.
         ahead: distance beyond the least one up to which a pair counts as near, in [m].
         """
-        if self.fixed:
-            return 0
         found = approaches_along(problem, path, self.distances, self.least, ahead)
         if self.probing and found.nearest < self.least:
             self.blocked = True
             return 0
         self.probing = False
-        return self._add(problem, found)
+        return self._add(problem, path, found)
+
+    def sharpen(self, path: DiscretePath) -> bool:
+        """Round the shapes of rows less that have come nearer to their bounds; whether there are any.
+
+        Their outputs grow by that. Shapes that are rounder than their pair is far bend the motion
+        less, and so steps may be longer; at a bound they are nearly as they are.
+        """
+        size = _rounding_of(self.values(path))
+        sharper = size < SHARPENED * self.rounding
+        if not sharper.any():
+            return False
+        self._round(np.where(sharper, size, self.rounding))
+        return True
 
     def thinned(self, path: DiscretePath, within: float) -> tuple[ClearanceRows, Index]:
         """The rows of pairs that are near along a motion alone; others get rows later from now on.
@@ -149,7 +171,8 @@ class ClearanceRows:
         kept = self.values(path) <= within / DISTANCE_SCALE
         rows = copy.copy(self)
         rows._followed, rows.guard = None, 0.5 * within
-        rows._set(self._problem, self.intervals[kept], self.positions[kept], self.pairs[kept])
+        some = self.intervals[kept], self.positions[kept], self.pairs[kept], self.rounding[kept]
+        rows._set(self._problem, *some)
         limits = len(self.order) - self.size
         slots = np.empty(len(self.order), dtype=np.intp)
         slots[self.order] = np.arange(len(self.order))
@@ -165,11 +188,9 @@ class ClearanceRows:
 
     def follow(self, path: DiscretePath) -> int:
         """Add rows where pairs without rows have come near; returns how many."""
-        if self.fixed:
-            return 0
         d = self._spread_distances(path)
         found = spread_approaches(d, self._watched, self.least, self.guard)
-        return self._add(self._problem, found)
+        return self._add(self._problem, path, found)
 
     def _spread_distances(self, path: DiscretePath) -> Array:
         """Distances of all pairs at positions spread over the motion, (N SPREAD + 1, K)."""
@@ -179,31 +200,40 @@ class ClearanceRows:
             self._seen = path, self.distances.values(q, self.least + self.guard)
         return self._seen[1]
 
-    def _add(self, problem: TrajectoryProblem, found: Approaches) -> int:
-        """Add rows at approaches at which there are none yet."""
+    def _add(self, problem: TrajectoryProblem, path: DiscretePath, found: Approaches) -> int:
+        """Add rows at approaches of a path at which there are none yet."""
         found = found.other_than(self.intervals + self.positions, self.pairs)
         if len(found.pairs) == 0:
             return 0
         k = np.minimum(found.at.astype(np.intp), self.grid.intervals - 1)
         both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
         intervals, positions, pairs = (np.concatenate(each) for each in both)
-        self._set(problem, intervals, positions, pairs)
         added = len(found.pairs)
+        rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
+        self._set(problem, intervals, positions, pairs, rounding)
+        rounding[-added:] = _rounding_of(self._values(path)[-added:])
+        self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
 
     def _set(
-        self, problem: TrajectoryProblem, intervals: Index, positions: Array, pairs: Index
+        self,
+        problem: TrajectoryProblem,
+        intervals: Index,
+        positions: Array,
+        pairs: Index,
+        rounding: Array,
     ) -> None:
-        """Take rows: their intervals, positions in these, and numbers of their pairs, (E,)."""
+        """Take rows: their intervals, positions in these, numbers of their pairs and rounding, (E,)."""
         self.grid: Grid = problem.grid
         self._problem = problem
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
         at, self._instant = np.unique(intervals + 1j * positions, return_inverse=True)
         chosen, self._column = np.unique(pairs, return_inverse=True)
-        some = self.distances.restricted(chosen.tolist()).rounded(ROUNDING)
-        self._some, self._wanted = some, np.zeros((len(at), len(chosen)), dtype=bool)
+        self._some = self.distances.restricted(chosen.tolist())
+        self._wanted = np.zeros((len(at), len(chosen)), dtype=bool)
         self._wanted[self._instant, self._column] = True
+        self._round(rounding)
         self._sums = RowSums.of(at.real.astype(np.intp), self._instant)
         number = problem.grid.intervals * SPREAD + 1
         self._watched = np.tile(free_ones(problem, number)[:, None], (1, len(self.distances.pairs)))
@@ -211,6 +241,12 @@ class ClearanceRows:
         self._seen = None
         k, s = at.real.astype(np.intp), np.ascontiguousarray(at.imag)
         self._batch = InstantBatch(self.grid, k, s, np.ones(len(k)))
+
+    def _round(self, rounding: Array) -> None:
+        """Take sizes by which the shapes of rows are rounded, (E,), in [m]."""
+        self.rounding, self._last = rounding, None
+        self._sizes = np.zeros(self._wanted.shape)
+        self._sizes[self._instant, self._column] = rounding
 
     def _configurations(self, path: DiscretePath) -> Array:
         """q at the instants, as distances take it."""
@@ -223,4 +259,9 @@ class ClearanceRows:
     @property
     def _reach(self) -> float:
         """Distance beyond which a row is constant, in [m]."""
-        return self.least + CUTOFF[1] * DISTANCE_SCALE
+        return self.least + CUTOFF[1] * DISTANCE_SCALE + MOST_INFLATION * MOST_ROUNDING
+
+
+def _rounding_of(y: Array) -> Array:
+    """Sizes by which the shapes of rows are rounded, in [m]. y: of the rows, (E,)."""
+    return np.clip(ROUNDED_SHARE * DISTANCE_SCALE * y, LEAST_ROUNDING, MOST_ROUNDING)

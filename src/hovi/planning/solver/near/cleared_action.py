@@ -136,9 +136,10 @@ class ClearedAction(BoundedAction):
         assert self.rows is not None
         order, before = self.near.order, self.rows.size
         found = self.rows.refine(x, level)
+        sharper = self.near.sharpen(x)
         added = self.near.extend(self.problem, x, AHEAD * level * DISTANCE_SCALE)
         self.blocked = self.near.blocked
-        if found is None and added == 0:
+        if found is None and added == 0 and not sharper:
             return None
         kept, origin = np.arange(before), np.zeros(0, dtype=np.intp)
         if found is not None:
@@ -146,11 +147,13 @@ class ClearedAction(BoundedAction):
         return self._renumbered(order, before, kept, origin, added)
 
     def refine_at_once(self, x: DiscretePath) -> Refinement | None:
-        """Bound the distances of pairs that have come near in a step."""
+        """Bound the distances of pairs that have come near in a step, and round shapes less."""
         assert self.rows is not None
+        if self.near.size == 0:
+            return None
         order, before = self.near.order, self.rows.size
-        added = 0 if self.near.size == 0 else self.near.follow(x)
-        if added == 0:
+        sharper, added = self.near.sharpen(x), self.near.follow(x)
+        if added == 0 and not sharper:
             return None
         none = np.zeros(0, dtype=np.intp)
         return self._renumbered(order, before, np.arange(before), none, added)
