@@ -151,6 +151,25 @@ class Barrier:
             z[old:] = np.maximum(z[old:], np.where(known, former[origin], 0.0))
         return whole._clipped()
 
+    def handed_on(self, y: Array, new: Index, beside: Index) -> Barrier:
+        """New outputs that are below their lower bounds take over the forces of those beside them.
+
+        It is foreseen that all of these rise together until the new ones are at their bounds: slacks
+        are where they will be then, with products z gap of mu.
+        y: outputs, (R,). new, beside: see Refinement.handed.
+        """
+        rise = np.maximum(self.bounds.lower[new] - y[new], 0.0)
+        below = rise > 0.0
+        new, beside, rise = new[below], beside[below], rise[below]
+        s, zl = self.s.copy(), self.zl.copy()
+        zl[new] = 0.0
+        np.add.at(zl, new, self.zl[beside])
+        zl[new] = np.maximum(zl[new], self.mu / INITIAL_MARGIN)
+        s[new] = self.bounds.lower[new] + self.mu / zl[new]
+        s[beside] = self.s[beside] + rise
+        zl[beside] = self.mu / (s[beside] - self.bounds.lower[beside])
+        return dataclasses.replace(self, s=s, zl=zl)._clipped()
+
     def _moved_inside(self, change: Array, kept: Index) -> Array:
         """The change of outputs that have one bound and move away from it; 0 of others."""
         bounds = self.bounds

@@ -79,6 +79,11 @@ CUT_RADIUS = 10.0
 """The largest radius after such a step, relative to what was left of it."""
 LEAST_CUT_RADIUS = 1e-3
 """The least radius after such a step."""
+SHORTENED = 0.3
+"""Ratio of the radius after such a step while outputs are not matched; its square, where the step
+was refused."""
+OUTSIDE_RADIUS = 3.0
+"""The largest radius when outputs are added outside of their bounds."""
 DENSITY_FLOOR = 1e-9
 """Mean density of the initial objective below which 1 is used as its scale."""
 MAX_FORCE = 1e12
@@ -208,13 +213,7 @@ class _Iteration(BoundedSteps[X]):
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         length = trial.norm * step.share
-        tried = length if step.decrease > 0.0 else trial.norm * min(step.along.primal, 1.0)
-        last, radius = self.radius, next_radius(self.radius, tried, ratio)
-        if abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
-            radius = max(radius, MOST_GROWTH * last)
-        matched = outcome.violation.max(initial=0.0) <= MATCHED
-        if matched and not trial.newton and step.share < SHORT_SHARE:
-            radius = min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
+        last, radius = self.radius, self._next_radius(step, ratio)
         self.shift = next_shift(trial.shift, trial.norm, radius)
         self.radius = radius
         short = length < SHORT_LENGTH * max(1.0, radius)
@@ -238,6 +237,20 @@ class _Iteration(BoundedSteps[X]):
         self.violations.append(float(outcome.violation.max(initial=0.0)))
         self._mark(x)
         return True
+
+    def _next_radius(self, step: BoundedStep, ratio: float) -> float:
+        """The radius after a step, which the bounds may have cut."""
+        norm, last = step.trial.norm, self.radius
+        length = norm * step.share
+        radius = next_radius(last, length, ratio)
+        if abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+            return max(radius, MOST_GROWTH * last)
+        if step.trial.newton or step.share >= SHORT_SHARE:
+            return radius
+        if self.outcome.violation.max(initial=0.0) <= MATCHED:
+            return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
+        # towards bounds that are not met yet a radius as short as the step would lead nowhere
+        return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def _hold(self, reaction: Array | None, sign: float) -> float:
         """Change multipliers of equations by a step's, or take it back; returns what that adds."""
@@ -334,7 +347,13 @@ class _Iteration(BoundedSteps[X]):
         barrier = outcome.barrier.refined(
             self.objective.bounds, outputs.y, found.kept, found.origin, before
         )
-        outside = float(barrier.outside(outputs.y)[len(found.kept) :].max(initial=0.0))
+        beyond = barrier.outside(outputs.y)
+        if beyond[len(found.kept) :].any():
+            self.radius = min(self.radius, OUTSIDE_RADIUS)
+        if found.handed is not None:
+            barrier = barrier.handed_on(outputs.y, *found.handed)
+            beyond[found.handed[0]] = 0.0
+        outside = float(beyond[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move
             barrier = barrier.warm(barrier.bounds, outputs.y, mu, REOPENED * outside)

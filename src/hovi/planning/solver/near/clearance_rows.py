@@ -45,6 +45,8 @@ MOST_INFLATION = 10.0
 """Bound of what a rounded distance is shorter by, relative to the size."""
 WEIGHT = 0.1
 """Weight of a row in a barrier, as a share of the interval."""
+BESIDE = 0.3
+"""Distance up to which a row is beside a new one, relative to the interval."""
 GUARD = 0.05
 """Distance beyond the least one below which pairs get rows at once, in [m]."""
 
@@ -60,6 +62,7 @@ class ClearanceRows:
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
         self.guard = GUARD
+        self.handed: tuple[Index, Index] | None = None
         self.probing = self.blocked = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
@@ -209,12 +212,28 @@ class ClearanceRows:
         both = (self.intervals, k), (self.positions, found.at - k), (self.pairs, found.pairs)
         intervals, positions, pairs = (np.concatenate(each) for each in both)
         added = len(found.pairs)
+        self.handed = self._beside(found)
         rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         self._set(problem, intervals, positions, pairs, rounding)
         rounding[-added:] = _rounding_of(self._values(path)[-added:])
         self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
+
+    def _beside(self, found: Approaches) -> tuple[Index, Index]:
+        """Numbers of new rows at approaches, and of the rows beside them of the same pairs.
+
+        Each of these is beside the nearest new row, at most BESIDE of an interval away.
+        """
+        own = self.intervals + self.positions
+        new, old = [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)]
+        for pair in np.intersect1d(found.pairs, self.pairs):
+            here, there = np.flatnonzero(found.pairs == pair), np.flatnonzero(self.pairs == pair)
+            apart = np.abs(found.at[here][:, None] - own[there])
+            near = apart.min(axis=0) <= BESIDE
+            new.append(self.size + here[apart.argmin(axis=0)[near]])
+            old.append(there[near])
+        return np.concatenate(new), np.concatenate(old)
 
     def _set(
         self,

@@ -178,8 +178,17 @@ class ClearedAction(BoundedAction):
         self.near.order = np.concatenate([places[order][remaining], fresh, last])
         self._with_rows()
         origins = np.where(origin < 0, -1, first + slots[origin])
-        none = np.full(added, -1)
-        return Refinement(np.append(np.arange(first), first + remaining), np.append(origins, none))
+        both = np.append(np.arange(first), first + remaining), np.append(origins, np.full(added, -1))
+        return Refinement(*both, self._handed() if added else None)
+
+    def _handed(self) -> tuple[Index, Index] | None:
+        """Outputs of the rows of distances that were added last, and of those beside them."""
+        if self.near.handed is None or self.rows is None:
+            return None
+        slots = np.empty(len(self.near.order), dtype=np.intp)
+        slots[self.near.order] = self._point_count + np.arange(len(slots))
+        new, beside = (slots[self.rows.size + each] for each in self.near.handed)
+        return new, beside
 
     @property
     def _limit_count(self) -> int:
