@@ -214,6 +214,8 @@ def test_the_trace_is_the_path_of_the_tip(motion: Trajectory, tmp_path: Path) ->
     points = np.frombuffer(points.data, np.float32).reshape(-1, 3)
     ends = motion.robot.frame_position("tip", motion.q[[0, -1]])  # type: ignore[union-attr]
     np.testing.assert_allclose(points[[0, -1]], ends, atol=1e-6)
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert steps.max() < 1.1 * steps.mean()  # a line where the tip is fast, too
     assert not [m for m in messages(tmp_path / "without.html") if "trace" in m["path"]]
 
 

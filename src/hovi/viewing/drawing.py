@@ -40,7 +40,9 @@ _GHOST_OPACITY = 0.42
 _TRACE_COLOR = (0.80, 0.47, 0.65)
 _TRACE_WIDTH = 0.011  # relative to the picture's size
 _VIEW_SAMPLES = 60
-_TRACE_SAMPLES = 2_000
+_TRACE_SAMPLES = 2_000  # to measure a path by
+_TRACE_SPACING = 0.15  # of the points that draw it, relative to their width
+_TRACE_POINTS = 8_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +91,11 @@ def drawn(
     lower, upper = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
     if trace:
         width = _TRACE_WIDTH * float(np.linalg.norm(upper - lower))
-        _draw_trace(viewer["trace"], _tip_paths(trajectory, robot), width, _TRACE_COLOR)
+        paths = _tip_paths(trajectory, robot, width)
+        _draw_trace(viewer["trace"], paths, width, _TRACE_COLOR)
         for k, (each, other) in enumerate(others, start=1):
-            color = _rgb(ghost_color(k))
-            _draw_trace(viewer[f"trace/{k}"], _tip_paths(each, other), width, color)
+            paths = _tip_paths(each, other, width)
+            _draw_trace(viewer[f"trace/{k}"], paths, width, _rgb(ghost_color(k)))
     return Drawn(visualizer, tracks, tuple(ghosts), _view(viewer, lower, upper))
 
 
@@ -129,9 +132,22 @@ def _ghost(
     return visualizer
 
 
-def _tip_paths(trajectory: Trajectory, robot: Robot) -> Array:
-    q = trajectory.configurations(_times(trajectory, _TRACE_SAMPLES))
-    return np.asarray(robot.frame_positions(robot.tip_frames, q)).reshape(-1, 3)
+def _tip_paths(trajectory: Trajectory, robot: Robot, width: float) -> Array:
+    """Points along the paths of all tips, shape (M, 3), in [m].
+
+    They are a fraction of `width` apart, where a tip is fast as where it is slow, so that they
+    look like a line.
+    """
+    t, frames = _times(trajectory, _TRACE_SAMPLES), robot.tip_frames
+    tips = robot.frame_positions(frames, trajectory.configurations(t))  # (M, tips, 3)
+    steps = np.linalg.norm(np.diff(tips, axis=0), axis=2).max(axis=1)
+    passed = np.concatenate([[0.0], np.cumsum(steps)])
+    if not 0.0 < passed[-1] < np.inf:
+        return tips.reshape(-1, 3)
+    count = min(passed[-1] / (_TRACE_SPACING * width), _TRACE_POINTS / len(frames))
+    even = np.linspace(0.0, passed[-1], 2 + int(count))
+    points = robot.frame_positions(frames, trajectory.configurations(np.interp(even, passed, t)))
+    return points.reshape(-1, 3)
 
 
 def _times(trajectory: Trajectory, max_count: int) -> Array:
