@@ -26,6 +26,11 @@ def example(name: str) -> Path:
     raise SceneError(f"hovi ships no scene or URDF {name!r}; {nearest(name, known)}")
 
 
+def shipped_urdf(name: str) -> Path | None:
+    """The path of a URDF that ships with hovi, by its file name; None for any other name."""
+    return _shipped("**/*").get(name) if name.endswith(".urdf") else None
+
+
 def example_scenes() -> list[str]:
     """Names of the scenes that ship with hovi, without its suite of tasks, sorted."""
     return sorted(path.stem for path in _shipped("*").values() if path.suffix == ".toml")

@@ -106,6 +106,18 @@ def test_a_shipped_robot_is_named_and_not_copied(tmp_path: Path) -> None:
     assert load_task(path).scene.robot.nv == 7
 
 
+def test_a_copy_of_a_shipped_scene_finds_the_shipped_urdf(tmp_path: Path) -> None:
+    copy = tmp_path / "mine.toml"
+    copy.write_text(example("two_link_reach.toml").read_text())
+    assert load_task(copy).scene.robot.name == "two_link"
+    own = example("two_link.urdf").read_text().replace('name="two_link"', 'name="own"')
+    (tmp_path / "two_link.urdf").write_text(own)
+    assert load_task(copy).scene.robot.name == "own"  # a file beside the scene comes first
+    copy.write_text(copy.read_text().replace("two_link.urdf", "no.urdf"))
+    with pytest.raises(ModelError, match="cannot read the URDF"):
+        load_task(copy)
+
+
 def test_ends_may_be_given_by_joint_in_any_order(folder: Path) -> None:
     text = REACH.replace("q = [0.3, 0.7]", "q = { elbow = 0.7, shoulder = 0.3 }")
     text = text.replace("v = [0.5, -0.4]", "v = { elbow = -0.4 }")

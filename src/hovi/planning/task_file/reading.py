@@ -33,6 +33,7 @@ from hovi.planning.task_file.scene_cache import (
 from hovi.planning.task_file.schema import PLAIN, SchemeTable, ShapedTable, TaskTable
 from hovi.planning.task_file.segment_tables import check_keys, read_segments
 from hovi.planning.task_file.task import Task
+from hovi.robot.bundled_models import shipped_urdf
 from hovi.robot.formats.recognized import require_untrusted
 from hovi.robot.loading import load_robot
 from hovi.robot.robot import Robot
@@ -230,7 +231,7 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
     try:
         require_untrusted(table.robot)
         return load_robot(
-            folder / table.robot if is_file else table.robot,
+            _urdf(folder, table.robot) if is_file else table.robot,
             package_dirs=tuple(folder / each for each in table.package_dirs),
             free_flyer=table.free_flyer,
             mimic=table.mimic,
@@ -240,6 +241,15 @@ def _load_robot(table: ShapedTable, toml: TomlText) -> Robot:
     except HoviError as refused:
         line = toml.line(("robot",))
         raise type(refused)(f"{toml.path}, line {line}: {refused}") from None
+
+
+def _urdf(folder: Path, name: str) -> Path:
+    """The URDF of a scene file; where it is missing, the one of this name that ships with hovi.
+
+    So a copy of a scene that ships with hovi can be planned from any folder.
+    """
+    path, shipped = folder / name, shipped_urdf(name)
+    return path if shipped is None or path.exists() else shipped
 
 
 def _read_tolerance(given: Any, robot: Robot, toml: TomlText) -> float | str | None:
