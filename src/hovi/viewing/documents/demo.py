@@ -45,14 +45,14 @@ class Demonstration:
 
 MOTIONS = (
     Demonstration(
-        "panda_reach_limited",
-        "A Panda reaches",
-        "As far and as fast as the arm's data sheet allows: yellow links are at a limit.",
+        "panda_reach_down",
+        "A Panda reaches down",
+        "With little torque and jerk, as fast as its joints allow: a yellow link is at a limit.",
     ),
     Demonstration(
-        "ur5_around_sphere",
-        "Around a ball",
-        "A UR5 turns about its base and keeps 3 cm between every link and a ball.",
+        "ur5_past_ball",
+        "Past a ball",
+        "A UR5 turns about its base and keeps its links 3 cm from a ball and from each other.",
     ),
     Demonstration(
         "panda_lift",
