@@ -49,6 +49,30 @@ def test_a_frame_is_reached_with_the_hand_as_it_was(scene: hovi.Scene) -> None:
     np.testing.assert_allclose(reached, [0.45, 0.1, 0.5], atol=1e-9)
 
 
+def test_a_table_of_the_group_alone_leaves_the_other_joints_where_they_start(
+    scene: hovi.Scene, tmp_path: Path
+) -> None:
+    q = start_of(scene, 0.02)
+    table = {joint: float(x) + 0.2 for joint, x in zip(ARM, q, strict=False)}
+    whole = hovi.plan(scene, q, q + np.array([0.2] * 7 + [0, 0]), 1.5, group="arm", **FAST)
+    for goal in (table, {"q": table}, hovi.State(table)):
+        same = hovi.plan(scene, q, goal, 1.5, group="arm", **FAST)
+        assert same.cost == pytest.approx(whole.cost, rel=1e-12)
+    with pytest.raises(InputError, match="leaves out joint 'panda_finger_joint1'"):
+        hovi.plan(scene, q, table, 1.5, **FAST)
+    with pytest.raises(InputError, match="leaves out joint 'panda_joint7'"):
+        hovi.plan(scene, q, dict(list(table.items())[:6]), 1.5, group="arm", **FAST)
+    written = "{ " + ", ".join(f"{joint} = {x}" for joint, x in table.items()) + " }"
+    text = f'robot = "panda"\ngroup = "arm"\nstart.q = {q.tolist()}\nscheme = "galerkin-2"\n'
+    text += "intervals = 8\ncontinuation = false\n[effects.gravity]\n"
+    alone, parts = tmp_path / "alone.toml", tmp_path / "parts.toml"
+    alone.write_text(f"duration = 1.5\ngoal.q = {written}\n{text}")
+    parts.write_text(f"{text}[[segments]]\nduration = 1.5\ngoal.q = {written}\n")
+    for file in (alone, parts):
+        again = hovi.plan_task(hovi.load_task(file))
+        assert again.cost == pytest.approx(whole.cost, rel=1e-6)
+
+
 def test_a_goal_that_moves_other_joints_is_refused(scene: hovi.Scene) -> None:
     q = start_of(scene, 0.02)
     with pytest.raises(InputError, match="'panda_finger_joint1' is not in group 'arm'"):

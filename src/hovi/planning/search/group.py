@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 
 def in_group(
@@ -50,6 +52,28 @@ def in_group(
             )
     smaller = _scene(scene, held)
     return smaller, _end(start, robot, smaller.robot), _end(goal, robot, smaller.robot)
+
+
+def with_others(
+    goal: T, group: str | None, robot: Robot, start: State | FrameGoal | None
+) -> T | State | Mapping[str, Any]:
+    """The goal, with the joints outside of the group that its table of joints leaves out.
+
+    They are where they are at the start. Raises InputError for an unknown group.
+    """
+    table: Any = goal.q if isinstance(goal, State) else goal
+    inside = isinstance(table, Mapping) and "q" in table
+    given = table["q"] if inside else table
+    if group is None or start is None or not isinstance(given, Mapping):
+        return goal
+    if not any(joint in robot.joint_names for joint in given):
+        return goal
+    moving, q = robot.semantics.joints_of(group, robot.model), _whole(robot, start)
+    still = {j: q[_part(robot, j, "nq")] for j in robot.joint_names if j not in moving}
+    whole = {**still, **given}
+    if isinstance(goal, State):
+        return dataclasses.replace(goal, q=whole)
+    return {**table, "q": whole} if inside else whole
 
 
 @lru_cache(maxsize=16)
@@ -90,9 +114,11 @@ def _end(end: State | FrameGoal, robot: Robot, smaller: Robot) -> State | FrameG
 
 def _entries(robot: Robot, smaller: Robot, size: str) -> list[int]:
     """The entries of q (size "nq") or v ("nv") of the joints that the smaller robot has."""
-    entries: list[int] = []
-    for name in smaller.joint_names:
-        joint = robot.model.joints[robot.model.getJointId(name)]
-        first = joint.idx_q if size == "nq" else joint.idx_v
-        entries += range(first, first + getattr(joint, size))
-    return entries
+    return [i for name in smaller.joint_names for i in _part(robot, name, size)]
+
+
+def _part(robot: Robot, name: str, size: str) -> range:
+    """The entries of q (size "nq") or v ("nv") of a joint."""
+    joint = robot.model.joints[robot.model.getJointId(name)]
+    first = joint.idx_q if size == "nq" else joint.idx_v
+    return range(first, first + getattr(joint, size))

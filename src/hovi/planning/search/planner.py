@@ -25,7 +25,7 @@ from hovi.planning.refinement.error_estimate import with_metadata
 from hovi.planning.search.branch_choice import chosen_ends, nearest_ends
 from hovi.planning.search.final_stages import on_grid_of
 from hovi.planning.search.free_duration import FreeDuration
-from hovi.planning.search.group import in_group
+from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Job, split_for_charts
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
@@ -122,7 +122,9 @@ def plan(
     expect(options, PlanOptions, "hovi.PlanOptions(...), or its fields by keyword")
     options = options.with_changes(**changes)
     scene = holding(scene, options)
-    given = as_end(start, scene.robot, "start"), _goal(goal, scene.robot, options)
+    first = as_end(start, scene.robot, "start")
+    goal = with_others(goal, options.group, scene.robot, first)
+    given = first, _goal(goal, scene.robot, options)
     if options.group is not None:
         scene, start_end, goal_end = in_group(scene, options.group, *given)
         given = start_end, goal_end

@@ -12,7 +12,7 @@ from hovi.discrete.measures.segment_spans import SEGMENT_NAMES
 from hovi.errors import InputError, expect
 from hovi.planning.problem.notation.ends import End as Start
 from hovi.planning.problem.notation.ends import as_end
-from hovi.planning.search.group import in_group
+from hovi.planning.search.group import in_group, with_others
 from hovi.planning.search.job import Acting
 from hovi.planning.search.option_fields import spell_out
 from hovi.planning.search.options import PlanOptions
@@ -135,7 +135,11 @@ def _in_group(
 ) -> tuple[Scene, End, tuple[End | None, ...]]:
     """The scene, the start and the goals, of the chosen group of joints if there is one."""
     begin = as_end(start, scene.robot, "start")
-    goals = goals_of(segments, scene.robot)
+    whole = [
+        dataclasses.replace(each, goal=with_others(each.goal, options.group, scene.robot, begin))
+        for each in segments
+    ]
+    goals = goals_of(whole, scene.robot)
     if options.group is None:
         return scene, begin, goals
     small, first = scene, begin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.notation.ends import END_KEYS, EndError, end_of
 from hovi.planning.problem.notation.via_points import require_no_rates
 from hovi.planning.problem.units import seconds
+from hovi.planning.search.group import with_others
 from hovi.planning.task_file.messages import Keys, TomlText, spelled
 from hovi.planning.task_file.schema import EndTable, ViaTable
 from hovi.robot.robot import Robot
@@ -22,11 +24,23 @@ from hovi.robot.space.joint_table import JointError
 _FREE = ("free", "free_velocity", "free_acceleration")
 
 
-def read_end(end: EndTable, keys: Keys, robot: Robot, toml: TomlText) -> State | FrameGoal:
-    """The start, a goal or that of a via point: a state, or the target of a frame."""
+Begin = tuple[str | None, State | FrameGoal | None]
+"""The group that moves, and the start, where the other joints stay."""
+NO_GROUP: Begin = (None, None)
+
+
+def read_end(
+    end: EndTable, keys: Keys, robot: Robot, toml: TomlText, begin: Begin = NO_GROUP
+) -> State | FrameGoal:
+    """The start, a goal or that of a via point: a state, or the target of a frame.
+
+    begin: of a goal, the group and the start.
+    """
     name = spelled(keys)
     try:
-        chosen = end_of(_given(end), name)
+        table = with_others(_given(end), begin[0], robot, begin[1])
+        assert isinstance(table, Mapping)
+        chosen = end_of(table, name)
         if isinstance(chosen, FrameGoal):
             chosen.check(robot)
             return chosen

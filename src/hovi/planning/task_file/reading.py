@@ -80,12 +80,13 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     scene = kept.get("scene", chosen(data, SCENE_KEYS), lambda: _scene(table, robot, toml))
     start = read_end(table.start, ("start",), held, toml)
     if table.segments:
-        segments = read_segments(table.segments, held, toml)
+        segments = read_segments(table.segments, held, toml, (table.group, start))
         whole = sum(each.duration for each in segments)
         options = _options(table, whole, held, grasped, toml)
         return Task.of_segments(scene, start, segments, options, name)
     assert table.goal is not None
-    duration, goal = _duration(table.duration, toml), read_end(table.goal, ("goal",), held, toml)
+    duration = _duration(table.duration, toml)
+    goal = read_end(table.goal, ("goal",), held, toml, (table.group, start))
     without = MOTION_KEYS[:2] if table.via else MOTION_KEYS  # via points are before its end
     options = kept.get(
         "options",

@@ -11,7 +11,7 @@ from hovi.planning.problem.units import seconds
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import Segment, checked_segments, names_of
 from hovi.planning.task_file.effect_tables import effect_table, read_effects
-from hovi.planning.task_file.goal_tables import end_table, read_end
+from hovi.planning.task_file.goal_tables import NO_GROUP, Begin, end_table, read_end
 from hovi.planning.task_file.limit_tables import limits_value, read_limits
 from hovi.planning.task_file.messages import TomlText
 from hovi.planning.task_file.schema import SegmentTable, ShapedTable, TaskTable
@@ -31,9 +31,11 @@ def check_keys(table: ShapedTable, toml: TomlText) -> None:
             )
 
 
-def read_segments(tables: Sequence[SegmentTable], robot: Robot, toml: TomlText) -> list[Segment]:
-    """The segments of a file, in its order."""
-    segments = [_read_segment(table, i, robot, toml) for i, table in enumerate(tables)]
+def read_segments(
+    tables: Sequence[SegmentTable], robot: Robot, toml: TomlText, begin: Begin = NO_GROUP
+) -> list[Segment]:
+    """The segments of a file, in its order. begin: as for `read_end`."""
+    segments = [_read_segment(table, i, robot, toml, begin) for i, table in enumerate(tables)]
     try:
         checked_segments(segments, PlanOptions())
     except InputError as wrong:
@@ -41,7 +43,9 @@ def read_segments(tables: Sequence[SegmentTable], robot: Robot, toml: TomlText) 
     return segments
 
 
-def _read_segment(table: SegmentTable, number: int, robot: Robot, toml: TomlText) -> Segment:
+def _read_segment(
+    table: SegmentTable, number: int, robot: Robot, toml: TomlText, begin: Begin
+) -> Segment:
     keys = ("segments", number)
     goal, limits = table.goal, table.limits
     try:
@@ -49,7 +53,7 @@ def _read_segment(table: SegmentTable, number: int, robot: Robot, toml: TomlText
     except InputError as wrong:
         raise toml.error((*keys, "duration"), str(wrong)) from None
     return Segment(
-        None if goal is None else read_end(goal, (*keys, "goal"), robot, toml),
+        None if goal is None else read_end(goal, (*keys, "goal"), robot, toml, begin),
         duration,
         effects=read_effects(table.effects, robot, toml, keys),
         limits=None if limits is None else read_limits(limits, robot, toml, (*keys, "limits")),
