@@ -152,7 +152,7 @@ def load_robot(
     """Load a robot. Models that do not support planning load as well; the problem refuses them.
 
     x: path of a URDF, xacro or MJCF file; or a name of example-robot-data, such as "panda", or of
-        robot_descriptions, such as "ur10_description"; or a pinocchio.Model, which is copied. A
+        robot_descriptions, such as "ur10e_description"; or a pinocchio.Model, which is copied. A
         string with a separator or ending in .urdf is a path. See docs/robots.md.
     package_dirs: folders in which `package://` meshes are looked up.
     free_flyer: whether the base floats; by default it is fixed, or as the example's loader says.
