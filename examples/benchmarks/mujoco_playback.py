@@ -10,7 +10,7 @@ import hovi
 
 TABLE = Path(__file__).resolve().parents[2] / "docs" / "tables" / "mujoco_playback.md"
 ARMS = {"ur5": [], "panda": ["panda_finger_joint1", "panda_finger_joint2"], "z1": []}
-STEPS = (2e-4, 1e-4, 5e-5)
+STEPS = (1e-3, 5e-4, 2e-4, 1e-4)
 
 
 def motion_of(name: str, rotors: float) -> hovi.Trajectory:
