@@ -205,6 +205,11 @@ def test_a_motion_never_at_a_limit_has_no_highlights(motion: Trajectory, tmp_pat
     assert messages(tmp_path / "1.html") == messages(tmp_path / "2.html")
 
 
+def test_a_replay_is_shown_as_one_line(motion: Trajectory, tmp_path: Path) -> None:
+    shown = repr(replay(motion, html=tmp_path / "motion.html"))
+    assert re.fullmatch(r"Replay of '\w+', [\d.]+ s, at file://\S+motion.html", shown)
+
+
 def test_the_trace_is_the_path_of_the_tip(motion: Trajectory, tmp_path: Path) -> None:
     replay(motion, html=tmp_path / "with.html")
     replay(motion, html=tmp_path / "without.html", trace=False)

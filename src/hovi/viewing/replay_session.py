@@ -42,7 +42,7 @@ _FRAME_RATE = 60.0
 _BROWSER_TIMEOUT = 20.0  # [s]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Replay:
     """A motion on a page. Jupyter shows it as the value of a cell.
 
@@ -80,6 +80,10 @@ class Replay:
         except KeyboardInterrupt:
             if not loop:
                 raise
+
+    def __repr__(self) -> str:
+        name = "" if self.trajectory.robot is None else f" of {self.trajectory.robot.name!r}"
+        return f"Replay{name}, {self.trajectory.duration:.6g} s, at {self.url}"
 
     def close(self) -> None:
         """Stop the server, if there is one. An open page stays as it is."""
