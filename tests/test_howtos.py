@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,17 +14,27 @@ import hovi
 
 TOP = Path(__file__).resolve().parents[1]
 PAGES = sorted((TOP / "docs" / "howto").glob("*.md"))
-CODE = re.compile(r"^```python\n(.*?)^```$", re.M | re.S)
+CODE, SHELL = (
+    re.compile(rf"^```{language}\n(.*?)^```$", re.M | re.S) for language in ("python", "sh")
+)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_the_code_of_a_page_runs(
-    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {"__name__": "__main__"}
-    for block in CODE.findall(page.read_text()):
-        exec(compile(block, page.name, "exec"), names)
+def test_the_code_and_the_commands_of_a_page_run(page: Path, tmp_path: Path) -> None:
+    """In the page's order of languages: its Python as one script, then what it types after it."""
+    text = page.read_text()
+    (tmp_path / "page.py").write_text("".join(CODE.findall(text)))
+    commands = [line for block in SHELL.findall(text) for line in block.splitlines()]
+    typed = [shlex.split(line, comments=True)[1:] for line in commands if line[:5] == "hovi "]
+    for arguments in (["page.py"], *(["-m", "hovi", *each] for each in typed)):
+        done = subprocess.run(
+            [sys.executable, *arguments],
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, (arguments, done.stdout, done.stderr)
 
 
 def test_every_page_but_the_index_has_code() -> None:

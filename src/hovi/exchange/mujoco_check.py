@@ -14,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.exchange.libraries import library
 from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scene
+from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]
 
@@ -22,8 +23,8 @@ TOLERANCE = 1e-3
 MAX_STEPS = 10_000_000
 
 
-@dataclass(frozen=True, eq=False)
-class MujocoReplay:
+@dataclass(frozen=True, eq=False, repr=False)
+class MujocoReplay(Summarized):
     """A motion as MuJoCo moved it.
 
     names: of the joints. times: of the steps, shape (M,), in [s].
@@ -46,6 +47,12 @@ class MujocoReplay:
     def success(self) -> bool:
         """Whether every joint stays within TOLERANCE of the plan."""
         return bool((self.error <= TOLERANCE).all())  # NaN where the simulation diverges
+
+    def _summary(self) -> Summary:
+        worst = int(np.argmax(self.error))  # the first NaN, if there is one
+        deviation = f"at most {self.error[worst]:.2e} rad or m, of joint {self.names[worst]!r}"
+        rows = [("follows", str(self.success)), ("deviation", deviation)]
+        return Summary(f"MujocoReplay in {len(self.times) - 1:,} steps", tuple(rows))
 
 
 @check_arguments_except("trajectory")

@@ -15,13 +15,21 @@ from hovi.planning.problem.notation.ends import as_end
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.sequence.segment import Segment, Table, checked_segments, duration_of, goals_of
+from hovi.planning.sequence.segment import (
+    Segment,
+    Table,
+    checked_segments,
+    duration_of,
+    goals_of,
+    names_of,
+)
 from hovi.scene.scene import Scene
+from hovi.system.summary import Summarized, Summary
 
 
 @check_arguments_except("start", "goal", "duration")
-@dataclass(frozen=True, eq=False)
-class Task:
+@dataclass(frozen=True, eq=False, repr=False)
+class Task(Summarized):
     """A planning task, valid once built.
 
     scene: the robot and the effects that act on it.
@@ -53,6 +61,15 @@ class Task:
                 f"{duration_of(self.segments):g} s, got {self.duration}: change theirs."
             )
         self.options.on(self.scene)
+
+    def _summary(self) -> Summary:
+        T = self.duration
+        bounds = f"{T[0]:g} to {T[1]:g} s, free" if isinstance(T, tuple) else f"{T:g} s"
+        effects = ", ".join(each.key for each in self.scene.effects)
+        rows = [("robot", self.scene.robot.name), ("effects", effects), ("duration", bounds)]
+        if self.segments:
+            rows.append(("segments", ", ".join(names_of(self.segments))))
+        return Summary(f"Task {self.name!r}", tuple(rows))
 
     @classmethod
     def of_segments(
