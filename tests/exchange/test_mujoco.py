@@ -76,6 +76,8 @@ def test_mujoco_follows_the_planned_torques(
     assert played.error.max() < 1e-6
     assert played.success
     assert not played.left_out
+    assert repr(played).startswith("MujocoReplay in 15,0")
+    assert repr(played).count("\n") == 2
 
 
 def test_errors_fall_with_the_fourth_power_of_the_step() -> None:
