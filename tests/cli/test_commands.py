@@ -386,6 +386,9 @@ def test_info_describes_robots_and_scenes(run: Run, tmp_path: Path) -> None:
         code, out, err = run("info", what)
         assert (code, err) == (0, "")
         assert "elbow" in out
+    code, listed, _ = run("info")
+    assert code == 0
+    assert {"panda", "two_link_elbow"} <= set(re.findall(r"\w+", listed))
     assert "joint_limit_potential" in run("info", "two_link_elbow")[1]
     assert "Base: floating" in run("info", "ur5", "--free-flyer")[1]
 

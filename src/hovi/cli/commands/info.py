@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -9,12 +10,13 @@ import typer
 
 def info(
     what: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="ROBOT|SCENE.toml",
-            help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name.",
+            help="A .urdf, a name of example-robot-data, a scene file or a shipped scene's name; "
+            "without it, all names are listed.",
         ),
-    ],
+    ] = None,
     mimic: Annotated[
         bool, typer.Option("--mimic", help="Apply the <mimic> tags of the URDF.")
     ] = False,
@@ -30,7 +32,10 @@ def info(
     from hovi.robot.loading import is_path
 
     robots, scenes = example_names(), example_scenes()
-    if what.lower().endswith(".toml") or what in scenes:
+    if what is None:
+        print(_listed("robots of example-robot-data", robots))
+        print(_listed("scenes that ship with hovi", scenes))
+    elif what.lower().endswith(".toml") or what in scenes:
         print(_scene(what))
     elif is_path(what) or what in robots or format_of(what) == "description":
         print(_robot(what, mimic, free_flyer))
@@ -39,6 +44,13 @@ def info(
             f"there is no robot or scene {what!r}; {nearest(what, (*robots, *scenes))} "
             "(A path ends in .urdf or .toml.)"
         )
+
+
+def _listed(title: str, names: Sequence[str]) -> str:
+    import textwrap
+
+    lines = textwrap.fill(", ".join(sorted(names)), 80, initial_indent="  ", subsequent_indent="  ")
+    return f"{title}:\n{lines}\n"
 
 
 def _scene(scene: str) -> str:

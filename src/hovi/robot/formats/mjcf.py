@@ -30,7 +30,9 @@ def model_of_mjcf(path: Path, free_flyer: bool) -> tuple[pin.Model, Geometry]:
     except OSError as error:
         raise ModelError(f"cannot read the MJCF file {str(path)!r}: {reason(error)}.") from error
     except Exception as error:  # Pinocchio's own, of several kinds
-        raise ModelError(f"Pinocchio does not read the MJCF {path.name!r}: {error}.") from error
+        raise ModelError(
+            f"Pinocchio does not read the MJCF {path.name!r}: {_cause(error)}."
+        ) from error
     model.name = model.name or path.stem
     kinds = pin.GeometryType.VISUAL, pin.GeometryType.COLLISION
     return model, (_geometry(model, path, kinds[0]), _geometry(model, path, kinds[1]))
@@ -41,3 +43,8 @@ def _geometry(model: pin.Model, path: Path, kind: pin.GeometryType) -> pin.Geome
         return pin.buildGeomFromMJCF(model, str(path), kind)
     except Exception:  # such as a mesh that is not there
         return None
+
+
+def _cause(error: Exception) -> str:
+    """What Pinocchio says, without the place in its sources."""
+    return " ".join(str(error).rpartition("message:")[2].split()).removesuffix(".")
