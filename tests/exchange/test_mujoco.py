@@ -14,7 +14,8 @@ import pytest
 import hovi
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError
-from hovi.exchange.mujoco_model import mjcf, mujoco_scene
+from hovi.exchange import mujoco_check
+from hovi.exchange.mujoco_model import mjcf, mujoco_scene, mujoco_scenes
 from hovi.scene.segment_scenes import SegmentScenes
 from samples.cubic_motion import cubic_motion
 
@@ -169,3 +170,16 @@ def test_segments_are_one_model_only_if_their_bodies_are_the_same(ur5: hovi.Robo
     other = dataclasses.replace(same, segments=SegmentScenes((scene, loaded), (1, 2)))
     with pytest.raises(InputError, match="the segments of this motion differ"):
         mujoco_scene(other)
+
+
+def test_a_grasped_body_moves_with_the_model_of_its_segment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    motion = hovi.plan_task(hovi.load_task(hovi.example("two_link_pick"))).trajectory
+    played = hovi.replay_in_mujoco(motion, step=1e-3)
+    assert played.error.max() < 1e-6
+    assert played.times[-1] == motion.duration
+    assert len(played.times) == len(played.q) == len(played.planned)
+    empty_handed = mujoco_scenes(motion)[0][0]
+    monkeypatch.setattr(mujoco_check, "mjcf", lambda scene: mjcf(empty_handed))
+    assert hovi.replay_in_mujoco(motion, step=1e-3).error.max() > 0.1

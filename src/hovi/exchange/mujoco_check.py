@@ -13,10 +13,11 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.exchange.libraries import library
-from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scene
+from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scenes
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
 
 TOLERANCE = 1e-3
 """Largest deviation of a joint that counts as following the plan, in [rad] or [m]."""
@@ -59,9 +60,10 @@ class MujocoReplay(Summarized):
 def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay:
     """Apply the planned torques to MuJoCo's model of the robot, without feedback.
 
-    Every interval of the motion is divided into equal steps, as torques may jump at its ends.
-    MuJoCo's accelerations are integrated by the classical Runge-Kutta method, with the controls of
-    each stage: errors fall with the fourth power of the step. Those of an unstable motion grow
+    Every interval of the motion is divided into equal steps, as torques may jump at its ends, and
+    every segment has a model of its own, since bodies may be grasped and released. MuJoCo's
+    accelerations are integrated by the classical Runge-Kutta method, with the controls of each
+    stage: errors fall with the fourth power of the step. Those of an unstable motion grow
     exponentially.
     step: the longest, in [s].
     Raises InputError for a step that is not positive or gives more than MAX_STEPS, and for a motion
@@ -72,38 +74,56 @@ def replay_in_mujoco(trajectory: Trajectory, step: float = 1e-4) -> MujocoReplay
         raise InputError(
             f"the step must be positive and give at most {MAX_STEPS:,} steps, got {step:g} s."
         )
-    scene = mujoco_scene(trajectory)
+    scenes = mujoco_scenes(trajectory)
     mujoco = library("mujoco", "mujoco", "the check in MuJoCo")
-    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(mjcf(scene), encoding="unicode"))
-    steps = trajectory.grid.steps
-    k = np.repeat(np.arange(len(steps)), np.ceil(steps / step * (1 - 1e-12)).astype(int))
-    count = np.bincount(k)  # of the steps in each interval
-    first = np.repeat(np.cumsum(count) - count, count)
-    s = (np.arange(len(k)) - first) / count[k]
-    driven = np.setdiff1d(np.arange(scene.robot.nv), scene.passive_coordinates)
-    parts = (
-        controls(scene, *trajectory.jet_intervals(k, np.minimum(s + c / count[k], 1.0)))
-        for c in (0.0, 0.5, 1.0)
-    )
-    stages = np.stack([part[:, driven] for part in parts], axis=1)  # (M, 3, nu)
-    times = np.append(trajectory.t[k] + s * steps[k], trajectory.duration)
+    lengths = trajectory.grid.steps
+    counts = np.ceil(lengths / step * (1 - 1e-12)).astype(np.intp)  # of the steps in each interval
+    ends = np.cumsum([0, *(intervals for _, intervals in scenes)])
+    q, v = angles(trajectory, trajectory.q[:1])[0], trajectory.v[0]
+    simulated = [q[None]]
+    for (scene, _), first, last in zip(scenes, ends[:-1], ends[1:], strict=True):
+        k, s = _steps(counts[first:last], first)
+        driven = np.setdiff1d(np.arange(scene.robot.nv), scene.passive_coordinates)
+        stages = (
+            controls(scene, *trajectory.jet_intervals(k, np.minimum(s + c / counts[k], 1.0)))
+            for c in (0.0, 0.5, 1.0)
+        )
+        tau = np.stack([each[:, driven] for each in stages], axis=1)  # (M, 3, nu)
+        model = mujoco.MjModel.from_xml_string(
+            ElementTree.tostring(mjcf(scene), encoding="unicode")
+        )
+        with np.errstate(over="ignore", invalid="ignore"):  # where the simulation diverges
+            positions, v = _simulate(mujoco, model, (q, v), tau, lengths[k] / counts[k])
+        simulated.append(positions)
+        q = positions[-1]
+    k, s = _steps(counts, 0)
+    times = np.append(trajectory.t[k] + s * lengths[k], trajectory.duration)
     planned = angles(trajectory, trajectory.configurations(times))
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = planned[0], trajectory.v[0]
-    with np.errstate(over="ignore", invalid="ignore"):  # where the simulation diverges
-        simulated = _simulate(mujoco, model, data, stages, steps[k] / count[k])
-    names = scene.robot.coordinate_names
-    return MujocoReplay(names, times, simulated, planned, left_out(scene))
+    missing = tuple(dict.fromkeys(key for scene, _ in scenes for key in left_out(scene)))
+    names = scenes[0][0].robot.coordinate_names
+    return MujocoReplay(names, times, np.concatenate(simulated), planned, missing)
 
 
-def _simulate(mujoco: Any, model: Any, data: Any, tau: Array, steps: Array) -> Array:
-    """Positions at the start and after every step, (M + 1, nv).
+def _steps(counts: Index, first: int) -> tuple[Index, Array]:
+    """The interval of every step, and where in it the step begins, from 0 to 1.
+
+    counts: of the steps in successive intervals, of which `first` is the first.
+    """
+    k = np.repeat(np.arange(len(counts)), counts)
+    before = np.cumsum(counts) - counts
+    return k + first, (np.arange(len(k)) - before[k]) / counts[k]
+
+
+def _simulate(
+    mujoco: Any, model: Any, state: tuple[Array, Array], tau: Array, steps: Array
+) -> tuple[Array, Array]:
+    """Positions after every step, (M, nv), and the last velocity, from a position and velocity.
 
     tau: at the beginning, in the middle and at the end of every step, (M, 3, nu). steps: (M,).
     """
-    q, v = data.qpos.copy(), data.qvel.copy()
-    positions = np.empty((len(tau) + 1, model.nq))
-    positions[0] = q
+    data = mujoco.MjData(model)
+    q, v = state
+    positions = np.empty((len(tau), model.nq))
 
     def acceleration(q: Array, v: Array, control: Array) -> Array:
         data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, control
@@ -120,5 +140,5 @@ def _simulate(mujoco: Any, model: Any, data: Any, tau: Array, steps: Array) -> A
         a4 = acceleration(q + h * v3, v4, last)
         q = q + h / 6 * (v + 2 * v2 + 2 * v3 + v4)
         v = v + h / 6 * (a + 2 * a2 + 2 * a3 + a4)
-        positions[i + 1] = q
-    return positions
+        positions[i] = q
+    return positions, v

@@ -30,29 +30,41 @@ _TINY = "1e-12"  # MuJoCo refuses bodies without mass, such as those between the
 
 
 def mujoco_scene(trajectory: Trajectory) -> Scene:
-    """The scene that a motion is played back with.
+    """The scene of a motion that one model holds.
 
-    Raises InputError for what a MuJoCo model of joints with one coordinate each cannot hold: mimic
-    joints, bases and ball joints, a base with a prescribed motion, segments with different bodies.
+    Raises InputError as `mujoco_scenes` does, and for segments with different bodies.
     """
-    scenes = [] if trajectory.scene is None else [trajectory.scene]
-    if trajectory.segments is not None:
-        scenes = list(trajectory.segments.scenes)
-    if not scenes:
-        raise InputError(
-            "this motion was saved without its robot, which was a bare Pinocchio model: load the "
-            "robot from a URDF and plan again."
-        )
+    scenes = [scene for scene, _ in mujoco_scenes(trajectory)]
     for scene in scenes:
-        _require_supported(scene)
         if not _same_bodies(scene.model, scenes[0].model) or damping_of(scene) != damping_of(
             scenes[0]
         ):
             raise InputError(
                 "a MuJoCo model has the same bodies all the time, and the segments of this motion "
-                "differ in mass, armature, damping or gravity: export them one by one."
+                "differ in mass, armature, damping or gravity: `hovi check` plays it back with a "
+                "model for each segment, but it is not exported."
             )
     return scenes[0]
+
+
+def mujoco_scenes(trajectory: Trajectory) -> list[tuple[Scene, int]]:
+    """The scenes of the segments of a motion, and how many intervals each has.
+
+    Raises InputError for what a MuJoCo model of joints with one coordinate each cannot hold: mimic
+    joints, bases and ball joints, and a base with a prescribed motion.
+    """
+    scenes = [] if trajectory.scene is None else [(trajectory.scene, trajectory.grid.intervals)]
+    if trajectory.segments is not None:
+        parts = trajectory.segments
+        scenes = list(zip(parts.scenes, parts.intervals, strict=True))
+    if not scenes:
+        raise InputError(
+            "this motion was saved without its robot, which was a bare Pinocchio model: load the "
+            "robot from a URDF and plan again."
+        )
+    for scene, _ in scenes:
+        _require_supported(scene)
+    return scenes
 
 
 def left_out(scene: Scene) -> tuple[str, ...]:
