@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from hovi.accuracy import MEASURES, Choice, Diagram, Run
 from hovi.accuracy.measures import shown_size
@@ -106,7 +106,11 @@ def _panel(ax: Axes, diagram: Diagram, measure: str, time: Time) -> None:
     ax.set_yscale("log")
     ax.xaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
     ax.xaxis.set_major_formatter("{x:g}")
-    ax.xaxis.set_minor_formatter("{x:g}")
+    least, most = ax.get_xlim()
+    if most < 300 * least:  # or labels of 2 and 5 in every decade overlap
+        ax.xaxis.set_minor_formatter("{x:g}")
+    else:
+        ax.xaxis.set_minor_formatter(NullFormatter())
     ax.tick_params(axis="x", which="both", labelsize="small")
     tips = names_in_words(diagram.resolved.tip_frames)
     ax.set_ylabel(_LABELS[measure].format(tips=tips))

@@ -380,7 +380,9 @@ def _sweep(ax: Axes3D, t: Array, points: Array, dark: Mask) -> None:
         colors.append(np.tile(np.where(dark[:, None], 0.35 * light, light), (_STRIPS, 1)))
     faces = np.concatenate(colors)
     ax.add_collection3d(
-        Poly3DCollection(np.concatenate(patches), facecolors=faces, edgecolors=faces, shade=True)
+        Poly3DCollection(
+            np.concatenate(patches), facecolors=faces, edgecolors=faces, linewidths=0.4, shade=True
+        )
     )
     across, up = points.reshape(-1, 2).T
     ax.auto_scale_xyz(t, across, up)
@@ -393,5 +395,5 @@ def _format_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
     ax.set_zlabel(f"{up} [m]")
     for axis in (ax.yaxis, ax.zaxis):
         axis.set_major_locator(MaxNLocator(5))
-    ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.05)
+    ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.12)
     ax.view_init(elev=22, azim=-58)
