@@ -395,5 +395,5 @@ def _format_surface(ax: Axes3D, across: str, up: str, extent: Array) -> None:
     ax.set_zlabel(f"{up} [m]")
     for axis in (ax.yaxis, ax.zaxis):
         axis.set_major_locator(MaxNLocator(5))
-    ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.12)
+    ax.set_box_aspect((1.9 * extent.max(), *np.maximum(extent, 0.2 * extent.max())), zoom=1.05)
     ax.view_init(elev=22, azim=-58)
