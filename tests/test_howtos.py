@@ -25,10 +25,11 @@ def test_the_code_and_the_commands_of_a_page_run(page: Path, tmp_path: Path) -> 
     if page.stem == "video":
         pytest.importorskip("imageio_ffmpeg")
     text = page.read_text()
-    (tmp_path / "page.py").write_text("".join(CODE.findall(text)))
+    script = (tmp_path / "typed").with_suffix(".py")
+    script.write_text("".join(CODE.findall(text)))
     commands = [line for block in SHELL.findall(text) for line in block.splitlines()]
     typed = [shlex.split(line, comments=True)[1:] for line in commands if line[:5] == "hovi "]
-    for arguments in (["page.py"], *(["-m", "hovi", *each] for each in typed)):
+    for arguments in ([script.name], *(["-m", "hovi", *each] for each in typed)):
         done = subprocess.run(
             [sys.executable, *arguments],
             cwd=tmp_path,
