@@ -50,7 +50,8 @@ SHIFT_LEVEL = 1.0
 output."""
 SHIFT_LEVELS = 1e-5, 3e-2
 """Least and largest such parameter."""
-WARM_SHIFT = 1e-3
+import os
+WARM_SHIFT = float(os.environ.get('WS','1e-3'))
 """Largest move of an output, as a share of its range, after which a solve begins at a solution."""
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
@@ -152,6 +153,21 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     start = None
     if len(known.s) == len(outputs.y):
         mu *= mean_density(outputs, objective.bounds.measure)
+        from hovi.optimize.central_newton import newton
+        import os
+        if not os.environ.get("OLD"):
+            st = dataclasses.replace(known, bounds=objective.bounds)
+            out = newton(objective, path, search.options, None, st, mean_density(outputs, objective.bounds.measure))
+            search.iterations += out.iterations
+            if _is_found(out):
+                search.history += out.history
+                search.last = search.problem, out.x
+                search._followed(out, objective)
+                search.options = whole
+                return out
+            if os.environ.get("VERB"): print("   FAILED")
+            search.options=whole
+            return out
         start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
     outcome = search.solve(path, start)
     search.options = whole
