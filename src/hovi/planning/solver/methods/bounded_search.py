@@ -17,6 +17,7 @@ from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
+from hovi.optimize.nearby_bounded import follow_bounded
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
@@ -260,6 +261,19 @@ class BoundedSearch:
         if start is not None and len(start.s) != len(objective.bounds.lower):
             start = None  # rows were added in a solve that failed
         outcome = minimize_bounded(objective, path, options, self.report, start, self.plain)
+        return self._noted(outcome, objective)
+
+    def followed(
+        self, objective: BoundedAction, path: DiscretePath, known: Barrier, options: Options
+    ) -> Bounded:
+        """A solve of an objective from the solution of a similar problem: see follow_bounded."""
+        raise_if_late()
+        known = dataclasses.replace(known, bounds=objective.bounds)
+        outcome = follow_bounded(objective, path, known, options, self.report)
+        return self._noted(outcome, objective)
+
+    def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
+        """The outcome of a solve, after its steps and its motion were noted."""
         self.iterations += outcome.iterations
         self.history += outcome.history
         self.last = self.problem, outcome.x

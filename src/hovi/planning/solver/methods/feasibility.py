@@ -50,9 +50,10 @@ SHIFT_LEVEL = 1.0
 output."""
 SHIFT_LEVELS = 1e-5, 3e-2
 """Least and largest such parameter."""
-import os
-WARM_SHIFT = float(os.environ.get('WS','1e-3'))
+WARM_SHIFT = 1e-3
 """Largest move of an output, as a share of its range, after which a solve begins at a solution."""
+NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
+"""The same for whole Newton steps, and the maximum number of these."""
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
 cost exceeds its minimum by less than 1e-6."""
@@ -114,11 +115,19 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
     level = search.level
     if level is None:
         objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
-        change = objective.outputs(moved).y - objective.outputs(along.last).y
+        before = objective.outputs(along.last).y
+        change = objective.outputs(moved).y - before
         shift = float(np.max(np.abs(change), initial=0.0))
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
-        if along.barrier is not None and shift <= WARM_SHIFT:
-            outcome = _solved_warm(search, along.barrier, moved)
+        known = along.barrier
+        plain = search.near is None and not search.problem.constrained
+        if known is not None and plain and len(known.s) == len(change) and shift <= NEWTON_SHIFT:
+            outcome = _followed(search, objective, known, moved)
+            if _is_found(outcome) or outcome.stop in STOPPED:
+                return outcome
+            _adopt(search, along)
+        if known is not None and shift <= WARM_SHIFT:
+            outcome = _solved_warm(search, known, moved)
             if _is_found(outcome) or outcome.stop in STOPPED:
                 return outcome
             _adopt(search, along)
@@ -133,6 +142,19 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
         search.near = along.near.on(search.problem)
     if along.margins is not None and along.margins.shape == search.margins.shape:
         search.margins = along.margins
+
+
+def _followed(
+    search: BoundedSearch, objective: BoundedAction, known: Barrier, path: DiscretePath
+) -> Bounded:
+    """Follow a solution by whole Newton steps, which end where they change the cost by little."""
+    options = dataclasses.replace(
+        search.remaining_options(),
+        barrier=max(search.options.barrier, WARM_BARRIER),
+        enough=WARM_DECREASE,
+        max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
+    )
+    return search.followed(objective, path, known, options)
 
 
 def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> Bounded:
@@ -153,21 +175,6 @@ def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> B
     start = None
     if len(known.s) == len(outputs.y):
         mu *= mean_density(outputs, objective.bounds.measure)
-        from hovi.optimize.central_newton import newton
-        import os
-        if not os.environ.get("OLD"):
-            st = dataclasses.replace(known, bounds=objective.bounds)
-            out = newton(objective, path, search.options, None, st, mean_density(outputs, objective.bounds.measure))
-            search.iterations += out.iterations
-            if _is_found(out):
-                search.history += out.history
-                search.last = search.problem, out.x
-                search._followed(out, objective)
-                search.options = whole
-                return out
-            if os.environ.get("VERB"): print("   FAILED")
-            search.options=whole
-            return out
         start = known.warm(objective.bounds, outputs.y, mu, WARM_MARGIN)
     outcome = search.solve(path, start)
     search.options = whole
