@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +36,7 @@ def forces_of(
     forces = rows.weights * multipliers / rows.of.ranges[rows.coordinate]
     for order in np.unique(rows.orders):
         own = np.flatnonzero(rows.orders == order)
-        shares = forces[own, None] * _values_in(rows.table[own], nodes, grid, int(order))
+        shares = forces[own, None] * _values_in(rows.table[own], grid, int(order))
         places = rows.intervals[own] * nv + rows.joints[own]
         numbers = places[:, None] * len(nodes) + np.arange(len(nodes))
         sums = np.bincount(numbers.ravel(), shares.ravel(), len(slope) * nv * len(nodes))
@@ -69,14 +70,22 @@ def joined(
     return Instants(k[order], s[order], weights[order]), [joint]
 
 
-def _values_in(table: Array, nodes: Array, grid: Grid, order: int) -> Array:
+def _values_in(table: Array, grid: Grid, order: int) -> Array:
     """Rows of h^j q^(j), or q, over (h q0', ..., Z, c) as sums of its values at nodes, (E, M)."""
-    values = jet_rows(nodes, grid.order, grid.inner_modes)[:, order]
+    inverse = _inverse_values(grid.order, grid.inner_modes, order)
     if order == 0:  # rows of q have a share of 1 in q0
-        values, table = (
-            np.pad(each, ((0, 0), (1, 0)), constant_values=1.0) for each in (values, table)
-        )
-    return np.asarray(table @ np.linalg.pinv(values))
+        return np.asarray(table @ inverse[1:] + inverse[0])
+    return np.asarray(table @ inverse)
+
+
+@cache
+def _inverse_values(k: int, modes: int, order: int) -> Array:
+    """(h q0', ..., Z, c), after q0 for order 0, from the values of h^j q^(j) at the nodes."""
+    nodes = control_nodes(control_degree(k, modes, 0))
+    values = jet_rows(nodes, k, modes)[:, order]
+    if order == 0:
+        values = np.pad(values, ((0, 0), (1, 0)), constant_values=1.0)
+    return np.asarray(np.linalg.pinv(values))
 
 
 def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> TrajectoryProblem:
