@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.instants import Instants
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -41,12 +40,11 @@ def forces_of(
         numbers = places[:, None] * len(nodes) + np.arange(len(nodes))
         sums = np.bincount(numbers.ravel(), shares.ravel(), len(slope) * nv * len(nodes))
         slope[:, order] = sums.reshape(len(slope), nv, len(nodes))
-    weights = np.repeat(grid.steps / len(nodes), len(nodes))
-    k = np.repeat(np.arange(grid.intervals), len(nodes))
-    instants = Instants(k, np.tile(nodes, grid.intervals), weights)
-    slope = slope.transpose(0, 3, 1, 2).reshape(len(k), -1) / weights[:, None]
-    outputs = np.zeros((len(k), 0))
-    return instants, [PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))]
+    instants = rows.instants
+    force = slope.transpose(0, 3, 1, 2).reshape(len(instants.weights), -1)
+    force = force / instants.weights[:, None]
+    outputs = np.zeros((len(force), 0))
+    return instants, [PointTerms(force, np.zeros_like(force), outputs, np.zeros_like(outputs))]
 
 
 def joined(
@@ -93,6 +91,5 @@ def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> Trajec
     if instants is problem.ld.instants:
         return problem
     whole = copy.copy(problem)  # nothing else depends on them
-    ld = DiscreteLagrangian(problem.ld.lagrangian, problem.grid, instants)
-    object.__setattr__(whole, "ld", ld)
+    object.__setattr__(whole, "ld", problem.ld.at(instants))
     return whole

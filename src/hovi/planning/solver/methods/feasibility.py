@@ -114,20 +114,15 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
     _adopt(search, along)
     level = search.level
     if level is None:
+        outcome = _followed(search, along)
+        if outcome is not None:
+            return outcome
         objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
-        before = objective.outputs(along.last).y
-        change = objective.outputs(moved).y - before
+        change = objective.outputs(moved).y - objective.outputs(along.last).y
         shift = float(np.max(np.abs(change), initial=0.0))
         level = float(np.clip(SHIFT_LEVEL * shift, *SHIFT_LEVELS))
-        known = along.barrier
-        plain = search.near is None and not search.problem.constrained
-        if known is not None and plain and len(known.s) == len(change) and shift <= NEWTON_SHIFT:
-            outcome = _followed(search, objective, known, moved)
-            if _is_found(outcome) or outcome.stop in STOPPED:
-                return outcome
-            _adopt(search, along)
-        if known is not None and shift <= WARM_SHIFT:
-            outcome = _solved_warm(search, known, moved)
+        if along.barrier is not None and shift <= WARM_SHIFT:
+            outcome = _solved_warm(search, along.barrier, moved)
             if _is_found(outcome) or outcome.stop in STOPPED:
                 return outcome
             _adopt(search, along)
@@ -144,17 +139,26 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
         search.margins = along.margins
 
 
-def _followed(
-    search: BoundedSearch, objective: BoundedAction, known: Barrier, path: DiscretePath
-) -> Bounded:
-    """Follow a solution by whole Newton steps, which end where they change the cost by little."""
+def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
+    """Follow the solution of a central path by whole Newton steps; None if it is not found so."""
+    known = along.barrier
+    if known is None or search.near is not None or search.problem.constrained:
+        return None
+    objective, moved = search.objective(None), search.problem.moved(along.last)
+    y = objective.outputs(moved).y
+    if len(y) != len(known.s) or np.max(np.abs(y - known.s), initial=0.0) > NEWTON_SHIFT:
+        return None
     options = dataclasses.replace(
         search.remaining_options(),
         barrier=max(search.options.barrier, WARM_BARRIER),
         enough=WARM_DECREASE,
         max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
     )
-    return search.followed(objective, path, known, options)
+    outcome = search.followed(objective, moved, known, options)
+    if _is_found(outcome) or outcome.stop in STOPPED:
+        return outcome
+    _adopt(search, along)
+    return None
 
 
 def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> Bounded:
