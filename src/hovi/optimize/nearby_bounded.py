@@ -153,5 +153,6 @@ class _Newton(Generic[X]):
             return False
         outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
         y = outcome.outputs.y
-        outcome.barrier = outcome.barrier.refined(objective.bounds, y, found.kept, found.origin)
+        refined = outcome.barrier.refined(objective.bounds, y, found.kept, found.origin)
+        outcome.barrier = refined.recentred(self.weight, refined.mu)
         return True
