@@ -11,8 +11,10 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.bounded_objective import Outputs
-from hovi.optimize.trust_region import Stop, minimize
+from hovi.optimize.trust_region import Options, Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -137,6 +139,21 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
         search.near = along.near.on(search.problem)
     if along.margins is not None and along.margins.shape == search.margins.shape:
         search.margins = along.margins
+
+
+def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
+    """The central path of a problem that ends at a solution near that of a similar problem.
+
+    None where whole Newton steps do not find it, or where time runs out.
+    barrier: last barrier parameter, relative to the mean density of the cost.
+    """
+    limits = problem.limits or no_limits(problem.coordinates)
+    search = BoundedSearch(problem, limits, Options(barrier=barrier), None, along.last, along=along)
+    _adopt(search, along)
+    outcome = _followed(search, along)
+    if outcome is None or not _is_found(outcome):
+        return None
+    return search.central_path(outcome)
 
 
 def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
