@@ -443,3 +443,47 @@ def test_a_step_leaves_a_gap_of_which_rounding_errors_are_a_small_share(mu: floa
     along = barrier.aim(y, np.array([-1.0]), barrier.central_targets())
     moved = barrier.moved(y + along.primal * along.dy, along, 1.0, 0.0)
     assert moved.s[0] >= 0.9e-4 * y[0]
+
+
+def test_a_recentred_barrier_is_on_its_central_path_and_keeps_what_holds_bounds() -> None:
+    for seed in SEEDS:
+        barrier, _ = random_barrier(seed)
+        weight, mu = 0.7, 1e-3
+        moved = barrier.recentred(weight, mu)
+        has = barrier.bounds.has_lower, barrier.bounds.has_upper
+        before = [
+            np.where(sides, z - weight * gap, -INF)
+            for z, gap, sides in zip((barrier.zl, barrier.zu), gaps(barrier), has, strict=True)
+        ]
+        for z, gap, sides in zip((moved.zl, moved.zu), gaps(moved), has, strict=True):
+            np.testing.assert_allclose((z * gap)[sides], mu, rtol=1e-9)
+            assert (gap[sides] > 0).all()
+            assert (z[~sides] == 0.0).all()
+        lower = has[0] & (before[0] >= before[1])
+        kept = np.where(
+            lower, moved.zl - weight * gaps(moved)[0], moved.zu - weight * gaps(moved)[1]
+        )
+        wanted = np.where(lower, *before)
+        inside = np.isfinite(wanted)
+        width = np.where(np.isfinite(barrier.bounds.upper - barrier.bounds.lower), 1.0, 0.0)
+        middle = np.abs(low - high) < 1e-12
+        free = inside & ~(middle & (width > 0))
+        np.testing.assert_allclose(kept[free], wanted[free], rtol=1e-8, atol=1e-9)
+
+
+def test_a_followed_barrier_takes_the_multipliers_or_the_gaps_of_a_step() -> None:
+    """A bound that holds keeps the multiplier that the step predicts, another one its gap."""
+    bounds = Bounds(np.zeros(3), np.array([INF, INF, 1.0]), np.array([1.0, 2.0, 4.0]))
+    mu = 1e-8
+    s = np.array([mu / 2.0, 0.5, 1.0 - mu / 3.0])
+    zl, zu = mu / s, np.array([0.0, 0.0, mu / (1.0 - s[2])])
+    barrier = Barrier(bounds, s, zl, zu, mu, 1.0)
+    dy = np.array([0.5 * s[0], 0.1, 0.0])  # the first multiplier falls by half, to 1
+    y_new = np.array([1e-6, 0.61, 1.0 + 1e-6])
+    moved, outside, work = barrier.followed(s, dy, y_new, mu, 1.0)
+    np.testing.assert_allclose(moved.zl[0], 1.0, rtol=1e-2)
+    np.testing.assert_allclose(moved.s[1], 0.61, rtol=1e-6)
+    np.testing.assert_allclose(moved.zu[2], 3.0 + 1e-6 * 3.0 / (mu / 3.0), rtol=1e-2)
+    np.testing.assert_allclose(outside, 1e-6, rtol=1e-6)
+    expected = bounds.weights * np.abs(moved.zu - moved.zl) * np.abs(y_new - moved.s)
+    np.testing.assert_allclose(work, expected.sum())

@@ -230,7 +230,8 @@ inline void recentre(const Slacks& at, double c, double mu, const Direction& out
   }
 }
 
-// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s|.
+// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus the sum of the
+// negative multipliers, times w, that a step predicts: bounds that no longer hold the solution.
 struct Misses {
   double outside = -infinity, work = 0.0;
 };
@@ -245,11 +246,12 @@ inline Misses follow(const Slacks& at, const double* weights, const double* y, c
   for (std::size_t i = 0; i < at.count; ++i) {
     const double below = at.below(i), above = at.above(i), ds = dy[i] + y[i] - at.s[i];
     const double c = std::max(at.zl[i] / below + at.zu[i] / above, least);
-    const double low = (mu - at.zl[i] * ds) / below - c * (y_new[i] - at.lower[i]);
-    const double high = (mu + at.zu[i] * ds) / above - c * (at.upper[i] - y_new[i]);
+    const double zl = (mu - at.zl[i] * ds) / below, zu = (mu + at.zu[i] * ds) / above;
+    const double low = zl - c * (y_new[i] - at.lower[i]), high = zu - c * (at.upper[i] - y_new[i]);
     const double s = central_slack(at, i, y_new[i], low, high, c, next_mu);
     set_central(at, i, s, next_mu, out);
-    misses.work += weights[i] * std::abs(out.zu[i] - out.zl[i]) * std::abs(y_new[i] - s);
+    const double miss = std::abs(out.zu[i] - out.zl[i]) * std::abs(y_new[i] - s);
+    misses.work += weights[i] * (miss + std::max(-zl, 0.0) + std::max(-zu, 0.0));
     misses.outside =
         std::max({misses.outside, at.lower[i] - y_new[i], y_new[i] - at.upper[i]});
   }

@@ -289,7 +289,8 @@ class Barrier:
 
         From a point of this central path. z is what the step predicts and the gap that of y_new;
         each bound keeps z - c gap with c = z / gap from before, or the weight if that is larger.
-        Returns also how far y_new is outside at most, and sum weights |zu - zl| |y_new - s|.
+        Returns also how far y_new is outside at most, and sum weights |zu - zl| |y_new - s| plus
+        that of the negative multipliers that the step predicts.
         """
         s, zl, zu = (np.empty_like(y) for _ in range(3))
         w, numbers = self.bounds.weights, (self.mu, mu, weight)

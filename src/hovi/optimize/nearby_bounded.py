@@ -20,6 +20,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import (
@@ -27,11 +28,12 @@ from hovi.optimize.bounded_objective import (
     BoundedObjective,
     BoundedOutcome,
 )
-from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 
+Array = npt.NDArray[np.float64]
 X = TypeVar("X")
 
 FIRST_MU, LARGEST_FIRST_MU = 0.3, 1e-3
@@ -57,7 +59,7 @@ def follow_bounded(
 
     It ends as DIVERGED where the steps do not converge, or not to a minimum.
     known: of the solution of a similar problem with as many outputs.
-    options: `barrier` is the last barrier parameter; it ends where the last step predicted, and the
+    options: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
         distance of slacks from outputs means, less than `enough` of the objective.
     """
     outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
@@ -97,12 +99,13 @@ class _Newton(Generic[X]):
         self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
         outcome.barrier = known.recentred(self.weight, max(self.last_mu, mu))
+        self.outside, self.work = 0.0, math.inf
         outcome.keep_best(objective.bounds)
 
     def run(self) -> None:
         """Iterate until stationary, or until it does not converge."""
-        outcome, solved = self.outcome, False
-        while outcome.iterations <= self.options.max_iterations:
+        outcome = self.outcome
+        while self.outside <= self.farthest:  # not where it is no number
             raise_if_interrupted()
             raise_if_late()
             terms = outcome.barrier.condensed(outcome.outputs.y)
@@ -110,46 +113,51 @@ class _Newton(Generic[X]):
             factor = model.factor(0.0)
             if factor is None:
                 return
-            if solved:
+            step, slope, length = model.descend(factor)
+            if self._is_solved(-0.5 * slope):
+                if self._refined():
+                    continue
+                outcome.barrier = outcome.barrier.at_outputs(outcome.outputs.y)
                 outcome.model, outcome.stop = model, Stop.STATIONARY
                 outcome.marks.append((outcome.barrier.mu, outcome.x))
                 return
-            self._step(model, factor)
-            if not self.outside <= self.farthest:  # or it is no number
+            if outcome.iterations >= self.options.max_iterations:
                 return
-            solved = self._is_solved() and not self._refined()
+            self._take(step, -0.5 * slope, math.sqrt(max(length, 0.0)), model)
 
-    def _step(self, model: QuadraticModel, factor: Factor) -> None:
-        """A Newton step, and what may still be missing after it."""
+    def _take(self, step: Array, decrease: float, norm: float, model: QuadraticModel) -> None:
+        """Take a Newton step, which predicts a decrease."""
         outcome, objective = self.outcome, self.objective
         barrier, before = outcome.barrier, outcome.outputs
-        step, slope, length = model.descend(factor)
         dy = objective.push(step, model)
         x = objective.retract(outcome.x, step, model)
         outputs = objective.outputs(x)
         objective.accept(step, model)
         mu = max(self.last_mu, DECREASE * barrier.mu)
-        moved, self.outside, work = barrier.followed(before.y, dy, outputs.y, mu, self.weight)
-        self.missing = math.inf if barrier.mu > mu else max(-0.5 * slope, work)
+        moved, self.outside, self.work = barrier.followed(before.y, dy, outputs.y, mu, self.weight)
         outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
         outcome.iterations += 1
-        norm = math.sqrt(max(length, 0.0))
-        outcome.history.append(Iteration(outputs.value, -0.5 * slope, 1.0, 0.0, norm))
+        outcome.history.append(Iteration(outputs.value, decrease, 1.0, 0.0, norm))
         if self.report is not None:
             self.report(outcome.iterations, outputs.value)
         outcome.keep_best(objective.bounds)
 
-    def _is_solved(self) -> bool:
-        """Whether outputs are within their bounds, and next to nothing is to be gained."""
-        enough = max(self.options.decrease, self.options.enough) * abs(self.outcome.outputs.value)
-        return self.outside <= FEASIBILITY_TOLERANCE and self.missing <= enough
+    def _is_solved(self, decrease: float) -> bool:
+        """Whether outputs are within their bounds, and next to nothing is to be gained.
+
+        decrease: what the next step predicts.
+        """
+        outcome = self.outcome
+        if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
+            return False
+        enough = max(self.options.decrease, self.options.enough) * abs(outcome.outputs.value)
+        return self.outside <= FEASIBILITY_TOLERANCE and max(decrease, self.work) <= enough
 
     def _refined(self) -> bool:
-        """Whether outputs were replaced by others; else slacks become their outputs."""
+        """Whether outputs were replaced by others."""
         outcome, objective = self.outcome, self.objective
         found = objective.refine(outcome.x, outcome.barrier.mu / self.density)
         if found is None:
-            outcome.barrier = outcome.barrier.at_outputs(outcome.outputs.y)
             return False
         outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
         y = outcome.outputs.y
