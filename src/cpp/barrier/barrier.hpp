@@ -11,6 +11,7 @@ namespace hovi::barrier {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_gap = 1e-16;  // the rounding unit at a bound of one
 constexpr double rounding = 1e-10;   // of a slack, as a share of its gap
+constexpr double released = 1e-2;    // how far an output may move from a bound that lets it go
 
 // R slacks s with multipliers zl, zu; infinite bounds are none.
 struct Slacks {
@@ -230,28 +231,30 @@ inline void recentre(const Slacks& at, double c, double mu, const Direction& out
   }
 }
 
-// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus the sum of the
-// negative multipliers, times w, that a step predicts: bounds that no longer hold the solution.
+// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds that
+// no longer hold the solution may give: the negative multipliers, times w and a distance.
 struct Misses {
   double outside = -infinity, work = 0.0;
 };
 
 // After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
 // point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
-// what both say of a bound is weighed with c, at least the ratio of multiplier and gap before.
+// what both say of a bound is weighed with c, between the ratio of multiplier and gap before and the
+// least one. With that ratio bounds would be released slowly, with the least one found slowly.
 inline Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
                      const double* y_new, double mu, double next_mu, double least,
                      const Direction& out) {
   Misses misses;
   for (std::size_t i = 0; i < at.count; ++i) {
     const double below = at.below(i), above = at.above(i), ds = dy[i] + y[i] - at.s[i];
-    const double c = std::max(at.zl[i] / below + at.zu[i] / above, least);
+    const double ratio = at.zl[i] / below + at.zu[i] / above;
+    const double c = std::sqrt(std::max(ratio, least) * least);
     const double zl = (mu - at.zl[i] * ds) / below, zu = (mu + at.zu[i] * ds) / above;
     const double low = zl - c * (y_new[i] - at.lower[i]), high = zu - c * (at.upper[i] - y_new[i]);
     const double s = central_slack(at, i, y_new[i], low, high, c, next_mu);
     set_central(at, i, s, next_mu, out);
     const double miss = std::abs(out.zu[i] - out.zl[i]) * std::abs(y_new[i] - s);
-    misses.work += weights[i] * (miss + std::max(-zl, 0.0) + std::max(-zu, 0.0));
+    misses.work += weights[i] * (miss + released * (std::max(-zl, 0.0) + std::max(-zu, 0.0)));
     misses.outside =
         std::max({misses.outside, at.lower[i] - y_new[i], y_new[i] - at.upper[i]});
   }

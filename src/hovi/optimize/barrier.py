@@ -50,6 +50,10 @@ class Bounds:
     weights: Array
     measure: float = 1.0
 
+    def shrunk(self, room: float) -> Bounds:
+        """Bounds that are further inside."""
+        return dataclasses.replace(self, lower=self.lower + room, upper=self.upper - room)
+
     @property
     def has_lower(self) -> Mask:
         """Where there is a lower bound."""
@@ -288,9 +292,10 @@ class Barrier:
         """The point of the central path with another mu after a Newton step dy of outputs y.
 
         From a point of this central path. z is what the step predicts and the gap that of y_new;
-        each bound keeps z - c gap with c = z / gap from before, or the weight if that is larger.
-        Returns also how far y_new is outside at most, and sum weights |zu - zl| |y_new - s| plus
-        that of the negative multipliers that the step predicts.
+        each bound keeps z - c gap, where c is the geometric mean of the weight and of z / gap
+        before, or the weight if that is larger. Returns also how far y_new is outside at most, and
+        what may still be gained: sum weights |zu - zl| |y_new - s|, and by the release of bounds
+        whose predicted multipliers are negative.
         """
         s, zl, zu = (np.empty_like(y) for _ in range(3))
         w, numbers = self.bounds.weights, (self.mu, mu, weight)

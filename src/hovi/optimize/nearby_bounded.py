@@ -15,6 +15,7 @@ converge, which a few steps show, and hovi.optimize.interior_point is needed.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -23,11 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.barrier import Barrier
-from hovi.optimize.bounded_objective import (
-    FEASIBILITY_TOLERANCE,
-    BoundedObjective,
-    BoundedOutcome,
-)
+from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
@@ -43,6 +40,8 @@ DECREASE = 0.1
 """Ratio of the barrier parameters of two steps."""
 GAP_WEIGHT = 3.0
 """Least weight c of a gap against a multiplier, relative to the mean density."""
+ROOM = 3e-7
+"""Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
 """How far outputs may be outside after a step, relative to how far they were at first, or to the
 least such distance: beyond, it does not converge."""
@@ -91,7 +90,8 @@ class _Newton(Generic[X]):
     ) -> None:
         self.objective, self.outcome = objective, outcome
         self.options, self.report = options, report
-        known, outputs = outcome.barrier, outcome.outputs
+        outputs, bounds = outcome.outputs, objective.bounds.shrunk(ROOM)
+        known = dataclasses.replace(outcome.barrier, bounds=bounds)
         self.density = abs(outputs.value) / objective.bounds.measure
         self.last_mu = options.barrier * self.density
         self.weight = GAP_WEIGHT * self.density
@@ -117,7 +117,8 @@ class _Newton(Generic[X]):
             if self._is_solved(-0.5 * slope):
                 if self._refined():
                     continue
-                outcome.barrier = outcome.barrier.at_outputs(outcome.outputs.y)
+                barrier = dataclasses.replace(outcome.barrier, bounds=self.objective.bounds)
+                outcome.barrier = barrier.at_outputs(outcome.outputs.y)
                 outcome.model, outcome.stop = model, Stop.STATIONARY
                 outcome.marks.append((outcome.barrier.mu, outcome.x))
                 return
@@ -151,7 +152,7 @@ class _Newton(Generic[X]):
         if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
             return False
         enough = max(self.options.decrease, self.options.enough) * abs(outcome.outputs.value)
-        return self.outside <= FEASIBILITY_TOLERANCE and max(decrease, self.work) <= enough
+        return self.outside <= ROOM and max(decrease, self.work) <= enough
 
     def _refined(self) -> bool:
         """Whether outputs were replaced by others."""
@@ -161,6 +162,7 @@ class _Newton(Generic[X]):
             return False
         outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
         y = outcome.outputs.y
-        refined = outcome.barrier.refined(objective.bounds, y, found.kept, found.origin)
+        bounds = objective.bounds.shrunk(ROOM)
+        refined = outcome.barrier.refined(bounds, y, found.kept, found.origin)
         outcome.barrier = refined.recentred(self.weight, refined.mu)
         return True
