@@ -40,7 +40,7 @@ DECREASE = 0.1
 """Ratio of the barrier parameters of two steps."""
 GAP_WEIGHT = 3.0
 """Least weight c of a gap against a multiplier, relative to the mean density."""
-ROOM = 3e-7
+ROOM = 2e-7
 """Distance by which bounds are moved inwards, and outputs may miss them at the end."""
 LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
 """How far outputs may be outside after a step, relative to how far they were at first, or to the
