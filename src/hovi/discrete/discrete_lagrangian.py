@@ -7,7 +7,7 @@ compiled again when the scheme, the step or the number of intervals changes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -49,7 +49,6 @@ class DiscreteLagrangian:
     lagrangian: Lagrangian
     grid: Grid
     instants: Instants | None = None
-    _elsewhere: DiscreteLagrangian | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.grid.order != self.lagrangian.order:
@@ -86,11 +85,14 @@ class DiscreteLagrangian:
         """The same with other instants; the last one is kept, with what it has computed."""
         if instants is self.instants:
             return self
-        if self._elsewhere is None or self._elsewhere.instants is not instants:
-            other = DiscreteLagrangian(self.lagrangian, self.grid, instants)
-            object.__setattr__(self, "_elsewhere", other)
-            return other
-        return self._elsewhere
+        if not self._elsewhere or self._elsewhere[0].instants is not instants:
+            self._elsewhere[:] = [DiscreteLagrangian(self.lagrangian, self.grid, instants)]
+        return self._elsewhere[0]
+
+    @cached_property
+    def _elsewhere(self) -> list[DiscreteLagrangian]:
+        """The last one with other instants, if any."""
+        return []
 
     def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
         """L_d of every interval, shape (N,).

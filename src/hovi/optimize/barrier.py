@@ -51,8 +51,9 @@ class Bounds:
     measure: float = 1.0
 
     def shrunk(self, room: float) -> Bounds:
-        """Bounds that are further inside."""
-        return dataclasses.replace(self, lower=self.lower + room, upper=self.upper - room)
+        """Bounds that are further inside, by at most a quarter of their distance."""
+        inside = np.minimum(room, 0.25 * (self.upper - self.lower))
+        return dataclasses.replace(self, lower=self.lower + inside, upper=self.upper - inside)
 
     @property
     def has_lower(self) -> Mask:
