@@ -160,9 +160,10 @@ class _Newton(Generic[X]):
         found = objective.refine(outcome.x, outcome.barrier.mu / self.density)
         if found is None:
             return False
+        before = outcome.outputs.y[found.kept]
         outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
         y = outcome.outputs.y
         bounds = objective.bounds.shrunk(ROOM)
-        refined = outcome.barrier.refined(bounds, y, found.kept, found.origin)
+        refined = outcome.barrier.refined(bounds, y, found.kept, found.origin, before)
         outcome.barrier = refined.recentred(self.weight, refined.mu)
         return True

@@ -50,7 +50,6 @@ NEARBY_COST = 0.5
 NEGLIGIBLE = 1e-12
 """Cost that counts as none, relative to that of torques of the size of the inertial torque."""
 
-
 _NO_FINER_MINIMUM = "no minimum was found near it on a finer grid"
 
 
@@ -138,8 +137,7 @@ def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
     """The solution with an estimate, why it is no minimum along its way or "", and a finer one."""
     reason, finer = _fault_of_period(solution) or _fault_on_curve(solution), None
     if solution.status is Status.STATIONARY:
-        found = (solution, reason) if reason else _compared_with_stationary(solution)
-        return *found, None
+        return *((solution, reason) if reason else _compared_with_stationary(solution)), None
     if not reason and solution.error_estimate is None and solution.accuracy is None:
         solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not _costs_nothing(solution):
@@ -165,8 +163,7 @@ class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
-    motions that are NEARBY. finer: the finer solution that it was compared with, which that of
-    another motion may follow; None for none.
+    motions that are NEARBY. finer: the solution it was compared with, or None.
     """
 
     path: DiscretePath
@@ -185,19 +182,19 @@ class Resolution(MotionCheck):
 
     def _followed(self, solution: Solution) -> Solution | None:
         """As `resolved`, compared with the followed finer solution; None where that says no."""
-        if self.finer is None or not solution.success or _fault_on_curve(solution):
+        if self.finer is None or not solution.success:
             return None
         try:
             finer = followed_within_limits(solution, self.finer)
         except OutOfTimeError:
             return _not_checked(solution)
-        if finer is None:
+        if finer is None or _fault_of_period(solution) or _fault_on_curve(solution):
             return None
         compared, reason = _compared(solution, finer)
         if reason or compared.error_estimate is None:
             return None
-        path, cost, estimate = compared.trajectory.path, compared.cost, compared.error_estimate
-        return dataclasses.replace(compared, check=Resolution(path, cost, estimate, finer))
+        passed = Resolution(solution.trajectory.path, solution.cost, compared.error_estimate, finer)
+        return dataclasses.replace(compared, check=passed)
 
     def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
         """The same for the rest of the motion, where the error of the cost is as large.
