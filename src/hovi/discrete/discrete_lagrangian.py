@@ -81,19 +81,6 @@ class DiscreteLagrangian:
         space = self.lagrangian.space
         return None if space is None or space.flat else Chart(space)
 
-    def at(self, instants: Instants | None) -> DiscreteLagrangian:
-        """The same with other instants; the last one is kept, with what it has computed."""
-        if instants is self.instants:
-            return self
-        if not self._elsewhere or self._elsewhere[0].instants is not instants:
-            self._elsewhere[:] = [DiscreteLagrangian(self.lagrangian, self.grid, instants)]
-        return self._elsewhere[0]
-
-    @cached_property
-    def _elsewhere(self) -> list[DiscreteLagrangian]:
-        """The last one with other instants, if any."""
-        return []
-
     def values(self, path: DiscretePath, jets: list[Jet] | None = None) -> Array:
         """L_d of every interval, shape (N,).
 

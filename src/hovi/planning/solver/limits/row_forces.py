@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import copy
 from functools import cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
 
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.instants import Instants
 from hovi.planning.problem.problem import TrajectoryProblem
@@ -17,6 +19,9 @@ from hovi.schemes.control_points import control_degree, control_nodes
 from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
+
+_AT_INSTANTS: WeakKeyDictionary[DiscreteLagrangian, DiscreteLagrangian] = WeakKeyDictionary()
+"""The last discrete Lagrangian with further instants of each one, with what it has computed."""
 
 
 def forces_of(
@@ -91,5 +96,9 @@ def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> Trajec
     if instants is problem.ld.instants:
         return problem
     whole = copy.copy(problem)  # nothing else depends on them
-    object.__setattr__(whole, "ld", problem.ld.at(instants))
+    known = _AT_INSTANTS.get(problem.ld)
+    if known is None or known.instants is not instants:
+        known = DiscreteLagrangian(problem.ld.lagrangian, problem.grid, instants)
+        _AT_INSTANTS[problem.ld] = known
+    object.__setattr__(whole, "ld", known)
     return whole
