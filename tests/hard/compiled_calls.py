@@ -791,6 +791,23 @@ ENTRIES: dict[str, Entry] = {
             _keeps_a_share(arguments, sizes) and arguments["mu"] >= 0 and arguments["ratio"] >= 1
         ),
     ),
+    "barrier.recentre": Entry(
+        barrier.recentre,
+        {**_SLACKS, **_outputs("new_s", "new_zl", "new_zu")},
+        {"c": 2.0, "mu": 0.1},
+        **_BARRIER,
+        fits=lambda arguments, sizes: arguments["c"] > 0 and arguments["mu"] > 0,
+    ),
+    "barrier.follow": Entry(
+        barrier.follow,
+        {
+            **{**_SLACKS, **_inputs("weights", "y", "dy", "y_new")},
+            **_outputs("new_s", "new_zl", "new_zu"),
+        },
+        {"mu": 0.1, "next_mu": 0.05, "least": 2.0},
+        **_BARRIER,
+        fits=lambda arguments, sizes: arguments["next_mu"] > 0 and arguments["least"] > 0,
+    ),
     "sampling.PathSampler": Entry(
         dynamics.PathSampler,
         _SAMPLED,

@@ -188,6 +188,20 @@ def test_a_range_of_multipliers_that_is_empty_is_refused(wrong: dict[str, float]
 
 
 @pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("barrier.recentre", {"c": 0.0}),
+        ("barrier.recentre", {"mu": np.nan}),
+        ("barrier.follow", {"next_mu": 0.0}),
+        ("barrier.follow", {"least": -1.0}),
+    ],
+)
+def test_a_central_path_needs_positive_numbers(name: str, wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match="c and mu must be positive"):
+        ENTRIES[name].function(**(full_call(name) | wrong))
+
+
+@pytest.mark.parametrize(
     "content",
     [
         b'["band.factor", 1e999, 1]',

@@ -443,3 +443,72 @@ def test_a_step_leaves_a_gap_of_which_rounding_errors_are_a_small_share(mu: floa
     along = barrier.aim(y, np.array([-1.0]), barrier.central_targets())
     moved = barrier.moved(y + along.primal * along.dy, along, 1.0, 0.0)
     assert moved.s[0] >= 0.9e-4 * y[0]
+
+
+def differences(barrier: Barrier, y: Array, zl: Array, zu: Array, c: Array) -> Pair:
+    """z - c gap of both bounds at outputs y; minus infinity where there is none."""
+    bounds = barrier.bounds
+    low = np.where(bounds.has_lower, zl - c * (y - np.maximum(bounds.lower, -1e9)), -INF)
+    high = np.where(bounds.has_upper, zu - c * (np.minimum(bounds.upper, 1e9) - y), -INF)
+    return low, high
+
+
+def check_central(moved: Barrier, mu: float, wanted: Pair, c: Array) -> None:
+    """Every product is mu, and the bound that matters more keeps z - c gap, up to the middle."""
+    bounds, (below, above) = moved.bounds, gaps(moved)
+    has = bounds.has_lower, bounds.has_upper
+    for z, gap, sides in zip((moved.zl, moved.zu), (below, above), has, strict=True):
+        np.testing.assert_allclose(z[sides] * gap[sides], mu, rtol=1e-9)
+    assert (moved.zl[~bounds.has_lower] == 0.0).all()
+    assert (moved.zu[~bounds.has_upper] == 0.0).all()
+    kept = differences(moved, moved.s, moved.zl, moved.zu, c)
+    lower = wanted[0] >= wanted[1]
+    kept, wanted = np.where(lower, *kept), np.where(lower, *wanted)
+    free = np.isfinite(wanted)
+    both = np.flatnonzero(has[0] & has[1])
+    free[both] &= np.abs(below[both] - above[both]) > 1e-12
+    assert free.sum() >= 5
+    np.testing.assert_allclose(kept[free], wanted[free], rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_recentred_barrier_is_central_and_keeps_what_holds_bounds(seed: int) -> None:
+    barrier, _ = random_barrier(seed)
+    c = np.full_like(barrier.s, 0.7)
+    moved = barrier.recentred(0.7, 1e-3)
+    check_central(moved, 1e-3, differences(barrier, barrier.s, barrier.zl, barrier.zu, c), c)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_followed_barrier_is_central_with_the_multipliers_of_the_step(seed: int) -> None:
+    start, y = random_barrier(seed)
+    barrier, random = start.recentred(0.7, MU), np.random.default_rng([seed, 3])
+    dy, more = 0.1 * random.normal(size=(2, len(y)))
+    y_new, mu = y + dy + 0.1 * more, 0.1 * MU
+    moved, outside, work = barrier.followed(y, dy, y_new, mu, 0.7)
+    below, above = gaps(barrier)
+    ds = y + dy - barrier.s
+    has = barrier.bounds.has_lower, barrier.bounds.has_upper
+    zl = np.where(has[0], (MU - barrier.zl * ds) / np.where(has[0], below, 1.0), 0.0)
+    zu = np.where(has[1], (MU + barrier.zu * ds) / np.where(has[1], above, 1.0), 0.0)
+    ratio = barrier.zl / below + barrier.zu / above
+    c = np.sqrt(np.maximum(ratio, 0.7) * 0.7)
+    check_central(moved, mu, differences(barrier, y_new, zl, zu, c), c)
+    bounds, w = barrier.bounds, barrier.bounds.weights
+    assert outside == np.maximum(bounds.lower - y_new, y_new - bounds.upper).max()
+    release = np.maximum(-zl, 0.0) + np.maximum(-zu, 0.0)
+    miss = np.abs(moved.multipliers) * np.abs(y_new - moved.s)
+    np.testing.assert_allclose(work, w @ (miss + 0.01 * release), rtol=1e-9)
+
+
+def test_bounds_are_found_and_released_in_one_step() -> None:
+    """An output that crosses its bound is held, one whose multiplier becomes negative is let go."""
+    bounds = Bounds(np.zeros(2), np.full(2, INF), np.ones(2))
+    start = Barrier(bounds, np.array([0.1, 1e-8]), np.zeros(2), np.ones(2), 1e-8, 1.0)
+    barrier = dataclasses.replace(start, zl=1e-8 / start.s, zu=np.zeros(2))
+    y, dy = barrier.s, np.array([-0.3, 5e-8])
+    moved, outside, work = barrier.followed(y, dy, y + dy, 1e-8, 1.0)
+    assert outside == pytest.approx(0.2)
+    assert work >= 0.01 * 4.0  # the multiplier 1 becomes -4
+    assert moved.zl[0] > 0.1
+    assert moved.zl[1] < 1e-3

@@ -11,6 +11,7 @@ namespace hovi::barrier {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double least_gap = 1e-16;  // the rounding unit at a bound of one
 constexpr double rounding = 1e-10;   // of a slack, as a share of its gap
+constexpr double released = 1e-2;    // how far an output may move from a bound that lets it go
 
 // R slacks s with multipliers zl, zu; infinite bounds are none.
 struct Slacks {
@@ -195,6 +196,69 @@ inline void move(const Slacks& at, const double* y, const Direction& d, double p
     out.zl[i] = at.has_lower(i) ? std::clamp(zl, centre_low / ratio, centre_low * ratio) : 0.0;
     out.zu[i] = at.has_upper(i) ? std::clamp(zu, centre_high / ratio, centre_high * ratio) : 0.0;
   }
+}
+
+// The gap of a bound at which gap z = mu and z - c gap = w: near 0 with z = w > 0, else -w/c.
+inline double central_gap(double w, double c, double mu) {
+  const double root = std::sqrt(w * w + 4.0 * c * mu);
+  return w > 0.0 ? 2.0 * mu / (root + w) : (root - w) / (2.0 * c);
+}
+
+// The slack between two bounds at the gap of the one that matters more, by given differences w of
+// the multipliers and c gaps, and not beyond the middle; y without any bound.
+inline double central_slack(const Slacks& at, std::size_t i, double y, double low, double high,
+                            double c, double mu) {
+  const double half = 0.5 * (at.upper[i] - at.lower[i]);  // infinite with one bound
+  if (at.has_lower(i) && (!at.has_upper(i) || low >= high))
+    return at.lower[i] + std::min(central_gap(low, c, mu), half);
+  return at.has_upper(i) ? at.upper[i] - std::min(central_gap(high, c, mu), half) : y;
+}
+
+// A slack, and the multipliers with which its products z gap are mu.
+inline void set_central(const Slacks& at, std::size_t i, double s, double mu,
+                        const Direction& out) {
+  out.s[i] = s;
+  out.zl[i] = at.has_lower(i) ? mu / std::max(s - at.lower[i], least_gap) : 0.0;
+  out.zu[i] = at.has_upper(i) ? mu / std::max(at.upper[i] - s, least_gap) : 0.0;
+}
+
+// The point of the central path with mu that belongs to slacks and multipliers of another one.
+inline void recentre(const Slacks& at, double c, double mu, const Direction& out) {
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double low = at.zl[i] - c * (at.s[i] - at.lower[i]);
+    const double high = at.zu[i] - c * (at.upper[i] - at.s[i]);
+    set_central(at, i, central_slack(at, i, at.s[i], low, high, c, mu), mu, out);
+  }
+}
+
+// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds that
+// no longer hold the solution may give: the negative multipliers, times w and a distance.
+struct Misses {
+  double outside = -infinity, work = 0.0;
+};
+
+// After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
+// point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
+// what both say of a bound is weighed with c, between the ratio of multiplier and gap before and the
+// least one. With that ratio bounds would be released slowly, with the least one found slowly.
+inline Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
+                     const double* y_new, double mu, double next_mu, double least,
+                     const Direction& out) {
+  Misses misses;
+  for (std::size_t i = 0; i < at.count; ++i) {
+    const double below = at.below(i), above = at.above(i), ds = dy[i] + y[i] - at.s[i];
+    const double ratio = at.zl[i] / below + at.zu[i] / above;
+    const double c = std::sqrt(std::max(ratio, least) * least);
+    const double zl = (mu - at.zl[i] * ds) / below, zu = (mu + at.zu[i] * ds) / above;
+    const double low = zl - c * (y_new[i] - at.lower[i]), high = zu - c * (at.upper[i] - y_new[i]);
+    const double s = central_slack(at, i, y_new[i], low, high, c, next_mu);
+    set_central(at, i, s, next_mu, out);
+    const double miss = std::abs(out.zu[i] - out.zl[i]) * std::abs(y_new[i] - s);
+    misses.work += weights[i] * (miss + released * (std::max(-zl, 0.0) + std::max(-zu, 0.0)));
+    misses.outside =
+        std::max({misses.outside, at.lower[i] - y_new[i], y_new[i] - at.upper[i]});
+  }
+  return misses;
 }
 
 }  // namespace hovi::barrier

@@ -138,6 +138,37 @@ void move(const Vector& lower, const Vector& upper, const Vector& s, const Vecto
                       penalty, ratio, out);
 }
 
+void require_central(double c, double mu) {
+  if (!(c > 0.0 && mu > 0.0)) refuse("c and mu must be positive.");
+}
+
+void recentre(const Vector& lower, const Vector& upper, const Vector& s, const Vector& zl,
+              const Vector& zu, double c, double mu, const Out& new_s, const Out& new_zl,
+              const Out& new_zu) {
+  require_central(c, mu);
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
+                      vector("new_zu", R, new_zu)};
+  hovi::barrier::recentre(at, c, mu, out);
+}
+
+std::tuple<double, double> follow(const Vector& lower, const Vector& upper, const Vector& s,
+                                  const Vector& zl, const Vector& zu, const Vector& weights,
+                                  const Vector& y, const Vector& dy, const Vector& y_new,
+                                  double mu, double next_mu, double least, const Out& new_s,
+                                  const Out& new_zl, const Out& new_zu) {
+  require_central(least, next_mu);
+  const Slacks at = slacks_of(lower, upper, s, zl, zu);
+  const std::size_t R = at.count;
+  const Direction out{vector("new_s", R, new_s), vector("new_zl", R, new_zl),
+                      vector("new_zu", R, new_zu)};
+  const auto misses = hovi::barrier::follow(at, vector("weights", R, weights), vector("y", R, y),
+                                            vector("dy", R, dy), vector("y_new", R, y_new), mu,
+                                            next_mu, least, out);
+  return {misses.outside, misses.work};
+}
+
 }  // namespace
 
 NB_MODULE(barrier, m) {
@@ -159,4 +190,8 @@ NB_MODULE(barrier, m) {
   m.def("move", &move, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "y"_a, "ds"_a, "dzl"_a,
         "dzu"_a, "primal"_a, "dual"_a, "keep"_a, "mu"_a, "penalty"_a, "ratio"_a, "new_s"_a,
         "new_zl"_a, "new_zu"_a);
+  m.def("recentre", &recentre, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "c"_a, "mu"_a,
+        "new_s"_a, "new_zl"_a, "new_zu"_a);
+  m.def("follow", &follow, "lower"_a, "upper"_a, "s"_a, "zl"_a, "zu"_a, "weights"_a, "y"_a, "dy"_a,
+        "y_new"_a, "mu"_a, "next_mu"_a, "least"_a, "new_s"_a, "new_zl"_a, "new_zu"_a);
 }

@@ -124,3 +124,32 @@ def move(
     new_zl: Array,
     new_zu: Array,
 ) -> None: ...
+def recentre(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    c: float,
+    mu: float,
+    new_s: Array,
+    new_zl: Array,
+    new_zu: Array,
+) -> None: ...
+def follow(
+    lower: Array,
+    upper: Array,
+    s: Array,
+    zl: Array,
+    zu: Array,
+    weights: Array,
+    y: Array,
+    dy: Array,
+    y_new: Array,
+    mu: float,
+    next_mu: float,
+    least: float,
+    new_s: Array,
+    new_zl: Array,
+    new_zu: Array,
+) -> tuple[float, float]: ...

@@ -175,6 +175,7 @@ class BandModel(QuadraticModel):
     def __init__(self, intervals: IntervalSum, layout: BandLayout, metric_band: Array) -> None:
         self.layout = layout
         self._band: Array | None = None
+        self._last: tuple[float, BandFactor | None] | None = None
         self._metric_band = metric_band
         super().__init__(intervals)
 
@@ -208,7 +209,9 @@ class BandModel(QuadraticModel):
         return s, slope, length
 
     def factor(self, shift: float) -> Factor | None:
-        """Banded Cholesky of H + shift D; None where it fails."""
+        """Banded Cholesky of H + shift D; None where it fails. The last one is kept."""
+        if self._last is not None and self._last[0] == shift:
+            return self._last[1]
         if self._band is None:
             self._band = self.layout.assemble(self.intervals.hessian)
         factor = np.empty_like(self._band)
@@ -216,7 +219,8 @@ class BandModel(QuadraticModel):
         definite = native.factor(
             self._band, self._metric_band, shift, rows, self.layout.size, factor
         )
-        return BandFactor(factor, rows) if definite else None
+        self._last = shift, BandFactor(factor, rows) if definite else None
+        return self._last[1]
 
     def negative_eigenvalues(self, border: tuple[Array, float] | None = None) -> int:
         """Number of negative eigenvalues of H, by elimination of blocks as wide as the band.

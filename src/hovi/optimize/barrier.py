@@ -23,6 +23,8 @@ WARM_START_MARGIN = 1e-5
 """Minimum distance of the slack of a warm start, unless it says otherwise."""
 ADDED_MARGIN = 0.3
 """Minimum distance of a slack that is added, relative to mu over the scale of the multipliers."""
+LEAST_GAP = 1e-16
+"""Least distance of a slack from its bounds."""
 MAX_DUAL_RATIO = 1e8
 """Largest ratio, either way, of a multiplier and mu over its gap."""
 FRACTION_TO_BOUNDARY = 0.99
@@ -47,6 +49,11 @@ class Bounds:
     upper: Array
     weights: Array
     measure: float = 1.0
+
+    def shrunk(self, room: float) -> Bounds:
+        """Bounds that are further inside, by at most a quarter of their distance."""
+        inside = np.minimum(room, 0.25 * (self.upper - self.lower))
+        return dataclasses.replace(self, lower=self.lower + inside, upper=self.upper - inside)
 
     @property
     def has_lower(self) -> Mask:
@@ -185,6 +192,11 @@ class Barrier:
         zl, zu = (np.where(known, z[chosen], 0.0) for z in (self.zl, self.zu))
         return dataclasses.replace(self, bounds=some, s=self.s[chosen], zl=zl, zu=zu)
 
+    def at_outputs(self, y: Array) -> Barrier:
+        """The same with slacks at outputs that are within the bounds to rounding."""
+        bounds, least = self.bounds, LEAST_GAP
+        return dataclasses.replace(self, s=np.clip(y, bounds.lower + least, bounds.upper - least))
+
     def outside(self, y: Array) -> Array:
         """How far outputs are outside their bounds, 0 inside, shape (R,)."""
         beyond = np.maximum(self.bounds.lower - y, y - self.bounds.upper)
@@ -266,6 +278,31 @@ class Barrier:
         native.move(*self.arrays, y, *d, *numbers, s, zl, zu)
         return dataclasses.replace(self, s=s, zl=zl, zu=zu)
 
+    def recentred(self, weight: float, mu: float) -> Barrier:
+        """The point of the central path with another mu that belongs to this one.
+
+        Each bound keeps z - weight gap, so that what holds a bound still does.
+        """
+        s, zl, zu = (np.empty_like(self.s) for _ in range(3))
+        native.recentre(*self.arrays, weight, mu, s, zl, zu)
+        return dataclasses.replace(self, s=s, zl=zl, zu=zu, mu=mu)
+
+    def followed(
+        self, y: Array, dy: Array, y_new: Array, mu: float, weight: float
+    ) -> tuple[Barrier, float, float]:
+        """The point of the central path with another mu after a Newton step dy of outputs y.
+
+        From a point of this central path. z is what the step predicts and the gap that of y_new;
+        each bound keeps z - c gap, where c is the geometric mean of the weight and of z / gap
+        before, or the weight if that is larger. Returns also how far y_new is outside at most, and
+        what may still be gained: sum weights |zu - zl| |y_new - s|, and by the release of bounds
+        whose predicted multipliers are negative.
+        """
+        s, zl, zu = (np.empty_like(y) for _ in range(3))
+        w, numbers = self.bounds.weights, (self.mu, mu, weight)
+        misses = native.follow(*self.arrays, w, y, dy, y_new, *numbers, s, zl, zu)
+        return dataclasses.replace(self, s=s, zl=zl, zu=zu, mu=mu), *misses
+
     def with_mu(self, mu: float) -> Barrier:
         """The barrier with another mu."""
         return dataclasses.replace(self, mu=mu)
@@ -290,4 +327,4 @@ class Barrier:
 
 def _gaps(bounds: Bounds, s: Array) -> Pair:
     """(s - lower, upper - s), at least the rounding unit; infinite where there is no bound."""
-    return np.maximum(s - bounds.lower, 1e-16), np.maximum(bounds.upper - s, 1e-16)
+    return np.maximum(s - bounds.lower, LEAST_GAP), np.maximum(bounds.upper - s, LEAST_GAP)

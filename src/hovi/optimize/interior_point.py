@@ -37,8 +37,7 @@ from hovi.optimize.bounded_objective import (
     Refinement,
 )
 from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
-from hovi.optimize.quadratic_model import QuadraticModel
-from hovi.optimize.step_control import decrease_ratio, next_radius, next_shift
+from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_radius, next_shift
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt

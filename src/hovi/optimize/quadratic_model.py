@@ -1,11 +1,13 @@
 """A quadratic model g.s + 1/2 s.H s that is a sum over intervals, with a metric D.
 
 An interval couples only its own columns: its two end nodes and its inner modes. A solver orders
-the unknowns such that H + shift D is factored in O(N n^3).
+the unknowns such that H + shift D is factored in O(N n^3). How well a model predicted the decrease
+of a step decides on the radius and the shift of the next one.
 """
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
@@ -80,3 +82,31 @@ class QuadraticModel(ABC):
     def random_vector(self, seed: int) -> Array:
         """A reproducible random step, a start of inverse iterations."""
         return np.random.default_rng(seed).standard_normal(self.gradient.shape)
+
+
+def decrease_ratio(actual: float, predicted: float, noise: float) -> float:
+    """Actual over predicted decrease; 1 where both are rounding noise, -1 where not finite."""
+    if not math.isfinite(actual):
+        return -1.0
+    if abs(actual) <= noise and abs(predicted) <= 10 * noise:
+        return 1.0
+    return actual / predicted if predicted > 0 else -1.0
+
+
+def next_shift(shift: float, norm: float, radius: float) -> float:
+    """Initial shift for a new radius: it decreases slightly faster than the radius grows."""
+    return float(shift * (norm / radius) ** 1.2)
+
+
+def next_radius(radius: float, norm: float, ratio: float) -> float:
+    """The radius after a step: larger where the model was good and the radius limited the step.
+
+    Where the model failed: the minimum of a parabola along the step, within bounds.
+    norm: length of the step. ratio: actual over predicted decrease.
+    """
+    if ratio < 0.25:
+        share = min(0.5, 0.5 / (1.0 - min(ratio, 0.0)))
+        return max(0.25, share) * min(radius, norm)
+    if ratio > 0.75 and norm > 0.7 * radius:
+        return (2.0 if ratio > 0.9 else 1.4) * radius
+    return radius

@@ -17,8 +17,13 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from hovi.optimize.quadratic_model import Factor, QuadraticModel
-from hovi.optimize.step_control import decrease_ratio, next_radius, next_shift
+from hovi.optimize.quadratic_model import (
+    Factor,
+    QuadraticModel,
+    decrease_ratio,
+    next_radius,
+    next_shift,
+)
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import raise_if_interrupted, record_interrupt
 

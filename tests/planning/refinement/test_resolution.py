@@ -11,8 +11,10 @@ import pytest
 
 import hovi
 from hovi.discrete.curve_integral import integral_along
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import as_limits
+from hovi.planning.refinement import resolution
 from hovi.planning.refinement.error_estimate import finer_than
 from hovi.planning.refinement.resolution import NEARBY, RESOLVED, resolved
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -157,6 +159,30 @@ def test_replanning_near_a_resolved_motion_keeps_its_estimate(arm_scene: Scene) 
     assert far.error_estimate != first.error_estimate
     true = solve_on_grid(far.problem.finer.finer, far.trajectory)  # type: ignore[union-attr]
     assert far.error_estimate == pytest.approx(abs(far.cost / true.cost - 1), rel=0.1)
+
+
+def test_within_limits_a_motion_is_compared_with_the_followed_finer_one(
+    two_link: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its estimate is that of a comparison from anew, at less cost."""
+    scene = Scene(two_link, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(1.0, 24, by_name("galerkin-2")))
+    limits = as_limits(two_link, {"base": "none", "v": 1.6, "tau": 60.0})
+    ends = hovi.State([0.0, 0.0]), hovi.State([1.2, 0.8])
+    first = hovi.solve(hovi.TrajectoryProblem(ld, *ends, limits))
+    assert first.success, first.message
+    calls = []
+    known = resolution.finer_than
+    monkeypatch.setattr(resolution, "finer_than", lambda x: calls.append(1) or known(x))
+    monkeypatch.setattr(resolution, "NEARBY", 1e-3)
+    moved = first.replan(goal=[1.204, 0.797])
+    again = moved.replan(goal=[1.2, 0.8])
+    assert moved.success, moved.message
+    assert again.success, again.message
+    assert not calls
+    anew = resolved(dataclasses.replace(moved, error_estimate=None))
+    assert calls
+    assert moved.error_estimate == pytest.approx(anew.error_estimate, rel=0.3, abs=3e-5)
 
 
 def test_no_estimate_is_kept_from_a_motion_at_rest(two_link: Robot) -> None:

@@ -29,6 +29,8 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
+from hovi.planning.solver.central_path import CentralPath
+from hovi.planning.solver.methods.feasibility import follow
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
@@ -112,6 +114,7 @@ class FinerSolution:
         and the same end data, shape (N,): the interval's contribution to the error of the cost.
         Their sum is the difference of costs to first order.
     finish: returns the converged finer solution; None if that fails.
+    central: of the finer solution within limits, which that of another motion may follow.
     """
 
     problem: TrajectoryProblem
@@ -120,6 +123,7 @@ class FinerSolution:
     known: float
     gains: Array
     finish: Callable[[], Solution | None]
+    central: CentralPath | None = None
 
     @property
     def trajectory(self) -> Trajectory:
@@ -147,6 +151,27 @@ def richer_within_limits(
     if found is None:
         return None
     return dataclasses.replace(found, finish=partial(_finished, found, central.level))
+
+
+def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSolution | None:
+    """The finer solution within limits, followed from that of a motion between other ends.
+
+    Without gains, and with nothing more to finish. known: that one. None where it does not belong
+    to the solution's grid, or is too far away.
+    """
+    problem, path = solution.problem, solution.trajectory.path
+    assert problem is not None
+    if known.central is None or problem.constrained:
+        return None
+    if not np.array_equal(known.problem.grid.steps, problem.grid.steps):
+        return None
+    fine = known.problem.between(problem.start, problem.goal)
+    central = follow(fine, known.central, RICHER_BARRIER)
+    if central is None:
+        return None
+    cost, before = fine.ld.action(central.last), problem.ld.action(path)
+    gains = np.full(problem.grid.intervals, np.nan)
+    return FinerSolution(fine, central.last, cost, before, gains, lambda: None, central)
 
 
 def _finished(found: FinerSolution, barrier: float) -> Solution | None:
@@ -218,7 +243,9 @@ def _solved(
     squares = np.sum((coarse.sample_intervals(k, s).tau - finer.sample(t).tau) ** 2, axis=1)
     gains = 0.5 * coarse.grid.steps * squares.reshape(coarse.grid.intervals, -1).mean(axis=1)
     known, cost = problem.ld.action(path), solution.cost
-    return FinerSolution(solution.problem, finer.path, cost, known, gains, lambda: solution)
+    return FinerSolution(
+        solution.problem, finer.path, cost, known, gains, lambda: solution, solution.central
+    )
 
 
 def prolonged(path: DiscretePath, fine: Grid) -> DiscretePath:

@@ -21,7 +21,9 @@ from hovi.errors import HoviError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.candidate import ROUNDING_FLOOR, error_of_cost
 from hovi.planning.refinement.error_estimate import (
+    FinerSolution,
     finer_than,
+    followed_within_limits,
     prolonged,
     with_estimate,
     with_metadata,
@@ -47,7 +49,6 @@ NEARBY_COST = 0.5
 """Relative change of the cost up to which that holds: near rest small motions differ much."""
 NEGLIGIBLE = 1e-12
 """Cost that counts as none, relative to that of torques of the size of the inertial torque."""
-
 
 _NO_FINER_MINIMUM = "no minimum was found near it on a finer grid"
 
@@ -118,7 +119,7 @@ def resolved(solution: Solution) -> Solution:
     if not solution.success or solution.problem is None:
         return solution
     try:
-        solution, reason = _checked(solution)
+        solution, reason, finer = _checked(solution)
     except OutOfTimeError:
         return _not_checked(solution)
     if reason and is_late():  # perhaps only as the finer solve was ended
@@ -128,20 +129,20 @@ def resolved(solution: Solution) -> Solution:
     assert solution.error_estimate is not None
     if solution.status is Status.STATIONARY:
         return dataclasses.replace(solution, check=resolved)
-    passed = Resolution(solution.trajectory.path, solution.cost, solution.error_estimate)
+    passed = Resolution(solution.trajectory.path, solution.cost, solution.error_estimate, finer)
     return dataclasses.replace(solution, check=passed)
 
 
-def _checked(solution: Solution) -> tuple[Solution, str]:
-    """The solution with an estimate, and why it is no minimum along its way, or ""."""
-    reason = _fault_of_period(solution) or _fault_on_curve(solution)
+def _checked(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
+    """The solution with an estimate, why it is no minimum along its way or "", and a finer one."""
+    reason, finer = _fault_of_period(solution) or _fault_on_curve(solution), None
     if solution.status is Status.STATIONARY:
-        return (solution, reason) if reason else _compared_with_stationary(solution)
+        return *((solution, reason) if reason else _compared_with_stationary(solution)), None
     if not reason and solution.error_estimate is None and solution.accuracy is None:
-        solution, reason = _compared_with_finer(solution)
+        solution, reason, finer = _compared_with_finer(solution)
     elif not reason and not _costs_nothing(solution):
         reason = _fault_of_estimate(solution.error_estimate)
-    return solution, reason or _fault_of_whirling(solution)
+    return solution, reason or _fault_of_whirling(solution), finer
 
 
 def unresolved_if_whirling(solution: Solution) -> Solution:
@@ -162,21 +163,38 @@ class Resolution(MotionCheck):
     """The check of motions that are replanned from a resolved one.
 
     path, cost: of the resolved motion. estimate: of the relative error of its cost, kept for
-    motions that are NEARBY.
+    motions that are NEARBY. finer: the solution it was compared with, or None.
     """
 
     path: DiscretePath
     cost: float
     estimate: float
+    finer: FinerSolution | None = None
 
     def __call__(self, solution: Solution) -> Solution:
         """The solution as `resolved` returns it, without (b) for a motion NEARBY."""
         if not (solution.success and self._is_near(solution)):
-            return resolved(solution)
+            return self._followed(solution) or resolved(solution)
         reason = _fault_on_curve(solution)
         if reason:
             return _unresolved(solution, reason)
         return dataclasses.replace(with_estimate(solution, self.estimate), check=self)
+
+    def _followed(self, solution: Solution) -> Solution | None:
+        """As `resolved`, compared with the followed finer solution; None where that says no."""
+        if self.finer is None or not solution.success:
+            return None
+        try:
+            finer = followed_within_limits(solution, self.finer)
+        except OutOfTimeError:
+            return _not_checked(solution)
+        if finer is None or _fault_of_period(solution) or _fault_on_curve(solution):
+            return None
+        compared, reason = _compared(solution, finer)
+        if reason or compared.error_estimate is None:
+            return None
+        passed = Resolution(solution.trajectory.path, solution.cost, compared.error_estimate, finer)
+        return dataclasses.replace(compared, check=passed)
 
     def shifted(self, shift: Shift, problem: TrajectoryProblem) -> Check:
         """The same for the rest of the motion, where the error of the cost is as large.
@@ -271,14 +289,20 @@ def _fault_of_passive(problem: TrajectoryProblem, trajectory: Trajectory) -> str
     )
 
 
-def _compared_with_finer(solution: Solution) -> tuple[Solution, str]:
-    """The solution with an error estimate, and why (b) or (c) does not hold, or ""."""
+def _compared_with_finer(solution: Solution) -> tuple[Solution, str, FinerSolution | None]:
+    """The solution with an estimate, why (b) or (c) does not hold or "", and the finer one."""
     try:
         finer = finer_than(solution)
     except HoviError as refused:
-        return solution, f"it could not be compared with a finer one: {str(refused).rstrip('.')}"
+        reason = f"it could not be compared with a finer one: {str(refused).rstrip('.')}"
+        return solution, reason, None
     if finer is None:
-        return solution, _NO_FINER_MINIMUM
+        return solution, _NO_FINER_MINIMUM, None
+    return *_compared(solution, finer), finer
+
+
+def _compared(solution: Solution, finer: FinerSolution) -> tuple[Solution, str]:
+    """The solution with an error estimate, and why (b) does not hold, or ""."""
     estimate, difference = error_of_cost(solution, finer), abs(finer.known - finer.cost)
     if solution.cost > finer.known:  # the cost of a free duration includes w T
         estimate *= finer.known / solution.cost

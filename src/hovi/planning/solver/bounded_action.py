@@ -349,13 +349,14 @@ class BoundedAction(BoundedObjective[DiscretePath]):
         intervals = np.concatenate(self.ld.point_intervals)
         weights = np.concatenate(self.ld.point_weights)[:, None]
         lower, upper = (self._rows_of(bound) for bound in self.limits.on(self.problem.grid.t))
-        lower = np.pad(lower, ((0, 0), (0, size)))
-        upper = np.pad(upper, ((0, 0), (0, size)), constant_values=np.inf)
+        if size > 0:
+            lower = np.pad(lower, ((0, 0), (0, size)))
+            upper = np.pad(upper, ((0, 0), (0, size)), constant_values=np.inf)
         if len(lower) > 1:  # they differ between segments
             lower, upper = lower[intervals], upper[intervals]
         shape = (len(intervals), lower.shape[1])
         lower, upper, weights = (np.broadcast_to(x, shape) for x in (lower, upper, weights))
-        if margins is None:
+        if margins is None or not margins.any():
             return lower, upper, weights
         tightening = margins.reshape(2, len(margins[0]), -1)
         first = self.limits.lower.size

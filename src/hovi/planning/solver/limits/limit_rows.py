@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from hovi._native import intervals as native
 from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Coordinates
 from hovi.discrete.interval_paths import scaled_data
 from hovi.optimize.bounded_objective import Refinement
@@ -26,7 +27,7 @@ from hovi.planning.problem.limits import Limits
 from hovi.planning.solver.limits.limited_coordinates import LimitedCoordinates
 from hovi.planning.solver.limits.limited_parts import LimitedParts
 from hovi.robot.space.configuration_space import ConfigurationSpace
-from hovi.schemes.control_points import control_degree, control_rows
+from hovi.schemes.control_points import control_degree, control_nodes, control_rows
 from hovi.schemes.scheme import regular_from_nodal
 
 Array = npt.NDArray[np.float64]
@@ -71,6 +72,7 @@ class LimitRows:
         self.fixed_ends = fixed_ends
         self.limits = limits
         self.fixed = False
+        self._instants: tuple[Grid, Instants] | None = None
         self.max_loss = max(MAX_LOSS, LOSS_RATIO * barrier)
         self.of = LimitedCoordinates.of(limits, grid, space)
         depth = np.where(self.of.order == 0, *halvings)
@@ -116,6 +118,17 @@ class LimitRows:
         rows = self.copied()
         rows.fixed = False
         return rows
+
+    @property
+    def instants(self) -> Instants:
+        """The instants of the control points of positions on whole intervals."""
+        if self._instants is None or self._instants[0] is not self.grid:
+            grid = self.grid
+            nodes = control_nodes(control_degree(grid.order, grid.inner_modes, 0))
+            weights = np.repeat(grid.steps / len(nodes), len(nodes))
+            k = np.repeat(np.arange(grid.intervals), len(nodes))
+            self._instants = grid, Instants(k, np.tile(nodes, grid.intervals), weights)
+        return self._instants[1]
 
     @property
     def size(self) -> int:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+from functools import cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,9 @@ from hovi.schemes.control_points import control_degree, control_nodes
 from hovi.schemes.interval_curve import jet_rows
 
 Array = npt.NDArray[np.float64]
+
+_AT_INSTANTS: WeakKeyDictionary[DiscreteLagrangian, DiscreteLagrangian] = WeakKeyDictionary()
+"""The last discrete Lagrangian with further instants of each one, with what it has computed."""
 
 
 def forces_of(
@@ -35,17 +40,16 @@ def forces_of(
     forces = rows.weights * multipliers / rows.of.ranges[rows.coordinate]
     for order in np.unique(rows.orders):
         own = np.flatnonzero(rows.orders == order)
-        shares = forces[own, None] * _values_in(rows.table[own], nodes, grid, int(order))
+        shares = forces[own, None] * _values_in(rows.table[own], grid, int(order))
         places = rows.intervals[own] * nv + rows.joints[own]
         numbers = places[:, None] * len(nodes) + np.arange(len(nodes))
         sums = np.bincount(numbers.ravel(), shares.ravel(), len(slope) * nv * len(nodes))
         slope[:, order] = sums.reshape(len(slope), nv, len(nodes))
-    weights = np.repeat(grid.steps / len(nodes), len(nodes))
-    k = np.repeat(np.arange(grid.intervals), len(nodes))
-    instants = Instants(k, np.tile(nodes, grid.intervals), weights)
-    slope = slope.transpose(0, 3, 1, 2).reshape(len(k), -1) / weights[:, None]
-    outputs = np.zeros((len(k), 0))
-    return instants, [PointTerms(slope, np.zeros_like(slope), outputs, np.zeros_like(outputs))]
+    instants = rows.instants
+    force = slope.transpose(0, 3, 1, 2).reshape(len(instants.weights), -1)
+    force = force / instants.weights[:, None]
+    outputs = np.zeros((len(force), 0))
+    return instants, [PointTerms(force, np.zeros_like(force), outputs, np.zeros_like(outputs))]
 
 
 def joined(
@@ -69,14 +73,22 @@ def joined(
     return Instants(k[order], s[order], weights[order]), [joint]
 
 
-def _values_in(table: Array, nodes: Array, grid: Grid, order: int) -> Array:
+def _values_in(table: Array, grid: Grid, order: int) -> Array:
     """Rows of h^j q^(j), or q, over (h q0', ..., Z, c) as sums of its values at nodes, (E, M)."""
-    values = jet_rows(nodes, grid.order, grid.inner_modes)[:, order]
+    inverse = _inverse_values(grid.order, grid.inner_modes, order)
     if order == 0:  # rows of q have a share of 1 in q0
-        values, table = (
-            np.pad(each, ((0, 0), (1, 0)), constant_values=1.0) for each in (values, table)
-        )
-    return np.asarray(table @ np.linalg.pinv(values))
+        return np.asarray(table @ inverse[1:] + inverse[0])
+    return np.asarray(table @ inverse)
+
+
+@cache
+def _inverse_values(k: int, modes: int, order: int) -> Array:
+    """(h q0', ..., Z, c), after q0 for order 0, from the values of h^j q^(j) at the nodes."""
+    nodes = control_nodes(control_degree(k, modes, 0))
+    values = jet_rows(nodes, k, modes)[:, order]
+    if order == 0:
+        values = np.pad(values, ((0, 0), (1, 0)), constant_values=1.0)
+    return np.asarray(np.linalg.pinv(values))
 
 
 def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> TrajectoryProblem:
@@ -84,6 +96,9 @@ def at_instants(problem: TrajectoryProblem, instants: Instants | None) -> Trajec
     if instants is problem.ld.instants:
         return problem
     whole = copy.copy(problem)  # nothing else depends on them
-    ld = DiscreteLagrangian(problem.ld.lagrangian, problem.grid, instants)
-    object.__setattr__(whole, "ld", ld)
+    known = _AT_INSTANTS.get(problem.ld)
+    if known is None or known.instants is not instants:
+        known = DiscreteLagrangian(problem.ld.lagrangian, problem.grid, instants)
+        _AT_INSTANTS[problem.ld] = known
+    object.__setattr__(whole, "ld", known)
     return whole

@@ -17,6 +17,7 @@ from hovi.optimize.bordered_model import EquationModel
 from hovi.optimize.bounded_objective import BoundedOutcome, Outputs
 from hovi.optimize.interior_point import minimize_bounded
 from hovi.optimize.merge_tree import MergeTreeModel
+from hovi.optimize.nearby_bounded import follow_bounded
 from hovi.optimize.trust_region import Iteration, Options, Stop
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.clearance_violation import (
@@ -77,7 +78,7 @@ class BoundedSearch:
     tightened: the margins before the last tightening and the excess then, if there was one on this
         grid.
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
-    last: the problem and the motion of the last solve.
+    last: the problem and the motion of the last solve. solved: its outcome and its objective.
     points: of the central path, with a larger barrier than that of the last solution.
     along, level: see InteriorPoint. plain: see minimize_bounded.
     """
@@ -112,6 +113,7 @@ class BoundedSearch:
         self.rows = self.coarse_rows() if known is None else known.copied()
         self.tightened: tuple[Array, Array] | None = None
         self.points: list[tuple[float, DiscretePath]] = []
+        self.solved: tuple[Bounded, BoundedAction] | None = None
 
     @property
     def least_distance(self) -> float:
@@ -190,7 +192,8 @@ class BoundedSearch:
     def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
 
-        These are on the central path of a similar problem only, but the next solve may need room.
+        These are on the central path of a similar problem only, perhaps between other ends, but the
+        next solve may need room.
         """
         density = mean_density(outcome.outputs, objective.bounds.measure)
         points = [(product / density, x) for product, x in outcome.marks]
@@ -200,8 +203,6 @@ class BoundedSearch:
             for level, x in self.points or ([] if self.along is None else self.along.points)
             if level > first and x.inner.shape == like.inner.shape
         ]
-        if not self.points:
-            before = [(level, self.problem.moved(x)) for level, x in before]
         self.points = before + points
 
     def remaining_options(self) -> Options:
@@ -260,9 +261,22 @@ class BoundedSearch:
         if start is not None and len(start.s) != len(objective.bounds.lower):
             start = None  # rows were added in a solve that failed
         outcome = minimize_bounded(objective, path, options, self.report, start, self.plain)
+        return self._noted(outcome, objective)
+
+    def followed(
+        self, objective: BoundedAction, path: DiscretePath, known: Barrier, options: Options
+    ) -> Bounded:
+        """A solve of an objective from the solution of a similar problem: see follow_bounded."""
+        raise_if_late()
+        known = dataclasses.replace(known, bounds=objective.bounds)
+        outcome = follow_bounded(objective, path, known, options, self.report)
+        return self._noted(outcome, objective)
+
+    def _noted(self, outcome: Bounded, objective: BoundedAction) -> Bounded:
+        """The outcome of a solve, after its steps and its motion were noted."""
         self.iterations += outcome.iterations
         self.history += outcome.history
-        self.last = self.problem, outcome.x
+        self.last, self.solved = (self.problem, outcome.x), (outcome, objective)
         if outcome.stop is Stop.STATIONARY and outcome.marks:
             self._followed(outcome, objective)
         return outcome
@@ -273,7 +287,7 @@ class BoundedSearch:
         Those of limits and constraints, penalty terms of the constraints included.
         """
         multipliers = outcome.barrier.multipliers
-        objective = self.objective(None)
+        objective = self._objective_of(outcome)
         if isinstance(objective, ClearedAction):
             multipliers = objective.plain(multipliers)
         limits = len(multipliers) - (0 if self.near is None else self.near.size)
@@ -290,7 +304,15 @@ class BoundedSearch:
         if known is not None:
             action = self.objective(known).action
             known = known.updated(action.residuals(outcome.x), self.problem.passive)
-        return self.objective(known).forces(outcome.x, outcome.barrier.multipliers)
+            return self.objective(known).forces(outcome.x, outcome.barrier.multipliers)
+        return self._objective_of(outcome).forces(outcome.x, outcome.barrier.multipliers)
+
+    def _objective_of(self, outcome: Bounded) -> BoundedAction:
+        """The objective of a solve without multipliers of constraints."""
+        last, objective = self.solved or (None, None)
+        if objective is None or last is not outcome or self.near is not None:
+            return self.objective(None)
+        return self.objective(None) if objective.action.multipliers is not None else objective
 
     def negative_eigenvalues(self, outcome: Bounded) -> int:
         """n_neg of the condensed system, which is positive definite at a minimum."""

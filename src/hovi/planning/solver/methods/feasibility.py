@@ -11,8 +11,10 @@ from hovi.discrete.grid import DiscretePath
 from hovi.discrete.guess import stretched, with_bump
 from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.bounded_objective import Outputs
-from hovi.optimize.trust_region import Stop, minimize
+from hovi.optimize.trust_region import Options, Stop, minimize
 from hovi.planning.clearance.clearance_violation import approach_along
+from hovi.planning.problem.limits import no_limits
+from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import first_multipliers
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -52,6 +54,8 @@ SHIFT_LEVELS = 1e-5, 3e-2
 """Least and largest such parameter."""
 WARM_SHIFT = 1e-3
 """Largest move of an output, as a share of its range, after which a solve begins at a solution."""
+NEWTON_SHIFT, NEWTON_STEPS = 0.1, 20
+"""The same for whole Newton steps, and the maximum number of these."""
 WARM_BARRIER, WARM_DECREASE = 1e-7, 3e-7
 """Its barrier parameter, and the predicted decrease at which it ends, relative to the cost: the
 cost exceeds its minimum by less than 1e-6."""
@@ -112,6 +116,9 @@ def _solved_along(search: BoundedSearch, along: CentralPath) -> Bounded:
     _adopt(search, along)
     level = search.level
     if level is None:
+        outcome = _followed(search, along)
+        if outcome is not None:
+            return outcome
         objective, moved = search.objective(search.multipliers), search.problem.moved(along.last)
         change = objective.outputs(moved).y - objective.outputs(along.last).y
         shift = float(np.max(np.abs(change), initial=0.0))
@@ -132,6 +139,43 @@ def _adopt(search: BoundedSearch, along: CentralPath) -> None:
         search.near = along.near.on(search.problem)
     if along.margins is not None and along.margins.shape == search.margins.shape:
         search.margins = along.margins
+
+
+def follow(problem: TrajectoryProblem, along: CentralPath, barrier: float) -> CentralPath | None:
+    """The central path of a problem that ends at a solution near that of a similar problem.
+
+    None where whole Newton steps do not find it, or where time runs out.
+    barrier: last barrier parameter, relative to the mean density of the cost.
+    """
+    limits = problem.limits or no_limits(problem.coordinates)
+    search = BoundedSearch(problem, limits, Options(barrier=barrier), None, along.last, along=along)
+    _adopt(search, along)
+    outcome = _followed(search, along)
+    if outcome is None or not _is_found(outcome):
+        return None
+    return search.central_path(outcome)
+
+
+def _followed(search: BoundedSearch, along: CentralPath) -> Bounded | None:
+    """Follow the solution of a central path by whole Newton steps; None if it is not found so."""
+    known = along.barrier
+    if known is None or search.near is not None or search.problem.constrained:
+        return None
+    objective, moved = search.objective(None), search.problem.moved(along.last)
+    y = objective.outputs(moved).y
+    if len(y) != len(known.s) or np.max(np.abs(y - known.s), initial=0.0) > NEWTON_SHIFT:
+        return None
+    options = dataclasses.replace(
+        search.remaining_options(),
+        barrier=max(search.options.barrier, WARM_BARRIER),
+        enough=WARM_DECREASE,
+        max_iterations=min(NEWTON_STEPS, search.options.max_iterations),
+    )
+    outcome = search.followed(objective, moved, known, options)
+    if _is_found(outcome) or outcome.stop in STOPPED:
+        return outcome
+    _adopt(search, along)
+    return None
 
 
 def _solved_warm(search: BoundedSearch, known: Barrier, path: DiscretePath) -> Bounded:

@@ -63,6 +63,8 @@ def require_known(
     options: Mapping[str, Any], method: Callable[..., Any], solve: Callable[..., Any]
 ) -> None:
     """Raise InputError for options that neither a method of a solution nor a solve has."""
+    if not options:
+        return
     solving = [*inspect.signature(solve).parameters][2:]
     own = [*inspect.signature(method).parameters][1:-1]
     for name in options:

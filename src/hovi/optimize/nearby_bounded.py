@@ -1,0 +1,169 @@
+"""Newton's method for a problem with bounds from the solution of a nearby one.
+
+At a solution every product z gap of a multiplier and a gap is mu. Where the problem changes, the
+step of the primal-dual system predicts the change of the solution to first order, with the bounds
+that hold it; the whole step is taken, whatever bounds it crosses. Then every bound is put back on
+the central path by itself: z and gap become the pair with z gap = mu and with z - c gap as the step
+predicts, which is the multiplier of a bound that holds the solution and the gap of one that does
+not. This is a semismooth Newton method with a smoothed complementarity function, and, for mu -> 0,
+one of active sets, which converges quadratically once the bounds that hold the solution are found.
+[Kanzow1996; HintermuellerItoKunisch2002]
+
+There is neither a merit function nor a shorter step: from a point that is too far it does not
+converge, which a few steps show, and hovi.optimize.interior_point is needed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.optimize.barrier import Barrier
+from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
+from hovi.optimize.quadratic_model import QuadraticModel
+from hovi.optimize.trust_region import Iteration, Options, Stop
+from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
+from hovi.system.interruption import raise_if_interrupted, record_interrupt
+
+Array = npt.NDArray[np.float64]
+X = TypeVar("X")
+
+FIRST_MU, LARGEST_FIRST_MU = 0.3, 1e-3
+"""First barrier parameter, relative to the square of how far outputs are outside their bounds and
+to the mean density of the objective, and the largest one, relative to the density."""
+DECREASE = 0.1
+"""Ratio of the barrier parameters of two steps."""
+GAP_WEIGHT = 3.0
+"""Least weight c of a gap against a multiplier, relative to the mean density."""
+ROOM = 2e-7
+"""Distance by which bounds are moved inwards, and outputs may miss them at the end."""
+LARGEST_GROWTH, LEAST_OUTSIDE = 4.0, 3e-4
+"""How far outputs may be outside after a step, relative to how far they were at first, or to the
+least such distance: beyond, it does not converge."""
+
+
+def follow_bounded(
+    objective: BoundedObjective[X],
+    x: X,
+    known: Barrier,
+    options: Options,
+    report: Callable[[int, float], None] | None = None,
+) -> BoundedOutcome[X]:
+    """Minimise from a point near the solution, whose slacks and multipliers are nearly known.
+
+    It ends as DIVERGED where the steps do not converge, or not to a minimum.
+    known: of the solution of a similar problem with as many outputs.
+    options: `barrier` is the last barrier parameter; it ends where the next step predicts, and the
+        distance of slacks from outputs means, less than `enough` of the objective.
+    """
+    outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
+    if not np.isfinite(outcome.outputs.value):
+        return outcome
+    try:
+        with Deadline(options.time_limit).in_force():
+            _Newton(objective, outcome, options, report).run()
+    except OutOfTimeError:
+        outcome.stop = Stop.TIME_LIMIT
+        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
+    except KeyboardInterrupt:
+        record_interrupt()
+        outcome.stop = Stop.INTERRUPTED
+    except ArithmeticError:
+        outcome.stop = Stop.DIVERGED
+    return outcome
+
+
+class _Newton(Generic[X]):
+    """The main loop: whole Newton steps, each of which ends on the central path."""
+
+    def __init__(
+        self,
+        objective: BoundedObjective[X],
+        outcome: BoundedOutcome[X],
+        options: Options,
+        report: Callable[[int, float], None] | None,
+    ) -> None:
+        self.objective, self.outcome = objective, outcome
+        self.options, self.report = options, report
+        outputs, bounds = outcome.outputs, objective.bounds.shrunk(ROOM)
+        known = dataclasses.replace(outcome.barrier, bounds=bounds)
+        self.density = abs(outputs.value) / objective.bounds.measure
+        self.last_mu = options.barrier * self.density
+        self.weight = GAP_WEIGHT * self.density
+        outside = float(known.outside(outputs.y).max(initial=0.0))
+        self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
+        mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
+        outcome.barrier = known.recentred(self.weight, max(self.last_mu, mu))
+        self.outside, self.work = 0.0, math.inf
+        outcome.keep_best(objective.bounds)
+
+    def run(self) -> None:
+        """Iterate until stationary, or until it does not converge."""
+        outcome = self.outcome
+        while self.outside <= self.farthest:  # not where it is no number
+            raise_if_interrupted()
+            raise_if_late()
+            terms = outcome.barrier.condensed(outcome.outputs.y)
+            model = self.objective.model(outcome.x, *terms)
+            factor = model.factor(0.0)
+            if factor is None:
+                return
+            step, slope, length = model.descend(factor)
+            if self._is_solved(-0.5 * slope):
+                if self._refined():
+                    continue
+                barrier = dataclasses.replace(outcome.barrier, bounds=self.objective.bounds)
+                outcome.barrier = barrier.at_outputs(outcome.outputs.y)
+                outcome.model, outcome.stop = model, Stop.STATIONARY
+                outcome.marks.append((outcome.barrier.mu, outcome.x))
+                return
+            if outcome.iterations >= self.options.max_iterations:
+                return
+            self._take(step, -0.5 * slope, math.sqrt(max(length, 0.0)), model)
+
+    def _take(self, step: Array, decrease: float, norm: float, model: QuadraticModel) -> None:
+        """Take a Newton step, which predicts a decrease."""
+        outcome, objective = self.outcome, self.objective
+        barrier, before = outcome.barrier, outcome.outputs
+        dy = objective.push(step, model)
+        x = objective.retract(outcome.x, step, model)
+        outputs = objective.outputs(x)
+        objective.accept(step, model)
+        mu = max(self.last_mu, DECREASE * barrier.mu)
+        moved, self.outside, self.work = barrier.followed(before.y, dy, outputs.y, mu, self.weight)
+        outcome.x, outcome.outputs, outcome.barrier = x, outputs, moved
+        outcome.iterations += 1
+        outcome.history.append(Iteration(outputs.value, decrease, 1.0, 0.0, norm))
+        if self.report is not None:
+            self.report(outcome.iterations, outputs.value)
+        outcome.keep_best(objective.bounds)
+
+    def _is_solved(self, decrease: float) -> bool:
+        """Whether outputs are within their bounds, and next to nothing is to be gained.
+
+        decrease: what the next step predicts.
+        """
+        outcome = self.outcome
+        if outcome.iterations == 0 or outcome.barrier.mu > self.last_mu:
+            return False
+        enough = max(self.options.decrease, self.options.enough) * abs(outcome.outputs.value)
+        return self.outside <= ROOM and max(decrease, self.work) <= enough
+
+    def _refined(self) -> bool:
+        """Whether outputs were replaced by others."""
+        outcome, objective = self.outcome, self.objective
+        found = objective.refine(outcome.x, outcome.barrier.mu / self.density)
+        if found is None:
+            return False
+        before = outcome.outputs.y[found.kept]
+        outcome.outputs, outcome.kept = objective.outputs(outcome.x), None
+        y = outcome.outputs.y
+        bounds = objective.bounds.shrunk(ROOM)
+        refined = outcome.barrier.refined(bounds, y, found.kept, found.origin, before)
+        outcome.barrier = refined.recentred(self.weight, refined.mu)
+        return True
