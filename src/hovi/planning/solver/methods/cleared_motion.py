@@ -143,6 +143,7 @@ def _rough_with_distances(
     if moved is None:
         return None
     search.near.extend(problem, moved, AHEAD)
+    search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome, known = _rough(search, moved, known, FIRST_MU, most)
     violation = float(outcome.violation.max(initial=0.0))

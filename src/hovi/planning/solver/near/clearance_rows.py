@@ -63,7 +63,7 @@ class ClearanceRows:
         self.distances, self.least = distances, least
         self.guard = GUARD
         self.handed: tuple[Index, Index] | None = None
-        self.probing = self.blocked = False
+        self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._seen: tuple[DiscretePath, Array] | None = None
