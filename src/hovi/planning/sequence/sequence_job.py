@@ -26,7 +26,7 @@ from hovi.schemes import of_order
 
 Array = npt.NDArray[np.float64]
 
-LEAST_INTERVALS = 8
+LEAST_INTERVALS = 4
 """Least number of intervals of a segment on the first grid of a refinement."""
 
 
@@ -56,8 +56,7 @@ def job_of(
         scene.robot, first.lagrangian(), begin, legs, options.clearance
     )
     if options.smooth:
-        shortest = min(each.duration for each in segments)
-        scene = smoothed(scene, known, reached[-1], shortest)
+        scene, parts = _smoothed(scene, known, reached[-1], segments, parts)
         grid = sequence_grid(segments, options, scene.order)
     legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
     job = Job(scene, grid, known, reached[-1], options, parts)
@@ -69,6 +68,26 @@ def job_of(
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))
     return job.on(grid.with_nodes(job.node_times)) if options.via else job
+
+
+def _smoothed(
+    scene: Scene,
+    start: State,
+    goal: End,
+    segments: Sequence[Segment],
+    parts: Sequence[Part],
+) -> tuple[Scene, tuple[Part, ...]]:
+    """The scene with a cost on the jerk, and the segments with their own: that of their duration.
+
+    A segment that has such a cost among its effects keeps it.
+    """
+    found = [smoothed(scene, start, goal, each.duration) for each in segments]
+    acting = (
+        Acting((each.effects[-1], *part.acting.effects))
+        for each, part in zip(found, parts, strict=True)
+    )
+    chosen = tuple(Part(part.end, own) for part, own in zip(parts, acting, strict=True))
+    return found[0], chosen
 
 
 def limits_of(
@@ -97,7 +116,8 @@ def sequence_grid(segments: Sequence[Segment], options: PlanOptions, order: int)
     durations = np.array([each.duration for each in segments])
     total, least = options.interval_count, 1
     if options.tolerance is not None:
-        least, total = LEAST_INTERVALS, min(total, MAX_FIRST_INTERVALS)
+        share = durations.sum() / durations.max()  # the longest one has what it has on its own
+        least, total = LEAST_INTERVALS, min(round(total * share), MAX_FIRST_INTERVALS)
     elif total < len(segments):
         raise InputError(
             f"{total} intervals are too few for {len(segments)} segments: use one for each or more."

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.trust_region import Stop
+from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     first_multipliers,
@@ -22,6 +23,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
+from hovi.planning.solver.methods.motion_legs import joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
@@ -47,6 +49,8 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
+LEG_LEVEL = 1e-3
+"""Barrier parameter at which legs are joined, relative to the mean density of the cost."""
 DETOUR = 1.02
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
@@ -62,6 +66,9 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     free = _without_distances(search, guess)
     if not search.near.blocked:
         return free
+    found = _by_legs(search, guess)
+    if found is not None:
+        return found
     rough = [_rough_with_distances(search, free.x)]
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
         steps = ROUGH_STEPS
@@ -74,6 +81,40 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
             return outcome
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, stop=Stop.DIVERGED)
+
+
+def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
+    """The solution from those of the legs between seams; None without legs, or if one has none."""
+    legs, paths = legs_of(search.problem), []
+    for leg in legs:
+        limits = leg.problem.limits or no_limits(leg.problem.coordinates)
+        part = BoundedSearch(
+            leg.problem,
+            limits,
+            search.remaining_options(),
+            search.report,
+            leg.path(guess),
+            lazy=True,
+        )
+        outcome = cleared_motion(part, part.guess)
+        search.iterations += part.iterations
+        search.history += part.history
+        if outcome.stop is not Stop.STATIONARY or not outcome.feasible:
+            return None
+        paths.append(part.central_path(outcome).at(LEG_LEVEL)[1])
+    if not legs:
+        return None
+    path = joined(legs, paths)
+    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
+    search.look_around(path)
+    objective = search.objective(search.multipliers)
+    outputs = objective.outputs(path)
+    density = mean_density(outputs, objective.bounds.measure)
+    margin = min(INITIAL_MARGIN, 0.1 * LEG_LEVEL)
+    start = Barrier.central(objective.bounds, outputs.y, LEG_LEVEL * density, density, margin)
+    outcome = search.solve(path, start)
+    good = outcome.feasible and outcome.stop is Stop.STATIONARY
+    return outcome if good or outcome.stop in STOPPED else None
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
