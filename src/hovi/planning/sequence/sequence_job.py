@@ -17,17 +17,18 @@ from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
 from hovi.planning.search.job import Acting, Job, Part
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.smoothing import smoothed
 from hovi.planning.sequence.branches import End, Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
+from hovi.planning.sequence.segment_smoothing import smoothed_segments
 from hovi.scene.scene import Scene
 from hovi.schemes import of_order
 
 Array = npt.NDArray[np.float64]
 
-LEAST_INTERVALS = 4
-"""Least number of intervals of a segment on the first grid of a refinement."""
+LEAST_INTERVALS, LEAST_WITH_DISTANCES = 8, 4
+"""Least number of intervals of a segment on the first grid of a refinement, and where distances are
+kept, which takes more intervals where the robot moves."""
 
 
 def job_of(
@@ -55,10 +56,10 @@ def job_of(
     known, reached = chosen_branches(
         scene.robot, first.lagrangian(), begin, legs, options.clearance
     )
-    if options.smooth:
-        scene, parts = _smoothed(scene, known, reached[-1], segments, parts)
-        grid = sequence_grid(segments, options, scene.order)
     legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
+    if options.smooth:
+        scene, parts = smoothed_segments(scene, known, legs, segments, parts)
+        grid = sequence_grid(segments, options, scene.order)
     job = Job(scene, grid, known, reached[-1], options, parts)
     found = segment_findings(job, legs, limits, names_of(segments))
     for sentence in found.warnings:
@@ -68,26 +69,6 @@ def job_of(
         job = job.with_options(limits=Limits.of_segments(limits, ends[:-1]))
     job = job.with_options(via=(*seams, *options.via))
     return job.on(grid.with_nodes(job.node_times)) if options.via else job
-
-
-def _smoothed(
-    scene: Scene,
-    start: State,
-    goal: End,
-    segments: Sequence[Segment],
-    parts: Sequence[Part],
-) -> tuple[Scene, tuple[Part, ...]]:
-    """The scene with a cost on the jerk, and the segments with their own: that of their duration.
-
-    A segment that has such a cost among its effects keeps it.
-    """
-    found = [smoothed(scene, start, goal, each.duration) for each in segments]
-    acting = (
-        Acting((each.effects[-1], *part.acting.effects))
-        for each, part in zip(found, parts, strict=True)
-    )
-    chosen = tuple(Part(part.end, own) for part, own in zip(parts, acting, strict=True))
-    return found[0], chosen
 
 
 def limits_of(
@@ -116,8 +97,10 @@ def sequence_grid(segments: Sequence[Segment], options: PlanOptions, order: int)
     durations = np.array([each.duration for each in segments])
     total, least = options.interval_count, 1
     if options.tolerance is not None:
-        share = durations.sum() / durations.max()  # the longest one has what it has on its own
-        least, total = LEAST_INTERVALS, min(round(total * share), MAX_FIRST_INTERVALS)
+        least = LEAST_INTERVALS
+        if options.clearance.wanted:  # the longest has what it would have alone, for its rows
+            least, total = LEAST_WITH_DISTANCES, round(total * durations.sum() / durations.max())
+        total = min(total, MAX_FIRST_INTERVALS)
     elif total < len(segments):
         raise InputError(
             f"{total} intervals are too few for {len(segments)} segments: use one for each or more."

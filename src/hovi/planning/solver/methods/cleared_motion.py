@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
+from hovi.optimize.barrier import Barrier
 from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
@@ -23,7 +24,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
-from hovi.planning.solver.methods.motion_legs import joined, legs_of
+from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
@@ -49,8 +50,13 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-LEG_LEVEL = 1e-3
-"""Barrier parameter at which legs are joined, relative to the mean density of the cost."""
+LEG_LEVEL = 3e-4
+"""Barrier parameter at which the legs of a motion are joined, relative to the cost's mean density:
+small enough that each stays where it is, and large enough for the accelerations at the seams."""
+LEG_MARGIN = 0.1
+"""Distance of slacks from their bounds then, relative to it."""
+LEG_AHEAD = 0.005
+"""Distance beyond the least one up to which pairs get rows then, in [m]."""
 DETOUR = 1.02
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
@@ -66,9 +72,9 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     free = _without_distances(search, guess)
     if not search.near.blocked:
         return free
-    found = _by_legs(search, guess)
-    if found is not None:
-        return found
+    by_legs = _by_legs(search, guess)
+    if by_legs is not None:
+        return by_legs
     rough = [_rough_with_distances(search, free.x)]
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
         steps = ROUGH_STEPS
@@ -84,37 +90,50 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
 
 
 def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
-    """The solution from those of the legs between seams; None without legs, or if one has none."""
-    legs, paths = legs_of(search.problem), []
+    """The solution from those of the legs between seams; None without legs, or where that fails."""
+    legs = legs_of(search.problem)
+    parts = list[BoundedSearch]()
+    paths = list[DiscretePath]()
     for leg in legs:
-        limits = leg.problem.limits or no_limits(leg.problem.coordinates)
-        part = BoundedSearch(
-            leg.problem,
-            limits,
-            search.remaining_options(),
-            search.report,
-            leg.path(guess),
-            lazy=True,
-        )
+        part = _search_of(leg, search, guess)
         outcome = cleared_motion(part, part.guess)
         search.iterations += part.iterations
         search.history += part.history
-        if outcome.stop is not Stop.STATIONARY or not outcome.feasible:
+        if not _is_solved(outcome):
             return None
+        parts.append(part)
         paths.append(part.central_path(outcome).at(LEG_LEVEL)[1])
     if not legs:
         return None
-    path = joined(legs, paths)
+    outcome = _from_legs(search, legs, parts, joined(legs, paths))
+    return outcome if _is_solved(outcome) or outcome.stop in STOPPED else None
+
+
+def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
+    """The search of a leg. guess: of the whole motion."""
+    problem, options = leg.problem, search.remaining_options()
+    limits = problem.limits or no_limits(problem.coordinates)
+    return BoundedSearch(problem, limits, options, search.report, leg.path(guess), lazy=True)
+
+
+def _from_legs(
+    search: BoundedSearch, legs: Sequence[Leg], parts: Sequence[BoundedSearch], path: DiscretePath
+) -> Bounded:
+    """The solve of the whole from the paths of its legs, with the rows of distances of these."""
+    near = [(leg.first, each.near) for leg, each in zip(legs, parts, strict=True) if each.near]
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
-    search.look_around(path)
+    search.near.take(near)
+    search.near.extend(search.problem, path, LEG_AHEAD)
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
     density = mean_density(outputs, objective.bounds.measure)
-    margin = min(INITIAL_MARGIN, 0.1 * LEG_LEVEL)
+    margin = LEG_MARGIN * LEG_LEVEL
     start = Barrier.central(objective.bounds, outputs.y, LEG_LEVEL * density, density, margin)
-    outcome = search.solve(path, start)
-    good = outcome.feasible and outcome.stop is Stop.STATIONARY
-    return outcome if good or outcome.stop in STOPPED else None
+    return search.solve(path, start)
+
+
+def _is_solved(outcome: Bounded) -> bool:
+    return outcome.feasible and outcome.stop is Stop.STATIONARY
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:

@@ -1,4 +1,4 @@
-"""Motions from seam to seam: where q and v are given at a seam, little joins what is before and after.
+"""Motions from seam to seam: where q and v are given, little joins what is before and after.
 
 For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
 seams, which are independent of each other; for order 3 the accelerations at the seams join them.
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
@@ -21,6 +22,8 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.seams import Hold
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +68,7 @@ def joined(legs: Sequence[Leg], paths: Sequence[DiscretePath]) -> DiscretePath:
     modes = max(path.inner.shape[1] for path in paths)
     inner = [np.pad(x.inner, ((0, 0), (0, modes - x.inner.shape[1]), (0, 0))) for x in paths]
 
-    def at_nodes(name: str) -> np.ndarray:
+    def at_nodes(name: str) -> Array:
         parts = [getattr(path, name) for path in paths]
         return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
 

@@ -9,6 +9,7 @@ semi-infinite program [HettichKortanek1993].
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -202,6 +203,12 @@ class ClearanceRows:
             q = self.distances.at(configurations(self._problem, path, batch), batch.t)
             self._seen = path, self.distances.values(q, self.least + self.guard)
         return self._seen[1]
+
+    def take(self, parts: Sequence[tuple[int, ClearanceRows]]) -> None:
+        """Take the rows of parts of the motion: the number of their first interval, and rows."""
+        chosen = [(x.intervals + first, x.positions, x.pairs, x.rounding) for first, x in parts]
+        if chosen:
+            self._set(self._problem, *(np.concatenate(each) for each in zip(*chosen, strict=True)))
 
     def _add(self, problem: TrajectoryProblem, path: DiscretePath, found: Approaches) -> int:
         """Add rows at approaches of a path at which there are none yet."""
