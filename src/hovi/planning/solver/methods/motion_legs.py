@@ -1,7 +1,8 @@
 """Motions from seam to seam: where q and v are given, little joins what is before and after.
 
 For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
-seams, which are independent of each other; for order 3 the accelerations at the seams join them.
+seams, which are independent of each other; for order 3 the accelerations at the seams join them,
+and at goals of frames the configurations do, which legs take as those of the guess.
 """
 
 from __future__ import annotations
@@ -47,14 +48,13 @@ class Leg:
 
 
 def legs_of(problem: TrajectoryProblem) -> list[Leg]:
-    """The legs between seams whose q and v are given; none where the motion is no sum of them.
+    """The legs between seams whose velocities are given; none where the motion has no such parts.
 
-    With acceleration 0 at seams for order 3.
+    From one seam's configuration, or that of the guess where a frame has a goal, to the next one's;
+    for order 3 without acceleration there.
     """
     distances, of = problem.distances, problem.ld.lagrangian
-    held = {each.node: each for each in problem.holds if each.fixed.all()}
-    for each in problem.conditions:
-        held.pop(each.node, None)
+    held = {each.node: each for each in problem.holds if each.fixed[1].all()}
     timed = any(each.timed for each in _parts(of))
     moving = distances is not None and bool(distances.paths)
     if not held or timed or moving or isinstance(problem.goal, Periodic):
