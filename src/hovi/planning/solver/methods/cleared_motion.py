@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
@@ -17,6 +17,7 @@ from hovi.planning.solver.augmented_lagrangian_rounds import (
     first_multipliers,
     minimize_constrained,
 )
+from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     STOPPED,
@@ -50,9 +51,10 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
-LEG_LEVEL = 3e-4
-"""Barrier parameter at which the legs of a motion are joined, relative to the cost's mean density:
-small enough that each stays where it is, and large enough for the accelerations at the seams."""
+LEG_LEVELS = 3e-4, 1e-2
+"""Barrier parameters at which the legs of a motion are joined, relative to the cost's mean density,
+the second where the first one fails: small enough that each stays where it is, and large enough for
+the accelerations at the seams."""
 LEG_MARGIN = 0.1
 """Distance of slacks from their bounds then, relative to it."""
 LEG_AHEAD = 0.005
@@ -64,13 +66,13 @@ DETOUR = 1.02
 def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
-    It is solved without distances, until it can be seen whether it keeps them. If it is far from
-    that, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
+    It is solved without distances, until it can be seen whether it keeps them. If it does not, a
+    motion with stops is solved leg by leg and then as a whole. Where that fails, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
     rough motion, by bounds and then by cost, is solved to its end; the other where that diverges.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
-    if not search.near.blocked:
+    if not search.near.blocked and free.stop is not Stop.DIVERGED:
         return free
     by_legs = _by_legs(search, guess)
     if by_legs is not None:
@@ -93,7 +95,7 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
     """The solution from those of the legs between seams; None without legs, or where that fails."""
     legs = legs_of(search.problem)
     parts = list[BoundedSearch]()
-    paths = list[DiscretePath]()
+    known = list[CentralPath]()
     for leg in legs:
         part = _search_of(leg, search, guess)
         outcome = cleared_motion(part, part.guess)
@@ -102,11 +104,13 @@ def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
         if not _is_solved(outcome):
             return None
         parts.append(part)
-        paths.append(part.central_path(outcome).at(LEG_LEVEL)[1])
-    if not legs:
-        return None
-    outcome = _from_legs(search, legs, parts, joined(legs, paths))
-    return outcome if _is_solved(outcome) or outcome.stop in STOPPED else None
+        known.append(part.central_path(outcome))
+    for level in LEG_LEVELS if legs else ():
+        path = joined(legs, [each.at(level)[1] for each in known])
+        outcome = _from_legs(search, legs, parts, path, level)
+        if _is_solved(outcome) or outcome.stop in STOPPED:
+            return outcome
+    return None
 
 
 def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
@@ -117,9 +121,13 @@ def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedS
 
 
 def _from_legs(
-    search: BoundedSearch, legs: Sequence[Leg], parts: Sequence[BoundedSearch], path: DiscretePath
+    search: BoundedSearch,
+    legs: Sequence[Leg],
+    parts: Sequence[BoundedSearch],
+    path: DiscretePath,
+    level: float,
 ) -> Bounded:
-    """The solve of the whole from the paths of its legs, with the rows of distances of these."""
+    """The solve of the whole from its legs' paths at a level, with their rows of distances."""
     near = [(leg.first, each.near) for leg, each in zip(legs, parts, strict=True) if each.near]
     search.rows, search.near = search.coarse_rows(), search.no_near_rows()
     search.near.take(near)
@@ -127,8 +135,8 @@ def _from_legs(
     objective = search.objective(search.multipliers)
     outputs = objective.outputs(path)
     density = mean_density(outputs, objective.bounds.measure)
-    margin = LEG_MARGIN * LEG_LEVEL
-    start = Barrier.central(objective.bounds, outputs.y, LEG_LEVEL * density, density, margin)
+    margin = min(LEG_MARGIN * level, INITIAL_MARGIN)
+    start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
     return search.solve(path, start)
 
 
