@@ -92,6 +92,7 @@ def test_rows_of_parts_are_taken_with_their_intervals_and_values() -> None:
     shifted = ClearanceRows(problem, near.distances, near.least)
     early = np.flatnonzero(near.intervals < problem.grid.intervals - 2)
     part = near.copied()
-    part._set(problem, near.intervals[early], near.positions[early], near.pairs[early])
+    some = near.intervals[early], near.positions[early], near.pairs[early]
+    part._set(problem, *some, near.rounding[early])
     shifted.take([(2, part)])
     np.testing.assert_array_equal(shifted.intervals, part.intervals + 2)

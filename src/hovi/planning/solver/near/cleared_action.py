@@ -178,7 +178,10 @@ class ClearedAction(BoundedAction):
         self.near.order = np.concatenate([places[order][remaining], fresh, last])
         self._with_rows()
         origins = np.where(origin < 0, -1, first + slots[origin])
-        both = np.append(np.arange(first), first + remaining), np.append(origins, np.full(added, -1))
+        both = (
+            np.append(np.arange(first), first + remaining),
+            np.append(origins, np.full(added, -1)),
+        )
         return Refinement(*both, self._handed() if added else None)
 
     def _handed(self) -> tuple[Index, Index] | None:
