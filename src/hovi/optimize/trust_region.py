@@ -84,7 +84,8 @@ class Options:
         remains after it is of the order of its square.
     step: stop when a Newton step is smaller than this, relative to the data.
     max_iterations: number of steps, rejected ones included. time_limit: in [s]; no limit when None.
-    radius: initial radius of the trust region, in the norm of the metric.
+    radius: initial radius of the trust region, in the norm of the metric; objectives with bounds
+        have their own: see BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
     exact: stop only after a Newton step of an exact model, one not updated from an earlier model,
         after which only rounding errors remain.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import re
 from functools import cache
@@ -510,3 +511,22 @@ def test_obstacles_that_move_are_looked_at_by_the_clock_of_the_sequence() -> Non
         ball = hovi.Sphere(tip, 0.1, name="ball", path=path)
         found = hovi.plan_sequence(arm, q[0], parts, obstacles=[ball], time_limit=0.2)
         assert ("and obstacle 'ball' overlap" in found.message) == refused
+
+
+@pytest.mark.parametrize("slower", [1.25, 1.75])
+def test_a_pick_that_would_fold_into_itself_keeps_its_distances(slower: float) -> None:
+    task = load_task(hovi.example("panda_pick_and_place"))
+    longer = [
+        dataclasses.replace(each, duration=each.duration * (slower if i % 2 == 0 else 1.0))
+        for i, each in enumerate(task.segments)
+    ]
+    total = sum(each.duration for each in longer)
+    task = dataclasses.replace(task, segments=tuple(longer), duration=total)
+    found = plan_task(task, tolerance="1 %")
+    assert found.success, found.message
+    assert not found.violation
+    assert found.problem is not None
+    assert found.problem.distances is not None
+    distances = found.problem.distances
+    q = found.trajectory.configurations(np.linspace(0.0, total, 5001))
+    assert distances.values(q, 0.05).min() > 0.01

@@ -17,17 +17,18 @@ from hovi.planning.problem.seams import Seam
 from hovi.planning.refinement.adaptive import MAX_FIRST_INTERVALS, first_grid
 from hovi.planning.search.job import Acting, Job, Part
 from hovi.planning.search.options import PlanOptions
-from hovi.planning.search.smoothing import smoothed
 from hovi.planning.sequence.branches import End, Leg, chosen_branches
 from hovi.planning.sequence.segment import Segment, names_of
 from hovi.planning.sequence.segment_findings import segment_findings
+from hovi.planning.sequence.segment_smoothing import smoothed_segments
 from hovi.scene.scene import Scene
 from hovi.schemes import of_order
 
 Array = npt.NDArray[np.float64]
 
-LEAST_INTERVALS = 8
-"""Least number of intervals of a segment on the first grid of a refinement."""
+LEAST_INTERVALS, LEAST_WITH_DISTANCES = 8, 4
+"""Least number of intervals of a segment on the first grid of a refinement, and where distances are
+kept, which takes more intervals where the robot moves."""
 
 
 def job_of(
@@ -55,11 +56,10 @@ def job_of(
     known, reached = chosen_branches(
         scene.robot, first.lagrangian(), begin, legs, options.clearance
     )
-    if options.smooth:
-        shortest = min(each.duration for each in segments)
-        scene = smoothed(scene, known, reached[-1], shortest)
-        grid = sequence_grid(segments, options, scene.order)
     legs = [dataclasses.replace(leg, goal=goal) for leg, goal in zip(legs, reached, strict=True)]
+    if options.smooth:
+        scene, parts = smoothed_segments(scene, known, legs, segments, parts)
+        grid = sequence_grid(segments, options, scene.order)
     job = Job(scene, grid, known, reached[-1], options, parts)
     found = segment_findings(job, legs, limits, names_of(segments))
     for sentence in found.warnings:
@@ -97,7 +97,10 @@ def sequence_grid(segments: Sequence[Segment], options: PlanOptions, order: int)
     durations = np.array([each.duration for each in segments])
     total, least = options.interval_count, 1
     if options.tolerance is not None:
-        least, total = LEAST_INTERVALS, min(total, MAX_FIRST_INTERVALS)
+        least = LEAST_INTERVALS
+        if options.clearance.wanted:  # the longest has what it would have alone, for its rows
+            least, total = LEAST_WITH_DISTANCES, round(total * durations.sum() / durations.max())
+        total = min(total, MAX_FIRST_INTERVALS)
     elif total < len(segments):
         raise InputError(
             f"{total} intervals are too few for {len(segments)} segments: use one for each or more."

@@ -61,3 +61,38 @@ def test_the_gradient_is_that_of_the_action_and_the_forces() -> None:
     force = np.random.default_rng(1).normal(size=count)
     pulled = float(np.vdot(action.pull(force, model), step))
     assert pulled == pytest.approx(float((action.bounds.weights * force) @ pushed), rel=1e-9)
+
+
+def test_rows_that_are_watched_refuse_a_step_into_a_pair_before_there_are_any() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    assert problem.distances is not None
+    none = ClearanceRows(problem, problem.distances, 10.0)  # all pairs are too close
+    limits = as_limits(problem.robot, LIMITS)
+    rows = LimitRows(problem.grid, limits, problem.coordinates.curved_space)
+    action = ClearedAction(problem, limits, None, None, None, rows, none)
+    assert np.isfinite(action.outputs(path).value)
+    assert action.refine_at_once(path) is None
+    none.watchful = True
+    assert np.isinf(action.outputs(path).value)
+    found = action.refine_at_once(path)
+    assert found is not None
+    assert len(found.origin) == none.size > 0
+
+
+def test_rows_of_parts_are_taken_with_their_intervals_and_values() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    near = action_of(problem, path, 0.1).near
+    both = ClearanceRows(problem, near.distances, near.least)
+    first = near.thinned(path, 0.0)[0]
+    both.take([(0, near), (0, first)])
+    assert both.size == near.size + first.size > near.size
+    np.testing.assert_allclose(both.values(path)[: near.size], near.values(path), atol=1e-12)
+    shifted = ClearanceRows(problem, near.distances, near.least)
+    early = np.flatnonzero(near.intervals < problem.grid.intervals - 2)
+    part = near.copied()
+    some = near.intervals[early], near.positions[early], near.pairs[early]
+    part._set(problem, *some, near.rounding[early])
+    shifted.take([(2, part)])
+    np.testing.assert_array_equal(shifted.intervals, part.intervals + 2)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+import pytest
 
 import hovi
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.clearance.distances import Distances
+from hovi.planning.problem.seams import Seam
 from hovi.planning.search.job import Job
+from hovi.planning.solver.near.approaches import free_ones
 from hovi.planning.solver.near.push_out import pushed_out
 from hovi.planning.solver.solver import guess_path
 
@@ -58,3 +63,30 @@ def test_a_motion_that_cannot_leave_is_given_up() -> None:
     around = hovi.Box((4.0, 4.0, 4.0), [0.0, 0.0, 0.0])
     distances = Distances(problem.robot, Clearance([around]))
     assert pushed_out(problem, path, distances, LEAST) is None
+
+
+@pytest.mark.parametrize("free", [(), ("all",)])
+def test_what_seams_give_stays(free: Sequence[str]) -> None:
+    robot = hovi.load_robot("ur5")
+    ends = [[0.0, -1.2, 1.2, -0.5, 0.3, 0.1], [0.9, -1.2, 1.2, -0.5, 0.3, 0.1]]
+    ends.append([1.8, -1.2, 1.2, -0.5, 0.3, 0.1])
+    scene = hovi.Scene(robot, [])
+    grids = [hovi.Grid.uniform(1.0, 8, hovi.schemes.galerkin(2)) for _ in range(2)]
+    parts = [hovi.DiscreteLagrangian(scene.effort_lagrangian(), grid) for grid in grids]
+    seam = Seam(1.0, hovi.State(ends[1], free_velocity=free))
+    known = hovi.State(ends[0]), hovi.State(ends[2])
+    problem = hovi.TrajectoryProblem.of_segments(parts, *known, via=(seam,))
+    path = guess_path(problem, "cubic")
+    at = robot.frame_position("tool0", problem.trajectory(path).configurations([0.55]))[0]
+    distances = Distances(robot, Clearance([hovi.Sphere(at, 0.05)]))
+    moved = pushed_out(problem, path, distances, LEAST)
+    assert moved is not None
+    np.testing.assert_allclose(moved.q[8], ends[1], atol=1e-12)
+    if not free:
+        np.testing.assert_allclose(moved.v[8], 0.0, atol=1e-12)
+    q = problem.trajectory(moved).configurations(np.linspace(0.0, 2.0, 2001))
+    assert distances.values(q).min() > LEAST - 5e-3
+    beside = problem.trajectory(moved).configurations(np.array([0.99, 1.01]))
+    assert np.abs(beside - np.array(ends[1])).max() < 0.1  # no jump at the seam
+    assert not free_ones(problem, 16 * 4 + 1)[8 * 4]
+    assert free_ones(problem, 16 * 4 + 1).sum() == 16 * 4 + 1 - 3

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hovi.discrete.grid import DiscretePath
-from hovi.optimize.barrier import Barrier
+from hovi.optimize.barrier import INITIAL_MARGIN, Barrier
 from hovi.optimize.trust_region import Stop
+from hovi.planning.problem.limits import no_limits
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import (
     first_multipliers,
     minimize_constrained,
 )
+from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.methods.bounded_search import (
     STOPPED,
@@ -22,6 +25,7 @@ from hovi.planning.solver.methods.bounded_search import (
     BoundedSearch,
     mean_density,
 )
+from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
@@ -47,6 +51,14 @@ ROUGH_TOLERANCE = 1e-4
 """Residual of conditions at nodes at which it ends, in [rad] or [m]."""
 ROUGH_ROUNDS = 3
 """Rounds of an augmented Lagrangian for a rough motion."""
+LEG_LEVELS = 3e-4, 1e-2
+"""Barrier parameters at which the legs of a motion are joined, relative to the cost's mean density,
+the second where the first one fails: small enough that each stays where it is, and large enough for
+the accelerations at the seams."""
+LEG_MARGIN = 0.1
+"""Distance of slacks from their bounds then, relative to it."""
+LEG_AHEAD = 0.005
+"""Distance beyond the least one up to which pairs get rows then, in [m]."""
 DETOUR = 1.02
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
@@ -54,14 +66,18 @@ DETOUR = 1.02
 def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
     """A motion within limits that keeps its distances, from a guess that may keep neither.
 
-    It is solved without distances, until it can be seen whether it keeps them. If it is far from
-    that, it is moved out of the obstacles, and so is the guess if that takes a detour. The better
-    rough motion, by bounds and then by cost, is solved to its end; the other where that diverges.
+    It is solved without distances, until it can be seen whether it keeps them. If it does not, a
+    motion with stops is solved leg by leg, and then as a whole. Without stops, or where that fails,
+    it is moved out of the obstacles, and so is the guess if that takes a detour. The better rough
+    motion, by bounds and then by cost, is solved to its end; the other where that diverges.
     """
     assert search.near is not None
     free = _without_distances(search, guess)
-    if not search.near.blocked:
+    if not search.near.blocked and free.stop is not Stop.DIVERGED:
         return free
+    by_legs = _by_legs(search, guess)
+    if by_legs is not None:
+        return by_legs
     rough = [_rough_with_distances(search, free.x)]
     if rough[0] is None or rough[0].rank > (False, DETOUR * abs(free.outputs.value)):
         steps = ROUGH_STEPS
@@ -74,6 +90,59 @@ def cleared_motion(search: BoundedSearch, guess: DiscretePath) -> Bounded:
             return outcome
     raise_if_late()  # or more time might lead to one
     return dataclasses.replace(free, stop=Stop.DIVERGED)
+
+
+def _by_legs(search: BoundedSearch, guess: DiscretePath) -> Bounded | None:
+    """The solution from those of the legs between seams; None without legs, or where that fails."""
+    legs = legs_of(search.problem)
+    parts = list[BoundedSearch]()
+    known = list[CentralPath]()
+    for leg in legs:
+        part = _search_of(leg, search, guess)
+        outcome = cleared_motion(part, part.guess)
+        search.iterations += part.iterations
+        search.history += part.history
+        if not _is_solved(outcome):
+            return None
+        parts.append(part)
+        known.append(part.central_path(outcome))
+    for level in LEG_LEVELS if legs else ():
+        path = joined(legs, [each.at(level)[1] for each in known])
+        outcome = _from_legs(search, legs, parts, path, level)
+        if _is_solved(outcome) or outcome.stop in STOPPED:
+            return outcome
+    return None
+
+
+def _search_of(leg: Leg, search: BoundedSearch, guess: DiscretePath) -> BoundedSearch:
+    """The search of a leg. guess: of the whole motion."""
+    problem, options = leg.problem, search.remaining_options()
+    limits = problem.limits or no_limits(problem.coordinates)
+    return BoundedSearch(problem, limits, options, search.report, leg.path(guess), lazy=True)
+
+
+def _from_legs(
+    search: BoundedSearch,
+    legs: Sequence[Leg],
+    parts: Sequence[BoundedSearch],
+    path: DiscretePath,
+    level: float,
+) -> Bounded:
+    """The solve of the whole from its legs' paths at a level, with their rows of distances."""
+    near = [(leg.first, each.near) for leg, each in zip(legs, parts, strict=True) if each.near]
+    search.rows, search.near = search.coarse_rows(), search.no_near_rows()
+    search.near.take(near)
+    search.near.extend(search.problem, path, LEG_AHEAD)
+    objective = search.objective(search.multipliers)
+    outputs = objective.outputs(path)
+    density = mean_density(outputs, objective.bounds.measure)
+    margin = min(LEG_MARGIN * level, INITIAL_MARGIN)
+    start = Barrier.central(objective.bounds, outputs.y, level * density, density, margin)
+    return search.solve(path, start)
+
+
+def _is_solved(outcome: Bounded) -> bool:
+    return outcome.feasible and outcome.stop is Stop.STATIONARY
 
 
 def _without_distances(search: BoundedSearch, guess: DiscretePath) -> Bounded:
@@ -143,6 +212,7 @@ def _rough_with_distances(
     if moved is None:
         return None
     search.near.extend(problem, moved, AHEAD)
+    search.near.watchful = True
     known = first_multipliers(problem, moved) if problem.constrained else None
     outcome, known = _rough(search, moved, known, FIRST_MU, most)
     violation = float(outcome.violation.max(initial=0.0))

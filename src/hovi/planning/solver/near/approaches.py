@@ -83,8 +83,13 @@ def spread(problem: TrajectoryProblem, number: int) -> InstantBatch:
 
 
 def free_ones(problem: TrajectoryProblem, number: int) -> Mask:
-    """Which of so many instants along a motion are not at an end that is given."""
+    """Which of so many instants along a motion are not at an end, or a seam, that is given.
+
+    number: of as many in every interval, and one at the end.
+    """
     free = np.ones(number, dtype=bool)
+    each = (number - 1) // problem.grid.intervals
+    free[[hold.node * each for hold in problem.holds if hold.fixed[0].all()]] = False
     free[0], free[-1] = (not isinstance(end, State) for end in (problem.start, problem.goal))
     return free
 

@@ -9,6 +9,7 @@ semi-infinite program [HettichKortanek1993].
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -63,7 +64,7 @@ class ClearanceRows:
         self.distances, self.least = distances, least
         self.guard = GUARD
         self.handed: tuple[Index, Index] | None = None
-        self.probing = self.blocked = False
+        self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
         self._followed: LimitRows | None = None
         self._seen: tuple[DiscretePath, Array] | None = None
@@ -202,6 +203,12 @@ class ClearanceRows:
             q = self.distances.at(configurations(self._problem, path, batch), batch.t)
             self._seen = path, self.distances.values(q, self.least + self.guard)
         return self._seen[1]
+
+    def take(self, parts: Sequence[tuple[int, ClearanceRows]]) -> None:
+        """Take the rows of parts of the motion: the number of their first interval, and rows."""
+        chosen = [(x.intervals + first, x.positions, x.pairs, x.rounding) for first, x in parts]
+        if chosen:
+            self._set(self._problem, *(np.concatenate(each) for each in zip(*chosen, strict=True)))
 
     def _add(self, problem: TrajectoryProblem, path: DiscretePath, found: Approaches) -> int:
         """Add rows at approaches of a path at which there are none yet."""

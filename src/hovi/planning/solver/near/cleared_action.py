@@ -78,7 +78,7 @@ class ClearedAction(BoundedAction):
     def outputs(self, x: DiscretePath) -> Outputs:
         """See BoundedAction.outputs."""
         base = super().outputs(x)
-        if self.near.size == 0:
+        if self.near.size == 0 and not self.near.watchful:
             return base
         value = np.inf if self.near.hidden_depth(x) > DEEPEST else base.value
         return Outputs(value, self._ordered(np.append(base.y, self.near.values(x))))
@@ -149,7 +149,7 @@ class ClearedAction(BoundedAction):
     def refine_at_once(self, x: DiscretePath) -> Refinement | None:
         """Bound the distances of pairs that have come near in a step, and round shapes less."""
         assert self.rows is not None
-        if self.near.size == 0:
+        if self.near.size == 0 and not self.near.watchful:
             return None
         order, before = self.near.order, self.rows.size
         sharper, added = self.near.sharpen(x), self.near.follow(x)

@@ -19,13 +19,13 @@ from hovi.discrete.guess import Curve, stretched
 from hovi.discrete.state import State
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.near.approaches import free_ones
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
-WAVES = 12
-"""Number of functions of time, besides one for each free end."""
+WAVES, MOST_WAVES = 12, 60
+"""Number of functions of time, besides one for each free end, and the largest one with seams."""
 SAMPLES = 64, 256
 """Least and largest number of times at which distances are looked at."""
 STEP = 0.02
@@ -68,13 +68,13 @@ class _Deformation:
 
     def solved(self) -> Array | None:
         """The coefficients of a change that keeps all distances; None if none is found."""
-        c = np.zeros((WAVES + sum(self._free), self.problem.coordinates.nv))
+        c = np.zeros((self._number + sum(self._free), self.problem.coordinates.nv))
         aim = self.least + BEYOND
         for _ in range(MAX_ITERATIONS):
             q = self.problem.coordinates.integrate(self._q, self._values @ c)
             placed = self.distances.at(q, self._t)
             d, J = self.distances.expand(placed, self.least + LOOKED_AT)
-            d[~free_ones(self.problem, len(d))] = np.inf
+            d[self._given] = np.inf
             lowest = d.min(axis=0)
             if float(lowest.min()) >= self.least:
                 return c
@@ -103,12 +103,12 @@ class _Deformation:
         return step.reshape(c.shape)
 
     def _elastic(self, c: Array) -> tuple[Array, Array]:
-        """Matrix and right-hand side of the acceleration's change and of conditions at nodes."""
+        """Matrix and right-hand side of the acceleration's change and of what holds at nodes."""
         H, g = self._stiffness.copy(), np.zeros(c.size)
         grid, path = self.problem.grid, self.path
         for each in self.problem.conditions:
             k, T = each.node, grid.duration
-            w, dw, _, _ = (x[0] for x in _waves(grid.t[[k]] / T, self._free))
+            w, dw, _, _ = (x[0] for x in self.waves(grid.t[[k]] / T))
             q, v = self.problem.coordinates.integrate(path.q[k], w @ c), path.v[k] + dw @ c / T
             value, slope = each.condition.evaluate(q, v)
             row = w[:, None] * slope[:, :1] + dw[:, None] / T * slope[:, 1:]
@@ -117,6 +117,10 @@ class _Deformation:
             g += CONDITION_STIFFNESS * row.T @ (row @ c.ravel() - value)
         return H, g
 
+    def waves(self, s: Array) -> tuple[Array, Array, Array, Array]:
+        """w_j and their first three derivatives at s in [0, 1], (M, J) each."""
+        return _waves(s, self._free, self._number)
+
     def curve(self, c: Array) -> Curve:
         """The changed motion."""
         T, problem = self.problem.grid.duration, self.problem
@@ -124,12 +128,26 @@ class _Deformation:
 
         def curve(t: Array) -> tuple[Array, ...]:
             q, v, a, *jerk = base(t)
-            w, dw, ddw, dddw = _waves(np.asarray(t) / T, self._free)
+            w, dw, ddw, dddw = self.waves(np.asarray(t) / T)
             x, dx, ddx = w @ c, dw @ c / T, ddw @ c / T**2
             moved = problem.coordinates.chart.composed((q, v, a), x, dx, ddx)
             return (*moved, *(each + dddw @ c / T**3 for each in jerk))
 
         return curve
+
+    @property
+    def _number(self) -> int:
+        """Number of waves: as many for every part between seams, up to a largest number."""
+        return min(WAVES * (1 + len(self.problem.holds)), MOST_WAVES)
+
+    @cached_property
+    def _given(self) -> Mask:
+        """At which times the configuration is given."""
+        given, T = np.zeros(len(self._t), dtype=bool), self.problem.grid.duration
+        given[[0, -1]] = [not free for free in self._free]
+        for each in self.problem.holds:
+            given |= (np.abs(self._t - each.time) < 1e-9 * T) & each.fixed[0].all()
+        return given
 
     @property
     def _free(self) -> tuple[bool, bool]:
@@ -148,25 +166,32 @@ class _Deformation:
 
     @cached_property
     def _values(self) -> Array:
-        return _waves(self._t / self._t[-1], self._free)[0]
+        return self.waves(self._t / self._t[-1])[0]
 
     @cached_property
     def _stiffness(self) -> Array:
         """The matrix of the integral of 1/2 |x''|^2 in normalized time."""
-        x, weights = np.polynomial.legendre.leggauss(2 * WAVES + 8)
-        ddw = _waves((x + 1) / 2, self._free)[2]
+        x, weights = np.polynomial.legendre.leggauss(2 * self._number + 8)
+        ddw = self.waves((x + 1) / 2)[2]
         gram = ddw.T @ (0.5 * weights[:, None] * ddw)
         gram += RIDGE * np.eye(len(gram))  # both ends may move without an acceleration
-        return np.asarray(np.kron(gram, np.eye(self.problem.coordinates.nv)), dtype=np.float64)
+        H = np.kron(gram, np.eye(self.problem.coordinates.nv))
+        T = self.problem.grid.duration
+        for each in self.problem.holds:  # what is given at seams does not change
+            for x, fixed in zip(self.waves(np.array([each.time / T])), each.fixed, strict=False):
+                price = CONDITION_STIFFNESS * np.diag(fixed.astype(np.float64))
+                H += np.kron(np.outer(x[0], x[0]), price)
+        return np.asarray(H, dtype=np.float64)
 
 
-def _waves(s: Array, free: tuple[bool, bool]) -> tuple[Array, Array, Array, Array]:
+def _waves(s: Array, free: tuple[bool, bool], number: int) -> tuple[Array, Array, Array, Array]:
     """w_j and their first three derivatives at s in [0, 1], (M, J) each.
 
     sin(pi s) sin(j pi s), which vanish with their rates at both ends; and for each end that is
     free the cubic that moves it.
+    number: of the sines.
     """
-    low, high = (np.pi * np.arange(start, start + WAVES) for start in (0, 2))
+    low, high = (np.pi * np.arange(start, start + number) for start in (0, 2))
     a, b = np.outer(s, low), np.outer(s, high)
     parts = (
         np.cos(a) - np.cos(b),

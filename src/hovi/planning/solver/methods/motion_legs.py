@@ -1,0 +1,124 @@
+"""Motions from seam to seam: where q and v are given, little joins what is before and after.
+
+For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
+seams, which are independent of each other; for order 3 the accelerations at the seams join them,
+and at goals of frames the configurations do, which legs take as those of the guess.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
+from hovi.discrete.grid import DiscretePath, Grid
+from hovi.discrete.state import Periodic, State
+from hovi.planning.problem.limits import Limits
+from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.problem.seams import Hold
+from hovi.scene.lagrangian import Lagrangian
+from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """The part of a motion between two nodes, as a problem of its own.
+
+    first, last: its nodes in the whole. problem: with its time from 0.
+    """
+
+    first: int
+    last: int
+    problem: TrajectoryProblem
+
+    def path(self, whole: DiscretePath) -> DiscretePath:
+        """The part of a path of the whole, with its ends as they are given."""
+        nodes, own = slice(self.first, self.last + 1), slice(self.first, self.last)
+        inner = whole.inner[own, : self.problem.grid.inner_modes]
+        higher = whole.higher[nodes] if whole.higher.size else whole.higher
+        part = DiscretePath(whole.q[nodes], whole.v[nodes], whole.z[own], inner, higher)
+        return self.problem.moved(part)
+
+
+def legs_of(problem: TrajectoryProblem) -> list[Leg]:
+    """The legs between seams whose velocities are given; none where the motion has no such parts.
+
+    From one seam's configuration, or that of the guess where a frame has a goal, to the next one's;
+    for order 3 without acceleration there.
+    """
+    distances, of = problem.distances, problem.ld.lagrangian
+    held = {each.node: each for each in problem.holds if each.fixed[1].all()}
+    timed = any(each.timed for each in _parts(of))
+    moving = distances is not None and bool(distances.paths)
+    if not held or timed or moving or isinstance(problem.goal, Periodic):
+        return []
+    nodes = [0, *sorted(held), problem.grid.intervals]
+    return [Leg(a, b, _between(problem, held, a, b)) for a, b in pairwise(nodes)]
+
+
+def joined(legs: Sequence[Leg], paths: Sequence[DiscretePath]) -> DiscretePath:
+    """The paths of all legs, one after the other."""
+    modes = max(path.inner.shape[1] for path in paths)
+    inner = [np.pad(x.inner, ((0, 0), (0, modes - x.inner.shape[1]), (0, 0))) for x in paths]
+
+    def at_nodes(name: str) -> Array:
+        parts = [getattr(path, name) for path in paths]
+        return np.concatenate([*(part[:-1] for part in parts[:-1]), parts[-1]])
+
+    higher = at_nodes("higher") if paths[0].higher.size else paths[0].higher
+    z = np.concatenate([path.z for path in paths])
+    return DiscretePath(at_nodes("q"), at_nodes("v"), z, np.concatenate(inner), higher)
+
+
+def _between(
+    problem: TrajectoryProblem, held: dict[int, Hold], first: int, last: int
+) -> TrajectoryProblem:
+    """The problem between two nodes."""
+    whole = problem.grid
+    grid = Grid(whole.steps[first:last], whole.schemes[first:last])
+    begin, end = float(whole.t[first]), float(whole.t[last])
+    ld = DiscreteLagrangian(_lagrangian(problem.ld.lagrangian, begin, end), grid)
+    start = State(held[first].q, held[first].v) if first in held else problem.start
+    goal = State(held[last].q, held[last].v) if last in held else problem.goal
+    via = tuple(
+        dataclasses.replace(each, time=each.time - begin)
+        for each in problem.via
+        if first < whole.node_at(each.time) < last
+    )
+    limits = None if problem.limits is None else _limits(problem.limits, begin, end)
+    return TrajectoryProblem(ld, start, goal, limits, via, problem.clearance)
+
+
+def _parts(of: Lagrangian) -> Sequence[Lagrangian]:
+    return of.lagrangians if isinstance(of, SegmentedLagrangian) else (of,)
+
+
+def _inside(ends: Sequence[float], begin: float, end: float) -> tuple[slice, tuple[float, ...]]:
+    """The numbers of the segments from one time to another, and where they meet, from there."""
+    least = 1e-9 * end
+    first = int(np.searchsorted(np.array(ends), begin + least))
+    last = int(np.searchsorted(np.array(ends), end - least))
+    return slice(first, last + 1), tuple(each - begin for each in ends[first:last])
+
+
+def _lagrangian(of: Lagrangian, begin: float, end: float) -> Lagrangian:
+    if not isinstance(of, SegmentedLagrangian):
+        return of
+    chosen, ends = _inside(of.ends, begin, end)
+    parts = of.lagrangians[chosen]
+    return SegmentedLagrangian(parts, ends) if ends else parts[0]
+
+
+def _limits(limits: Limits, begin: float, end: float) -> Limits:
+    if not limits.parts:
+        return limits
+    chosen, ends = _inside(limits.ends, begin, end)
+    parts = limits.parts[chosen]
+    return Limits.of_segments(parts, ends) if ends else parts[0]
