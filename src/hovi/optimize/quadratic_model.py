@@ -7,11 +7,12 @@ the unknowns such that H + shift D is factored in O(N n^3).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

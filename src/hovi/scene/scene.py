@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
+from dataclasses import MISSING, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -28,6 +28,7 @@ from hovi.scene.evaluation_cost import SceneAccount, account
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.regular_cost import require_regular
 from hovi.scene.terms import SceneTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

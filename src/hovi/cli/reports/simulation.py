@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hovi.cli.reports.terminal_table import terminal_table
 from hovi.planning.problem.limits import urdf_limits
+from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 if TYPE_CHECKING:

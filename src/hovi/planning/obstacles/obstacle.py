@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, field, fields
 from typing import Any, NamedTuple
 
 import coal
@@ -15,6 +15,7 @@ import pinocchio as pin
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, nearest
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, Self
 
@@ -40,6 +40,7 @@ from hovi.scene.scene import Scene, require_plannable
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -32,6 +31,7 @@ from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Self
 
 from hovi.checks.arguments import check_arguments_except
@@ -17,6 +17,7 @@ from hovi.planning.search.option_fields import option_infos
 from hovi.planning.search.options import PlanOptions
 from hovi.planning.sequence.segment import Segment, Table, checked_segments, duration_of, goals_of
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 
 @check_arguments_except("start", "goal", "duration")

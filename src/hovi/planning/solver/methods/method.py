@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
@@ -14,6 +14,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
+from hovi.system.dataclass import dataclass
 
 Report = Callable[[int, float], None]
 """Called with the number of each step and the least cost so far."""
