@@ -22,6 +22,12 @@ Array = npt.NDArray[np.float64]
 
 MAX_NUMBER = 1e9
 """Largest number of an obstacle, in [m] or [rad]."""
+GRASPED_KEYS = {
+    "frame": "the name of a link of the robot",
+    "mass": "a positive number of kilograms",
+    "shape": "a table such as an obstacle's, or a list of them",
+}
+"""What a table of a grasped obstacle must have, and what that is."""
 
 
 class Body(NamedTuple):

@@ -28,7 +28,6 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.system.dataclass import dataclass
@@ -135,6 +134,8 @@ def richer_within_limits(
     It starts from the solution's central path, and torques are not checked between the points.
     Finished, it is a solution within limits everywhere. time_limit: in [s].
     """
+    from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
+
     problem, central = solution.problem, solution.central
     assert problem is not None
     assert central is not None
@@ -154,6 +155,8 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
 
     barrier: last barrier parameter.
     """
+    from hovi.planning.solver.methods.interior_point import InteriorPoint
+
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None
