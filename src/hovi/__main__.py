@@ -31,6 +31,8 @@ def run() -> None:
     """Run the command line and exit with its code."""
     _replace_closed_streams()
     gc.set_threshold(NEW_OBJECTS)
+    # No plugin of another package changes what a scene file says, and none is searched for.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not in the background
         signal.signal(signal.SIGINT, _handle_interrupt)
     try:

@@ -356,8 +356,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
 
 def _check_shapes(trajectory: Trajectory) -> None:
     path, grid = trajectory.path, trajectory.grid
-    N, nv = grid.intervals, path.v.shape[-1]
-    robot = trajectory.robot
+    N, nv, robot = grid.intervals, path.v.shape[-1], trajectory.robot
     nq = path.q.shape[-1] if robot is None else robot.nq
     expected = {
         "q": (path.q, (N + 1, nq)),

@@ -381,10 +381,9 @@ class TrajectoryProblem(ProblemSummary):
 
 def _require_supported(problem: TrajectoryProblem) -> None:
     """Raise InputError for what this order, or a periodic motion, does not support."""
-    k = problem.ld.k
+    k, limits = problem.ld.k, problem.limits
     if problem.periodic and (problem.via or len(problem.passive) > 0):
         raise InputError("periodic motions have no via points or passive joints: leave them out.")
-    limits = problem.limits
     wanted = {
         "limits": limits is not None and bool(limits.bounded.any()),
         "obstacles": problem.clearance is not None and problem.clearance.wanted,

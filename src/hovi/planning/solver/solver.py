@@ -27,7 +27,7 @@ from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accur
 from hovi.planning.problem.units import as_time_limit, seconds
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.limits.row_forces import at_instants
-from hovi.planning.solver.methods.choice import method_for
+from hovi.planning.solver.methods.choice import method_for, method_from
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
@@ -301,11 +301,9 @@ class _Again:
         problem, path, goal = self.problem, self.path, self.problem.goal
         if isinstance(goal, FrameGoal) and not is_near(goal, problem, path):
             path = problem.moved_to_guesses(path)
-        if problem.limited and self.central is not None:
-            from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
-
-            options = {"method": InteriorPoint(self.central)} | options
         options = {"time_limit": time_limit} | options
+        if problem.limited and self.central is not None:
+            options = {"method": method_from(self.central)} | options
         if problem.limited or not problem.plain:
             return solve_on_grid(problem, path, near=True, **options)
         found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)
