@@ -18,7 +18,7 @@ IMPORTLIB_FILE = "<frozen importlib"
 """Prefix of the file names of frames of Python's import system."""
 EXTENSION_MODULE = "hovi._native.dynamics"
 """The module that reports leaked objects at exit, except after an interrupt."""
-NEW_OBJECTS = 100_000
+NEW_OBJECTS = 200_000
 """How many new containers start a search for unreachable ones. Python's own 700 costs a small plan
 a tenth of its time: what it imports stays."""
 INTERRUPTION_MODULE = "hovi.system.interruption"
