@@ -55,7 +55,7 @@ def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iter
 
 
 def _far_payloads(scene: Scene) -> Iterator[str]:
-    if not scene.effects:
+    if not any(effect.key == "payload" for effect in scene.effects):
         return
     from hovi.effects import Payload
 
