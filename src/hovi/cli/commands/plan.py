@@ -158,7 +158,8 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool, verbose: bo
     from hovi.system.progress import progress
 
     deadline = Deadline(task.options.time_limit_seconds)
-    noted = () if json else _note_assumptions(task)
+    if not json:
+        _note_assumptions(task)
     with progress(quiet=json) as report:
         solution = plan_task(task, report)
     written, save_error = None if is_guess(solution) else out, None
@@ -174,7 +175,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool, verbose: bo
         if json:
             print(as_json(solution, task, written, margins, certificate))
         else:
-            print_report(_without(noted, solution), task, written, margins, certificate, verbose)
+            print_report(solution, task, written, margins, certificate, verbose)
             if out is not None and is_guess(solution):
                 print("wrote nothing, as there is no motion")
     finally:  # also where nobody reads the report
@@ -183,8 +184,8 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool, verbose: bo
     return 0 if solution.success else 1
 
 
-def _note_assumptions(task: Task) -> tuple[str, ...]:
-    """Print what the plan assumes without being told, before it begins; these sentences."""
+def _note_assumptions(task: Task) -> None:
+    """Print what the plan assumes without being told; see its message for more."""
     import sys
     from contextlib import suppress
 
@@ -194,21 +195,9 @@ def _note_assumptions(task: Task) -> tuple[str, ...]:
     scene, group = task.scene, task.options.group
     if group is not None:
         scene, _, _ = in_group(scene, group, task.start, task.goal)
-    sentences = tuple(assumptions(scene, weighted=task.options.weight is not None))
     with suppress(OSError):  # stderr may be closed
-        for sentence in sentences:
+        for sentence in assumptions(scene, weighted=task.options.weight is not None):
             print(f"note: {sentence}", file=sys.stderr, flush=True)
-    return sentences
-
-
-def _without(noted: tuple[str, ...], solution: Solution) -> Solution:
-    """The solution with a message that does not repeat what was noted on stderr."""
-    import dataclasses
-
-    message = solution.message
-    for sentence in noted:
-        message = message.replace(f" {sentence}", "")
-    return dataclasses.replace(solution, message=message)
 
 
 def _margins(solution: Solution, deadline: Deadline, report: Progress | None) -> KnownMargins:
