@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 import pytest
 
 from hovi.cli.application import main
@@ -66,3 +69,24 @@ def test_a_study_of_effects_shows_each_of_them(
     shown = capfd.readouterr().err
     assert "  0 % reading the scene (" in shown
     assert " % trying gravity (" in shown
+
+
+def test_a_bar_on_a_terminal_shows_the_last_report_and_goes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its brackets are no markup, and it comes after a delay only."""
+    ours, theirs = os.openpty()
+    monkeypatch.setattr(reports, "BAR_DELAY", 0.05)
+    monkeypatch.setenv("TERM", "xterm")
+    with os.fdopen(theirs, "w") as terminal:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        with reports.progress(quiet=False, doing="starting [red]") as report:
+            assert report is not None
+            shown = b""
+            while b"starting [red]" not in shown:
+                shown += os.read(ours, 4096)
+            report("half", 0.5)
+            while b"half" not in shown:
+                shown += os.read(ours, 4096)
+        assert b"\x1b[2K" in os.read(ours, 65536)  # the line is erased
+    os.close(ours)

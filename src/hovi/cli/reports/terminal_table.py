@@ -54,7 +54,7 @@ def table_text(
 def _folded(cells: Sequence[str], widths: Sequence[int], texts: Sequence[int]) -> list[str]:
     """The lines of one row: more than one where a text is folded."""
     parts = [
-        (textwrap.wrap(cell, widths[i], drop_whitespace=False) or [""]) if i in texts else [cell]
+        (textwrap.wrap(cell, max(widths[i], 1)) or [""]) if i in texts else [cell]
         for i, cell in enumerate(cells)
     ]
     return [
