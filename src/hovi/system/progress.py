@@ -100,12 +100,15 @@ def _progress_bar(doing: str) -> Iterator[Progress]:
 
     def show() -> None:
         if not shown:
-            shown.append(_started_bar(last))
+            shown.append(_bar(last.began))  # before it shows anything, as reports may come
+            report(*last.report)
+            shown[0].start()
 
     def report(text: str, fraction: float) -> None:
         last.take(text, fraction)
         for bar in shown:
-            bar.update(bar.task_ids[0], **last.fields())
+            described = text.replace("[", r"\[")  # brackets are markup
+            bar.update(bar.task_ids[0], description=described, completed=fraction)
 
     try:
         with _every(BAR_DELAY, show):
@@ -116,17 +119,16 @@ def _progress_bar(doing: str) -> Iterator[Progress]:
                 bar.stop()
 
 
-def _started_bar(last: _Last) -> Bar:
-    """A bar that shows what was reported last; rich takes longer to import than a small plan."""
+def _bar(began: float) -> Bar:
+    """A bar that began at a time; rich takes longer to import than a small plan."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     bar = Bar(*columns, console=Console(stderr=True), transient=True, get_time=time.monotonic)
-    line = bar.add_task(total=1.0, **last.fields())
-    bar.tasks[line].start_time = last.began
-    bar.start()
+    bar.add_task("", total=1.0)
+    bar.tasks[0].start_time = began
     return bar
 
 
@@ -174,9 +176,10 @@ class _Last:
         """A report."""
         self._text, self._fraction = text, fraction
 
-    def fields(self) -> dict[str, Any]:
-        """As a line of rich's bars, in which brackets are markup."""
-        return {"description": self._text.replace("[", r"\["), "completed": self._fraction}
+    @property
+    def report(self) -> tuple[str, float]:
+        """What was reported."""
+        return self._text, self._fraction
 
     def line(self) -> str:
         """With the time since the beginning."""
