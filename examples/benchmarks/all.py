@@ -38,6 +38,7 @@ SCRIPTS = (
     "hard_cases",
     "underactuated",
     "growth",
+    "starting",
     "tolerance",
     "example_robots",
     "manifold_points",

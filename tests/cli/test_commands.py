@@ -115,12 +115,31 @@ def test_json_has_the_effort_and_the_extremes(run: Run, tmp_path: Path) -> None:
 
 
 def test_the_report_says_the_effort_the_largest_acceleration_and_jerk(run: Run) -> None:
-    out = run("plan", "two_link_reach", "--no-certificate")[1]
+    out = run("plan", "two_link_reach", "--no-certificate", "--verbose")[1]
     assert re.search(r"^effort +20\.2088", out, re.MULTILINE)
     ends = r".*; up to \S+ \(elbow\) at the start, \S+ \(elbow\) at the end$"
     for label, unit in (("accel\\.", "2"), ("jerk", "3")):
         line = rf"^{label} +at most \S+ rad/s\^{unit} \(elbow, t = \S+ s\){ends}"
         assert re.search(line, out, re.MULTILINE), out
+    out = run("plan", "two_link_reach", "--no-certificate")[1]
+    largest = r"at most \S+ rad/s\^{} \(elbow, t = \S+ s\)".format
+    assert re.search(f"^accel\\. +{largest(2)}; jerk {largest(3)}$", out, re.MULTILINE), out
+
+
+def test_the_report_says_the_effort_where_it_is_not_the_cost(run: Run) -> None:
+    assert re.search(r"^effort ", run("plan", "two_link_reach", "--smooth")[1], re.MULTILINE)
+    assert "effort" not in run("plan", "two_link_reach")[1]
+
+
+def test_a_report_is_short_and_verbose_adds_the_rest(run: Run) -> None:
+    short, long = (run("plan", "two_link_reach", *more)[1] for more in ((), ("--verbose",)))
+    labels, all_labels = ([line[:9].strip() for line in x.splitlines()] for x in (short, long))
+    top = ["status", "message", "cost", "scheme", "time"]
+    assert labels == [*top, "", "joint", *labels[7:10], "", "accel.", "accuracy"]
+    solver = {"effort", "n_neg", "nit"}
+    certificate = {"errors", "action", "bound", "energy", "residual", "largest", "replay"}
+    assert set(all_labels) >= {*top, "accel.", "jerk"} | solver | certificate
+    assert "accuracy" not in all_labels
 
 
 def test_options_override_the_scene(run: Run) -> None:
@@ -223,6 +242,9 @@ def test_a_tolerance_chooses_the_scheme(run: Run) -> None:
     assert fields["grids"][-1]["error"] < 1e-2 * fields["grids"][0]["error"]
     _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm")
     assert re.search(r"estimated error \S+ mm at tool0, tolerance 0.1 mm at tool0", out)
+    line = r"^accuracy estimated errors: cost \S+, joints \S+ rad, tool0 \S+ mm; simulating"
+    assert re.search(line, out, re.MULTILINE)
+    _, out, _ = run("plan", "ur5_reach", "--tolerance", "0.1 mm", "--verbose")
     assert re.search(r"^errors +cost .*, q .* rad, .* tool0 .* mm$", out, re.MULTILINE)
 
 
@@ -263,6 +285,11 @@ def test_a_plan_comes_with_its_certificate(run: Run) -> None:
     assert certificate["replay"]["q_rad"] < 1e-8
     assert certificate["replay"]["certifies"] == "dynamics and torques, not optimality"
     text = run("plan", "two_link_reach")[1]
+    line = r"^accuracy estimated errors: cost \S+, joints \S+ rad, tip \S+ mm; simulating "
+    assert re.search(
+        line + r"the torques from node to node agrees to \S+e-1\d rad$", text, re.MULTILINE
+    )
+    text = run("plan", "two_link_reach", "--verbose")[1]
     assert "this certifies dynamics and torques, not optimality" in text
     assert re.search(r"^energy +Pontryagin's H = 55\.45", text, re.MULTILINE)
     fields = json.loads(run("plan", "two_link_reach", "--no-certificate", "--json")[1])

@@ -11,7 +11,8 @@ from dataclasses import fields
 from pathlib import Path
 
 import hovi.effects
-from hovi.effects import EFFECTS, REGISTRY, Effect
+from hovi.effects import Effect
+from hovi.effects.registration import EFFECTS, REGISTRY
 
 
 def test_every_effect_in_the_folder_is_listed_and_public() -> None:
@@ -21,13 +22,14 @@ def test_every_effect_in_the_folder_is_listed_and_public() -> None:
         for value in vars(importlib.import_module(f"hovi.effects.{module.name}")).values()
         if isinstance(value, type) and issubclass(value, Effect) and value is not Effect
     }
-    assert set(EFFECTS) == {effect for effect in written if effect.storable}
+    listed = {REGISTRY[key] for key in EFFECTS}
+    assert listed == {effect for effect in written if effect.storable}
     assert {effect.__name__ for effect in written} <= set(hovi.effects.__all__)
-    assert {effect.__name__ for effect in EFFECTS} <= set(hovi.effects.__all__)
 
 
 def test_keys_are_in_the_order_of_the_list() -> None:
-    assert list(REGISTRY)[: len(EFFECTS)] == [effect.key for effect in EFFECTS]
+    assert list(REGISTRY)[: len(EFFECTS)] == list(EFFECTS)
+    assert list(EFFECTS) == [REGISTRY[key].key for key in EFFECTS]
 
 
 def test_default_numbers_are_those_that_the_page_of_scene_files_states() -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import select
+import sys
+
 import pytest
 
 from hovi.cli.application import main
@@ -66,3 +70,29 @@ def test_a_study_of_effects_shows_each_of_them(
     shown = capfd.readouterr().err
     assert "  0 % reading the scene (" in shown
     assert " % trying gravity (" in shown
+
+
+def test_a_bar_on_a_terminal_shows_the_last_report_and_goes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It comes after a delay; brackets in its text are no markup."""
+    ours, theirs = os.openpty()
+    monkeypatch.setattr(reports, "BAR_DELAY", 0.05)
+    for name, value in {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}.items():
+        monkeypatch.setenv(name, value)
+
+    def await_text(text: bytes) -> None:
+        shown = b""
+        while text not in shown:
+            assert select.select([ours], [], [], 20.0)[0], shown
+            shown += os.read(ours, 4096)
+
+    with os.fdopen(theirs, "w") as terminal:
+        monkeypatch.setattr(sys, "stderr", terminal)
+        with reports.progress(quiet=False, doing="starting [red]") as report:
+            assert report is not None
+            await_text(b"starting [red]")
+            report("half", 0.5)
+            await_text(b"half")
+        await_text(b"\x1b[2K")  # the line is erased
+    os.close(ours)

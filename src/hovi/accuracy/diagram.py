@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from hovi.accuracy.measures import MEASURES, shown_sizes, size
 from hovi.accuracy.resolved_motion import ResolvedMotion
 from hovi.accuracy.run import Run
 from hovi.accuracy.tolerance_method import Choice
+from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
 

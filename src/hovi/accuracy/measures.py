@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from hovi.discrete.measures.motion_error import MotionError
+from hovi.system.dataclass import dataclass
 
 _SIZES: dict[str, Callable[[MotionError], float]] = {
     "cost": lambda error: error.cost,

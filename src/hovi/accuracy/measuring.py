@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.measures import Thresholds
@@ -12,6 +12,7 @@ from hovi.accuracy.method import Method, Prepared, Stopwatch
 from hovi.accuracy.reference_motion import ReferenceMotion
 from hovi.accuracy.run import Run
 from hovi.errors import UnmeasurableError
+from hovi.system.dataclass import dataclass
 from hovi.system.progress import Progress
 
 INTERVALS = tuple(sorted([2**k for k in range(2, 13)] + [3 * 2**k for k in range(1, 12)]))

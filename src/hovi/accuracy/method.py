@@ -6,9 +6,9 @@ import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from hovi.accuracy.reference_motion import Configurations
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, eq=False)

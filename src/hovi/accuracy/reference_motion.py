@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from hovi.discrete.measures.motion_error import MotionError, relative_difference
 from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Configurations = Callable[[Array], Array]

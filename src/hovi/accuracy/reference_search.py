@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from hovi.accuracy.budget import Budget
 from hovi.accuracy.resolved_motion import ResolvedMotion, resolve
@@ -24,6 +23,7 @@ from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
+from hovi.system.dataclass import dataclass
 from hovi.system.interruption import raise_if_interrupted
 from hovi.system.progress import Progress
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 from hovi.accuracy.budget import Budget
@@ -21,6 +21,7 @@ from hovi.planning.refinement.limit_sensitivity import cost_of_tolerance
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
+from hovi.system.dataclass import dataclass
 
 INNER_MODES = 8
 """Inner modes of a resolved motion without limits: more than any scheme in SCHEMES has."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass
 from typing import Any
 
 from hovi.accuracy.measures import shown_size, size
 from hovi.discrete.measures.motion_error import MotionError
+from hovi.system.dataclass import dataclass
 
 MAX_JOINT_ERROR = 0.1
 """Joint error in [rad] or [m] beyond which the run found another motion."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,6 +23,7 @@ from hovi.planning.refinement.adaptive import first_grid, solve_to_tolerance
 from hovi.planning.search.options import DEFAULT_INTERVALS, DEFAULT_TOLERANCE, PlanOptions
 from hovi.planning.search.planner import plan
 from hovi.planning.solver.solver import Solution
+from hovi.system.dataclass import dataclass
 
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9)
 """Relative tolerances of the cost."""

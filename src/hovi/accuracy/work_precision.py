@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from math import inf
 
@@ -33,6 +32,7 @@ from hovi.discrete.guess import Curve
 from hovi.errors import InputError, UnmeasurableError, nearest
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.task_file.task import Task
+from hovi.system.dataclass import dataclass
 from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
 

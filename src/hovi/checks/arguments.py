@@ -11,11 +11,11 @@ import inspect
 import sys
 import types
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, TypeVar, cast
 
 from hovi.checks.kinds import Kind, MismatchError, kind_of, resolved
 from hovi.errors import HoviError, InputError
+from hovi.system.dataclass import dataclass
 
 Accept = Callable[[Any], Any]
 _MARK = "_hovi_checks_arguments"

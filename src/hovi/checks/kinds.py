@@ -8,11 +8,12 @@ import numbers
 import operator
 import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal, Union, get_args, get_origin
 
 import numpy as np
 import numpy.typing as npt
+
+from hovi.system.dataclass import dataclass
 
 MAX_WHOLE_NUMBER = 10**18
 """Largest magnitude of an integer: larger ones overflow in compiled code."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +12,7 @@ from hovi.discrete.instants import InstantBatch, InstantCharts
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import Charts
 from hovi.scene.lagrangian import PointExpansion
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 AnyCharts = Charts | InstantCharts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.scene.lagrangian import Lagrangian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ compiled again when the scheme, the step or the number of intervals changes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +24,7 @@ from hovi.robot.space.chart import Chart
 from hovi.scene.lagrangian import Lagrangian, NoCost, PointTerms
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes.scheme import regular_from_nodal
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from hovi.checks.shapes import require_shape
 from hovi.errors import InputError
 from hovi.schemes import Scheme, galerkin
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
+from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]

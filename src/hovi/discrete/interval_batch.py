@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.interval_paths import interpolate, interpolate_any
 from hovi.schemes import Scheme
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

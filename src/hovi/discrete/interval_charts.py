@@ -9,7 +9,6 @@ the velocities, (q0, q1, c).
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +20,7 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.compiled_charts import CompiledCharts
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes import Scheme
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field, replace
+from dataclasses import KW_ONLY, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import angles_in_degrees
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.space.joint_table import configuration_of, rates_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -8,13 +8,13 @@ ends are among the points, so jumps at nodes are reproduced.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

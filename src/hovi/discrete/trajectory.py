@@ -6,7 +6,7 @@ import io
 import itertools
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -40,6 +40,7 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.scene import Scene
 from hovi.scene.segment_scenes import SegmentScenes
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -355,8 +356,7 @@ class Trajectory(ExportMethods, TrajectorySummary):
 
 def _check_shapes(trajectory: Trajectory) -> None:
     path, grid = trajectory.path, trajectory.grid
-    N, nv = grid.intervals, path.v.shape[-1]
-    robot = trajectory.robot
+    N, nv, robot = grid.intervals, path.v.shape[-1], trajectory.robot
     nq = path.q.shape[-1] if robot is None else robot.nq
     expected = {
         "q": (path.q, (N + 1, nq)),

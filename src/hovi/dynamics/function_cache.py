@@ -26,7 +26,6 @@ from hovi.system.cache_home import cache_home
 from hovi.system.deadline import OutOfTimeError, time_left
 from hovi.system.files import reason, whole_file
 from hovi.system.private_folder import UnsafeFolderError, is_private_file, private_folder
-from hovi.version import __version__
 
 COMPILERS = ("cc", "gcc")
 FLAGS = ("-O1", "-ffp-contract=off", "-fPIC", "-shared", "-s")
@@ -47,6 +46,8 @@ def compiled(function: ca.Function) -> ca.Function:
     Raises CompilationError without a C compiler or a folder that is safe to load from, and
     OutOfTimeError if it is not built at the deadline in force.
     """
+    from hovi.version import __version__  # slow to import
+
     code = c_code(function)
     folder = library_folder()
     source_hash = _digest(code, *FLAGS, ca.CasadiMeta.version(), __version__, *_platform())

@@ -8,8 +8,6 @@ planar is the base: its components are the first joints of the tree and have no 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -17,6 +15,7 @@ import pinocchio as pin
 from hovi._native import dynamics as native
 from hovi.robot.space.groups import SE2, SO2, Group
 from hovi.robot.space.joint_kinds import kind_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

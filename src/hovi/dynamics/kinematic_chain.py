@@ -5,8 +5,6 @@ Every joint rotates about and translates along the z axis of its own frame, as i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
@@ -16,6 +14,7 @@ from hovi.dynamics.joint_tree import axes_of, frames_along
 from hovi.robot.model import frame_id
 from hovi.robot.space.groups import SO2
 from hovi.robot.space.joint_kinds import kind_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -13,6 +12,7 @@ import pinocchio as pin
 from hovi.dynamics.extension import SymbolicModel, archive
 from hovi.errors import ModelError, nearest
 from hovi.robot.mimic_model import CoordinateMap, uncoupled
+from hovi.system.dataclass import dataclass
 
 _OutputMap = Callable[[casadi.SX, casadi.SX], list[casadi.SX]]
 

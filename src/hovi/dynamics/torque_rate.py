@@ -10,13 +10,13 @@ accurately. The rate itself is exact.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.dynamics.torque_model import TorqueModel
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from hovi.effects.expressions.joint_values import (
     of_urdf,
     require_one_source,
 )
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     import pinocchio as pin

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import casadi as ca
@@ -11,6 +10,7 @@ import casadi as ca
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

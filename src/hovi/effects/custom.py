@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -13,6 +13,7 @@ from hovi.effects.expressions.formula import Number, expression
 from hovi.effects.expressions.formula_symbols import joint_symbols
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

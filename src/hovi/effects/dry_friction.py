@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -19,6 +18,7 @@ from hovi.effects.expressions.joint_values import (
 )
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

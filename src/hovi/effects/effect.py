@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_fields
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     import pinocchio as pin

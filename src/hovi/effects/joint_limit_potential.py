@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -12,6 +11,7 @@ import numpy as np
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

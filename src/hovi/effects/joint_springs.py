@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -12,6 +11,7 @@ from hovi.effects.effect import Effect
 from hovi.effects.expressions.joint_positions import positions, require_positions
 from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
 from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

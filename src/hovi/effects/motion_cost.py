@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -13,6 +12,7 @@ from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.joint_values import JointValues, in_words, joint_values
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -12,6 +11,7 @@ from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.effects.expressions.time_vector import TimeVector, in_words, time_vector
 from hovi.errors import SceneError
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,6 +10,7 @@ import pinocchio as pin
 from hovi.effects.effect import Effect, Touch
 from hovi.effects.expressions.frame_motion import require_frame
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -14,6 +13,7 @@ from hovi.effects.expressions.formula import Number, expression
 from hovi.effects.expressions.joint_positions import positions, require_positions
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -1,16 +1,71 @@
-"""Effects by the name of their table in a scene file."""
+"""Effects by the name of their table in a scene file.
+
+This file lists those of hovi: they are tables of scene files and of their JSON schema, and can be
+stored in motion files. A CasadiCost holds a function, and is not among them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, MutableMapping
 from typing import TypeVar
 
 from hovi.effects.effect import Effect
 from hovi.errors import SceneError
 
-REGISTRY: dict[str, type[Effect]] = {}
-"""The effects of hovi.effects, in its order, then those registered by users."""
+EFFECTS = {
+    "gravity": "Gravity",
+    "viscous_friction": "ViscousFriction",
+    "dry_friction": "DryFriction",
+    "armature": "Armature",
+    "joint_springs": "JointSprings",
+    "joint_limit_potential": "JointLimitPotential",
+    "payload": "Payload",
+    "wrench": "Wrench",
+    "drag": "Drag",
+    "moving_base": "MovingBase",
+    "custom": "Custom",
+    "effort_weight": "EffortWeight",
+    "velocity_cost": "VelocityCost",
+    "acceleration_cost": "AccelerationCost",
+    "jerk_cost": "JerkCost",
+    "reference_cost": "ReferenceCost",
+    "power_cost": "PowerCost",
+    "running_cost": "RunningCost",
+}
+"""Keys, in the order of the JSON schema, and the names in hovi.effects of their classes."""
 
 Kind = TypeVar("Kind", bound=type[Effect])
+
+
+class Registry(MutableMapping[str, type[Effect]]):
+    """Classes by key: those of hovi, each imported when it is asked for, then those of users."""
+
+    def __init__(self) -> None:
+        self._others: dict[str, type[Effect]] = {}
+
+    def __getitem__(self, key: str) -> type[Effect]:
+        if key in self._others:
+            return self._others[key]
+        import hovi.effects
+
+        found: type[Effect] = getattr(hovi.effects, EFFECTS[key])
+        return found
+
+    def __setitem__(self, key: str, effect: type[Effect]) -> None:
+        self._others[key] = effect
+
+    def __delitem__(self, key: str) -> None:
+        del self._others[key]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from EFFECTS
+        yield from self._others
+
+    def __len__(self) -> int:
+        return len(EFFECTS) + len(self._others)
+
+
+REGISTRY = Registry()
 
 
 def register(effect: Kind) -> Kind:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
@@ -18,6 +17,7 @@ from hovi.effects.expressions.joint_values import (
     require_one_source,
 )
 from hovi.effects.expressions.symbols import SceneSymbols
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.discrete.output.caution import warn_of_caution
 from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect, nearest
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)

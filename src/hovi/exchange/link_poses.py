@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
 from hovi.robot.robot import Robot
 from hovi.robot.urdf.check import checked_urdf
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

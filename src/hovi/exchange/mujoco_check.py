@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
@@ -14,6 +13,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import InputError, expect
 from hovi.exchange.libraries import library
 from hovi.exchange.mujoco_model import angles, controls, left_out, mjcf, mujoco_scenes
+from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,6 @@ exp(eta) exp(zeta) = exp(eta + zeta + 1/2 [eta, zeta] + ...). [MarsdenPekarskySh
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ import numpy.typing as npt
 
 from hovi.flows.segment import flat
 from hovi.robot.space.configuration_space import ConfigurationSpace, bracket
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ Points of T^(k-1)Q and momenta have shape (B, k, n) or (k, n); points on groups 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -23,6 +22,7 @@ from hovi.flows.legendre_transforms import (
     unbatched,
 )
 from hovi.flows.segment import IntervalLagrangian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Form = Literal["plus", "minus", "momentum"]

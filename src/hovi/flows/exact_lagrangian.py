@@ -7,7 +7,6 @@ Euler-Lagrange equations with these ends. The degree of the curve is raised unti
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +22,7 @@ from hovi.flows.scheme_lagrangian import SchemeLagrangian, check_step
 from hovi.flows.segment import IntervalLagrangian, Segment, flat
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme, galerkin
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +16,7 @@ from hovi.flows.exact_lagrangian import ExactDiscreteLagrangian, approximation
 from hovi.flows.legendre_transforms import legendre
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

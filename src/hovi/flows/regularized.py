@@ -8,7 +8,6 @@ coordinates up to and including h = 0, and (x0, x1) are not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import factorial
 
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.schemes import gamma, inverse_gamma
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

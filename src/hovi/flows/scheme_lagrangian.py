@@ -6,7 +6,7 @@ function of two end points in the theorems of the paper.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -30,6 +30,7 @@ from hovi.flows.step_guesses import (
 from hovi.optimize.batched_newton import System, newton, roots
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ give the momenta, D1 .. D2k and D11 .. of L_d, and the tangent map of the discre
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -20,6 +19,7 @@ from hovi.errors import InputError
 from hovi.flows.regularized import Regularized, regularized
 from hovi.scene.lagrangian import Lagrangian
 from hovi.schemes import Scheme
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

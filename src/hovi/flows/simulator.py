@@ -6,8 +6,6 @@ torques of effects as forces. [MarsdenWest2001, section 3.2]
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -27,6 +25,7 @@ from hovi.scene.scene import Scene
 from hovi.scene.standard_lagrangians import mechanics
 from hovi.schemes import galerkin
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

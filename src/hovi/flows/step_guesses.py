@@ -7,7 +7,6 @@ They come from the exact jet at the start, from the previous step, or from short
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -17,6 +16,7 @@ from hovi.errors import InputError
 from hovi.flows.regularized import regularized
 from hovi.schemes import end_basis
 from hovi.schemes.polynomials import legendre
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

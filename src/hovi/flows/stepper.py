@@ -11,7 +11,7 @@ by compensated summation. [ColomboFerraroMartin2016, section 2 and corollary to 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,7 @@ from hovi.flows.symmetry import Symmetry
 from hovi.scene.scene import Scene
 from hovi.schemes import require_regular
 from hovi.schemes.galerkin_table import MAX_INNER_MODES
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 EPS = float(np.finfo(float).eps)

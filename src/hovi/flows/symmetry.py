@@ -10,7 +10,6 @@ the body's frame, and the second entry of the lift is d/dt xi + [v, xi], the cha
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -30,6 +29,7 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.joint_kinds import kind_of
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

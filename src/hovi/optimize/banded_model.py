@@ -6,7 +6,6 @@ Cholesky factorisation gives the step and decides definiteness at once.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy.typing as npt
 
 from hovi._native import band as native
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

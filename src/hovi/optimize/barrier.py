@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import barrier as native
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -12,13 +12,12 @@ K = H, U = K^-1 A^T and S = A U, they are z = S^-1 (c - U^T g), and s = -K^-1 g 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.banded_model import BandModel
 from hovi.optimize.quadratic_model import Factor, QuadraticModel
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -6,7 +6,6 @@ See hovi.optimize.interior_point for the method.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -16,6 +15,7 @@ from hovi.optimize.barrier import Barrier, Direction, Pair
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Options, Trial, solve_subproblem
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from hovi._native import band as native
 from hovi.optimize.banded_model import BandFactor, BandLayout, BandModel
 from hovi.optimize.quadratic_model import Factor, IntervalSum
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -10,12 +10,12 @@ blocks add up to that of H. [ColomboFerraroMartin2016, section 2]
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor, IntervalSum, QuadraticModel
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

@@ -7,13 +7,14 @@ Useful where gradients are cheap and a new factorisation is not.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.optimize.quadratic_model import Factor
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")

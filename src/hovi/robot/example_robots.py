@@ -6,13 +6,13 @@ the URDF and the SRDF, whether the base floats, and whether the SRDF contains ro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pinocchio as pin
 
 from hovi.errors import ModelError, nearest
+from hovi.system.dataclass import dataclass
 
 BUILT_IN_CODE = ("human", "talos_legs")
 """Robots whose loader modifies the model after reading the URDF."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pinocchio as pin
@@ -28,6 +27,7 @@ from hovi.robot.urdf.mesh_contents import (
 )
 from hovi.robot.urdf.mesh_files import check_mesh, is_inside
 from hovi.robot.urdf.normalize import make_plain
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason
 
 MAX_ALL_MESHES = 256_000_000

@@ -7,7 +7,6 @@ algorithms, its archives and the kernel do not support mimic joints: q_all = G q
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -16,6 +15,7 @@ import pinocchio as pin
 
 from hovi.errors import ModelError
 from hovi.robot.reordered_model import axis, continuous_joint, rebuilt
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

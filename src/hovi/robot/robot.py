@@ -9,7 +9,7 @@ effort limit of 0 in the file stays 0.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,7 @@ from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.space.joint_kinds import Units, coordinate_units
 from hovi.robot.srdf import Srdf, parse_srdf
 from hovi.robot.tip_frame import is_moved, tip_frames
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,11 +7,12 @@ import math
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from hovi.errors import ModelError
+from hovi.system.dataclass import dataclass
 
 SourceKind = Literal["urdf", "example", "model"]
 MAX_POSITION = 1e9

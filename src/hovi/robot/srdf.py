@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,6 +23,7 @@ import pinocchio as pin
 from hovi.errors import InputError, ModelError, nearest
 from hovi.robot.model import frame_id
 from hovi.robot.urdf.rules import MAX_MAGNITUDE, is_decimal
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, require_file
 
 Array = npt.NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +16,7 @@ from hovi.scene.cost_terms import PotentialTerm, RunningCostTerm
 from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms, add_weights
 from hovi.scene.squared_effort import expand_squares, predict, weighted_square
 from hovi.scene.terms import SceneTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 import casadi as ca
@@ -15,6 +14,7 @@ import pinocchio as pin
 
 from hovi.effects import Effect
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 
 Array = npt.NDArray[np.float64]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import casadi as ca
@@ -21,6 +20,7 @@ from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.added_inertia import added_inertia
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

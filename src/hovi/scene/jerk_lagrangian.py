@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from hovi.robot.robot import Robot
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.scene.effort_lagrangian import EffortLagrangian, EffortScene
 from hovi.scene.lagrangian import Lagrangian, PointExpansion, PointTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -6,7 +6,6 @@ This is the only interface between CasADi and Pinocchio below it and NumPy and L
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy.typing as npt
 
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.coordinates import Coordinates, NamedCoordinates
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import MISSING, dataclass, field
+from dataclasses import MISSING, field
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -17,7 +17,8 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.dynamics.mimic_kernel import rnea_kernel, without_rnea_kernel
 from hovi.dynamics.moving_base_torque import MovingBaseTorque, inverse_dynamics, on_base_joints
 from hovi.dynamics.torque_model import AnalyticTorque, CasadiTorque, SummedTorque, TorqueModel
-from hovi.effects import REGISTRY, Effect, EffortWeight
+from hovi.effects.effect import Effect
+from hovi.effects.registration import REGISTRY
 from hovi.errors import ModelError, SceneError, nearest
 from hovi.robot.mass_matrix import check_mass_matrix
 from hovi.robot.mimic_model import PortableModel, check_coupling
@@ -28,6 +29,7 @@ from hovi.scene.evaluation_cost import SceneAccount, account
 from hovi.scene.jerk_lagrangian import JerkLagrangian
 from hovi.scene.regular_cost import require_regular
 from hovi.scene.terms import SceneTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
@@ -139,6 +141,12 @@ class Scene:
             require_regular(found, self.robot, active)
         return found
 
+    @property
+    def _has_effort_matrix(self) -> bool:
+        from hovi.effects.effort_weight import EffortWeight  # most scenes have none
+
+        return any(isinstance(each, EffortWeight) and bool(each.matrix) for each in self.effects)
+
     def _effort_weight(self, given: npt.ArrayLike | None) -> Array:
         """R, or the one of the effects."""
         R = self.terms.effort_weight if given is None else np.asarray(given, dtype=np.float64)
@@ -147,8 +155,7 @@ class Scene:
                 f"weight needs {self.robot.nv} numbers of 0 or more, one per joint coordinate, "
                 f"got {R}."
             )
-        full = any(isinstance(each, EffortWeight) and each.matrix for each in self.effects)
-        if full and given is not None:
+        if given is not None and self._has_effort_matrix:
             raise SceneError(
                 "weight cannot replace the matrix of the scene's effect 'effort_weight': leave out "
                 "one of them."

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +14,7 @@ from hovi.errors import InputError
 from hovi.robot.space.coordinates import Coordinates
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ import pinocchio as pin
 from hovi.effects import Effect, SceneSymbols, Touch
 from hovi.errors import SceneError
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

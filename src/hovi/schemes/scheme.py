@@ -6,7 +6,6 @@ higher-order counterpart of a Butcher tableau.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, cached_property
 from math import factorial
 
@@ -16,6 +15,7 @@ import numpy.typing as npt
 from hovi.checks.arguments import check_arguments
 from hovi.schemes.interval_curve import jet_rows, require_positions
 from hovi.schemes.polynomials import interval_rows, legendre
+from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
 Array = npt.NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -23,6 +23,7 @@ from hovi.study.storage.index import Index
 from hovi.study.storage.samples import SampleFormat
 from hovi.study.storage.tables import PLANS, RUNS, read_table
 from hovi.study.study_file import cells_of, validated
+from hovi.system.dataclass import dataclass
 from hovi.version import __version__
 
 if TYPE_CHECKING:

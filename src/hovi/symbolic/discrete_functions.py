@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 
 from hovi.checks.arguments import check_arguments
@@ -13,6 +11,7 @@ from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme
 from hovi.symbolic import scene_functions
+from hovi.system.dataclass import dataclass
 
 
 @check_arguments

@@ -6,7 +6,6 @@ by CasADi.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -17,6 +16,7 @@ from hovi.dynamics.symbolic_dynamics import RigidBodyFunctions, casadi_functions
 from hovi.errors import InputError, nearest
 from hovi.robot.space import tangent
 from hovi.scene.scene import Scene, require_known_joints
+from hovi.system.dataclass import dataclass
 
 
 @check_arguments

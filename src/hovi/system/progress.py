@@ -10,7 +10,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import copy_context
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -92,23 +95,41 @@ def _harmless(report: Progress) -> Progress:
 
 @contextmanager
 def _progress_bar(doing: str) -> Iterator[Progress]:
+    last = _Last(doing)
+    shown: list[Bar] = []
+
+    def show() -> None:
+        if not shown:
+            shown.append(_bar(last.began))  # before it shows anything, as reports may come
+            report(*last.report)
+            shown[0].start()
+
+    def report(text: str, fraction: float) -> None:
+        last.take(text, fraction)
+        for bar in shown:
+            described = text.replace("[", r"\[")  # brackets are markup
+            bar.update(bar.task_ids[0], description=described, completed=fraction)
+
+    try:
+        with _every(BAR_DELAY, show):
+            yield report
+    finally:
+        for bar in shown:
+            with suppress(OSError):
+                bar.stop()
+
+
+def _bar(began: float) -> Bar:
+    """A bar that began at a time; rich takes longer to import than a small plan."""
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    bar = Bar(*columns, console=Console(stderr=True), transient=True)
-    line = bar.add_task(doing, total=1.0)
-
-    def report(text: str, fraction: float) -> None:
-        bar.update(line, description=text.replace("[", r"\["), completed=fraction)
-
-    with _every(BAR_DELAY, bar.start):  # again and again, which does nothing
-        try:
-            yield report
-        finally:
-            with suppress(OSError):
-                bar.stop()
+    bar = Bar(*columns, console=Console(stderr=True), transient=True, get_time=time.monotonic)
+    bar.add_task("", total=1.0)
+    bar.tasks[0].start_time = began
+    return bar
 
 
 @contextmanager
@@ -149,15 +170,20 @@ class _Last:
     """What was reported last."""
 
     def __init__(self, doing: str) -> None:
-        self._began, self._text, self._fraction = time.monotonic(), doing, 0.0
+        self.began, self._text, self._fraction = time.monotonic(), doing, 0.0
 
     def take(self, text: str, fraction: float) -> None:
         """A report."""
         self._text, self._fraction = text, fraction
 
+    @property
+    def report(self) -> tuple[str, float]:
+        """What was reported."""
+        return self._text, self._fraction
+
     def line(self) -> str:
         """With the time since the beginning."""
-        seconds = time.monotonic() - self._began
+        seconds = time.monotonic() - self.began
         return f"{100 * self._fraction:3.0f} % {self._text} ({seconds:.0f} s)"
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import html
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+
+from hovi.system.dataclass import dataclass
 
 LONGEST = 120
 """Length to which texts are cut, in characters."""

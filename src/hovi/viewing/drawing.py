@@ -6,7 +6,6 @@ import itertools
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,7 @@ import pinocchio as pin
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.viewing.animation import placements_at
 from hovi.viewing.highlights import Highlights
 from hovi.viewing.meshcat_page import Page

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.limit_violation import at_limit
 from hovi.planning.problem.limits import KINDS
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.viewing.recorded_limits import imposed_limits
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import coal
@@ -15,6 +14,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from pinocchio.visualize import MeshcatVisualizer

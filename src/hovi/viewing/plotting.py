@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +30,7 @@ from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.solver.solver import Solution
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.joint_panels import compared, joint_figure
 from hovi.viewing.curves.scheme_torque import scheme_torque

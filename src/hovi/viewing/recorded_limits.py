@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -15,6 +14,7 @@ from hovi.planning.clearance.distances import Distances, distances_between
 from hovi.planning.obstacles.obstacle import Body, Obstacle
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
 from hovi.planning.problem.limits import Limits
+from hovi.system.dataclass import dataclass
 
 _OBSTACLE_COLOR = np.array([0.75, 0.32, 0.22, 1.0])  # brick: stands out from robots and background
 

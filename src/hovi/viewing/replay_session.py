@@ -10,7 +10,6 @@ import time
 import warnings
 import webbrowser
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -20,6 +19,7 @@ from hovi.discrete.trajectory import Trajectory
 from hovi.errors import DisplayError, InputError, expect
 from hovi.planning.problem.limits import as_limits
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, whole_file
 from hovi.system.terminal import has_browser, terminal_script, wait_at_exit, wait_for_interrupt
 from hovi.viewing.animation import animation_of, frame_times

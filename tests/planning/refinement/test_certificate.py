@@ -287,7 +287,7 @@ def test_a_certificate_names_the_tip_with_the_largest_error(exact: Solution) -> 
     np.testing.assert_array_equal(
         found.replay.tip, np.maximum(*(each.tip for each in replays.values()))
     )
-    lines = dict(certificate_lines(found))
+    lines = dict(certificate_lines(found, verbose=True))
     assert re.search(r", right_gripper \S+ mm$", lines["errors"])
     assert re.search(rf", {worst} by \S+ mm", lines["replay"])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +20,7 @@ from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.evaluation_cost import seconds_per_point
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible, raise_if_interrupted, record_interrupt
 from hovi.system.progress import Progress, shows_progress, silent

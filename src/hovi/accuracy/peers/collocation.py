@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from hovi.accuracy.peers.collocation_table import CollocationTable, lagrange_integrals
 from hovi.accuracy.peers.point_program import PointProgram, casadi_matrix
 from hovi.discrete.guess import Boundary, Curve
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

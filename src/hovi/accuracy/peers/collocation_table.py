@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.errors import SchemeError, nearest
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from hovi.accuracy.method import Answer, Method, Prepared
 from hovi.accuracy.peers.bare_urdf import bare_urdf
 from hovi.accuracy.peers.supported_scenes import require_supported
 from hovi.accuracy.peers.worker_client import Worker
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ assembled from kernels of one point, which are compiled by gcc or interpreted by
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.accuracy.peers.point_program import IPOPT, PointProgram, block_diagonal
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

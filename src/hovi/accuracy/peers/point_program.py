@@ -10,7 +10,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ import numpy.typing as npt
 import scipy.sparse as sparse
 
 from hovi.errors import UnmeasurableError
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

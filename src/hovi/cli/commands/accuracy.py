@@ -120,7 +120,7 @@ def _print(diagram: Diagram) -> None:
     """Print the reference, the fastest run per tolerance, and notes."""
     from hovi.accuracy.measures import shown_sizes
     from hovi.accuracy.tables import COLUMNS, cheapest_rows
-    from hovi.cli.reports.terminal_table import print_table, terminal_table
+    from hovi.cli.reports.terminal_table import print_table
     from hovi.robot.tip_frame import names_in_words
 
     resolved = diagram.resolved
@@ -131,12 +131,8 @@ def _print(diagram: Diagram) -> None:
         f"accurate to {errors['cost']:.0e} relative, {errors['joints']:.0e} rad, "
         f"{errors['tip']:.0e} mm at the tip, {names_in_words(resolved.tip_frames)}."
     )
-    table = terminal_table("fastest run per tolerance")
-    for column in COLUMNS:
-        table.add_column(column, justify="left" if column == "method" else "right")
-    for row in cheapest_rows(diagram):
-        table.add_row(*row)
-    print_table(table, width=120)
+    texts = [i for i, column in enumerate(COLUMNS) if column == "method"]
+    print_table(COLUMNS, cheapest_rows(diagram), "fastest run per tolerance", texts)
     for note in diagram.notes:
         print(f"note: {note}")
     if not diagram.complete:

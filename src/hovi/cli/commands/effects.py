@@ -66,15 +66,10 @@ def effects(
 
 def _print(study: EffectStudy) -> None:
     from hovi.accuracy.effect_study.tables import COLUMNS, study_note, study_rows
-    from hovi.cli.reports.terminal_table import print_table, terminal_table
+    from hovi.cli.reports.terminal_table import print_table
 
-    table = terminal_table(study.task.name)
-    for column in COLUMNS:
-        first = column == "effect"
-        table.add_column(column, justify="left" if first else "right", no_wrap=first)
-    for row in study_rows(study):
-        table.add_row(*row)
-    print_table(table, width=140)
+    texts = [i for i, column in enumerate(COLUMNS) if column == "effect"]
+    print_table(COLUMNS, study_rows(study), study.task.name, texts)
     for trial in study.trials:
         print(f"{'+' if trial.added else '-'} {trial.effect.describe()}")
     print(study_note(study))

@@ -55,8 +55,11 @@ def plan(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="F.npz", help="Path of the motion.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", help="Print the certificate and the solver's numbers, too.")
+    ] = False,
     certificate: Annotated[
-        bool, typer.Option(help="Report errors, energy and a replay of the plan.")
+        bool, typer.Option(help="Estimate errors, and simulate the planned torques.")
     ] = True,
     compile: Annotated[
         bool,
@@ -82,7 +85,7 @@ def plan(
     options = _options(context.params)
     with progress(quiet=json, doing="reading the scene"):  # meshes may be divided into parts
         task = _task(scene, options, compile)
-    raise typer.Exit(_plan(task, out, json, certificate))
+    raise typer.Exit(_plan(task, out, json, certificate, verbose))
 
 
 def _options(flags: dict[str, Any]) -> dict[str, Any]:
@@ -145,7 +148,7 @@ def _guess(guess: str) -> str | Trajectory:
     )
 
 
-def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
+def _plan(task: Task, out: Path | None, json: bool, certified: bool, verbose: bool) -> int:
     """Plan, write, print; returns the exit code. Where there is no motion, nothing is written."""
     from hovi.cli.reports.limit_margins import is_guess
     from hovi.cli.reports.plan import as_json, print_report
@@ -172,7 +175,7 @@ def _plan(task: Task, out: Path | None, json: bool, certified: bool) -> int:
         if json:
             print(as_json(solution, task, written, margins, certificate))
         else:
-            print_report(solution, task, written, margins, certificate)
+            print_report(solution, task, written, margins, certificate, verbose)
             if out is not None and is_guess(solution):
                 print("wrote nothing, as there is no motion")
     finally:  # also where nobody reads the report

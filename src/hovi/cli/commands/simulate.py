@@ -154,13 +154,12 @@ def _deviation(tracking: Tracking, plan: Path, feedback: str, bandwidth: float) 
 
 
 def _print(report: dict[str, Any], motion: Simulation) -> None:
-    from hovi.cli.reports.simulation import end_state, end_table, exceeded_limits, limits_sentence
-    from hovi.cli.reports.terminal_table import print_table
+    from hovi.cli.reports.simulation import end_state, exceeded_limits, limits_sentence, print_end
 
     drive = f"playing {report['plan']}" if "plan" in report else "no torques"
     print(f"{report['scene']}: {report['duration']:g} s in {report['intervals']} steps", end="")
     print(f" of order {report['order']}, {drive}")
-    print_table(end_table(end_state(motion)))
+    print_end(end_state(motion))
     print(
         f"energy {report['energy']:.9g} J to {report['energy_end']:.9g} J: torques "
         f"{report['work_of_torques']:+.6g} J, effects {report['work_of_effects']:+.6g} J, "

@@ -38,8 +38,48 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
-    """Labels and their text."""
+def certificate_lines(certificate: Certificate, verbose: bool) -> list[tuple[str, str]]:
+    """Labels and their text: one line of accuracy, or all statements if `verbose`."""
+    if verbose:
+        return _all_lines(certificate)
+    lines = [("accuracy", f"{_errors(certificate)}; {_simulated(certificate)}")]
+    return [*lines, *_coarse(certificate)]
+
+
+def _errors(certificate: Certificate) -> str:
+    errors = certificate.errors
+    if errors is None:
+        return f"errors unknown ({certificate.missing['errors']})"
+    parts = [f"cost {errors.cost:.0e}"]
+    parts += [] if errors.sliding.all() else [f"joints {errors.angle:.0e} rad"]
+    parts += [f"joints {1e3 * errors.slide:.0e} mm"] if errors.sliding.any() else []
+    parts.append(f"{errors.frame} {1e3 * errors.largest_tip:.0e} mm")
+    return f"estimated errors: {', '.join(parts)}"
+
+
+def _simulated(certificate: Certificate) -> str:
+    replay = certificate.replay
+    if replay is None:
+        return f"torques not simulated ({certificate.missing['replay']})"
+    parts = [] if replay.sliding.all() else [f"{replay.angle:.0e} rad"]
+    parts += [f"{1e3 * replay.slide:.0e} mm"] if replay.sliding.any() else []
+    return f"simulating the torques from node to node agrees to {' and '.join(parts)}"
+
+
+def _coarse(certificate: Certificate) -> list[tuple[str, str]]:
+    """A caution about a grid that is too coarse for its scheme."""
+    if _gap(certificate) <= COARSE_GAP:
+        return []
+    return [
+        (
+            "! coarse",
+            f"the cost of the curve, {certificate.integral:.6g}, differs by more than 1 %: plan to "
+            "a tolerance, or use more intervals",
+        )
+    ]
+
+
+def _all_lines(certificate: Certificate) -> list[tuple[str, str]]:
     energy, missing = certificate.hamiltonian, certificate.missing
     lines = [
         ("errors", _text_or_reason(certificate.errors, errors_text, missing, "errors")),
@@ -51,13 +91,7 @@ def certificate_lines(certificate: Certificate) -> list[tuple[str, str]]:
     ]
     if certificate.bound is not None:
         lines.append(("bound", f"this minimum costs at most {certificate.bound:.10g}"))
-    if _gap(certificate) > COARSE_GAP:
-        lines.append(
-            (
-                "! coarse",
-                "the two differ by more than 1 %: plan to a tolerance, or use more intervals",
-            )
-        )
+    lines += _coarse(certificate)
     if energy is not None:
         lines.append(("energy", f"Pontryagin's H = {energy.mean:.6g}, spread {energy.spread:.1e}"))
     if certificate.residual is not None:

@@ -35,17 +35,21 @@ def _json(extreme: Extreme) -> dict[str, Any]:
     }
 
 
-def extremes_lines(extremes: Extremes) -> list[tuple[str, str]]:
-    """Labels and their text."""
-    return [("accel.", _text(extremes.acceleration)), ("jerk", _text(extremes.jerk))]
+def extremes_lines(extremes: Extremes, verbose: bool) -> list[tuple[str, str]]:
+    """Labels and their text. verbose: whether to add the values at the ends."""
+    a, jerk = extremes.acceleration, extremes.jerk
+    if not verbose:
+        return [("accel.", f"at most {_largest(a)}; jerk at most {_largest(jerk)}")]
+    return [("accel.", _text(a)), ("jerk", _text(jerk))]
+
+
+def _largest(extreme: Extreme) -> str:
+    return f"{extreme.value:.4g} {extreme.unit} ({extreme.joint}, t = {extreme.t:.4g} s)"
 
 
 def _text(extreme: Extreme) -> str:
     ends = f"{_end(extreme, extreme.start)} at the start, {_end(extreme, extreme.end)} at the end"
-    return (
-        f"at most {extreme.value:.4g} {extreme.unit} ({extreme.joint}, t = {extreme.t:.4g} s); "
-        f"up to {ends}"
-    )
+    return f"at most {_largest(extreme)}; up to {ends}"
 
 
 def _end(extreme: Extreme, values: Array) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import Clearance
@@ -13,6 +13,7 @@ from hovi.planning.solver.outcome import margins
 from hovi.planning.solver.outcome.margins import LimitMargins
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.viewing.recorded_limits import imposed_limits, kept_distances
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 Array = npt.NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hovi.cli.reports.accuracy import accuracy_json, scheme_text, steps_text
 from hovi.cli.reports.arm_limits import limit_set_json, limit_set_of, limit_set_text
@@ -14,7 +14,7 @@ from hovi.cli.reports.extremes import extremes_json, extremes_lines
 from hovi.cli.reports.limit_margins import KnownMargins, is_guess
 from hovi.cli.reports.peaks import Peaks, peaks
 from hovi.cli.reports.segments import segment_lines, segments_json
-from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.cli.reports.terminal_table import print_table
 from hovi.discrete.measures.motion_extremes import extremes
 from hovi.planning.refinement.certificate import Certificate
 from hovi.planning.solver.outcome.margins import LimitMargins
@@ -22,9 +22,6 @@ from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.planning.task_file.task import Task
 from hovi.system.files import finite
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 
 def as_json(
@@ -75,10 +72,13 @@ def print_report(
     out: Path | None,
     margins: KnownMargins,
     certificate: Certificate | None = None,
+    verbose: bool = False,
 ) -> None:
-    """Print a summary, the peaks of the motion, the certificate and the output file."""
-    for label, text in _summary(solution, task, margins):
-        print(f"{label:9s}{text}")
+    """Print a summary, the peaks of the motion, its accuracy and the output file.
+
+    verbose: whether to print the numbers of the solver and the whole certificate, too.
+    """
+    _print_lines(_summary(solution, task, margins, verbose))
     if is_guess(solution):
         return
     arm = limit_set_of(task)
@@ -86,14 +86,13 @@ def print_report(
         print(f"limits   {limit_set_text(arm, solution.trajectory.grid.order)}")
     largest = peaks(solution.trajectory)
     if margins.limits is not None:
-        print_table(_margins_table(largest, margins.limits), width=120)
+        _print_margins(largest, margins.limits)
         print(_margins_note(margins.limits))
     else:
-        print_table(_peaks_table(largest), width=120)
+        _print_peaks(largest)
         if any(each.any() for each in largest.beyond().values()):
             print("! beyond a limit of the URDF: the motion was planned without it.")
-    for label, text in extremes_lines(extremes(solution.trajectory)):
-        print(f"{label:9s}{text}")
+    _print_lines(extremes_lines(extremes(solution.trajectory), verbose))
     if margins.missing:
         print(f"margins  none: {margins.missing}")
     if margins.distance is not None:
@@ -102,9 +101,13 @@ def print_report(
             f"distance {margins.distance:.4g} m at the nearest approach, the margin is {kept:g} m"
         )
     if certificate is not None:
-        for label, text in certificate_lines(certificate):
-            print(f"{label:9s}{text}")
+        _print_lines(certificate_lines(certificate, verbose))
     _print_file(out, solution)
+
+
+def _print_lines(lines: list[tuple[str, str]]) -> None:
+    for label, text in lines:
+        print(f"{label:9s}{text}")
 
 
 def _print_file(out: Path | None, solution: Solution) -> None:
@@ -120,17 +123,22 @@ def _estimate(solution: Solution, certificate: Certificate | None) -> float | No
     return None if certificate.errors is None else certificate.errors.cost
 
 
-def _summary(solution: Solution, task: Task, margins: KnownMargins) -> list[tuple[str, str]]:
+def _summary(
+    solution: Solution, task: Task, margins: KnownMargins, verbose: bool
+) -> list[tuple[str, str]]:
     """Labels and their text."""
     rows = [("status", str(solution.status)), ("message", solution.message)]
     if is_guess(solution):
         return rows
     grid = solution.trajectory.grid
+    rows.append(("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"))
+    if verbose or (solution.effort is not None and not _equal(solution.effort, solution.cost)):
+        rows.append(("effort", "none" if solution.effort is None else f"{solution.effort:.10g}"))
+    if verbose:
+        unknown = solution.n_neg < 0
+        rows.append(("n_neg", "not determined" if unknown else f"{solution.n_neg}"))
+        rows.append(("nit", f"{solution.nit}"))
     rows += [
-        ("cost", f"{solution.cost:.10g}{_infeasible_note(solution)}"),
-        ("effort", "none" if solution.effort is None else f"{solution.effort:.10g}"),
-        ("n_neg", "not determined" if solution.n_neg < 0 else f"{solution.n_neg}"),
-        ("nit", f"{solution.nit}"),
         ("scheme", f"{scheme_text(task, grid)} on {_intervals(solution, task)}"),
         ("time", f"{solution.setup_seconds:.2f} s setup, {solution.solve_seconds:.2f} s solving"),
     ]
@@ -142,6 +150,11 @@ def _summary(solution: Solution, task: Task, margins: KnownMargins) -> list[tupl
         more = f" and {len(costs) - 6} more" if len(costs) > 6 else ""
         rows.append(("minima", f"{len(costs)}: {', '.join(costs[:6])}{more}"))
     return rows
+
+
+def _equal(effort: float, cost: float) -> bool:
+    """Whether a cost is nothing but the effort, up to rounding."""
+    return math.isclose(effort, cost, rel_tol=1e-9)
 
 
 def _usable(violation: str) -> str:
@@ -164,10 +177,8 @@ def _intervals(solution: Solution, task: Task) -> str:
     return f"{taken} intervals{asked}"
 
 
-def _margins_table(extremes: Peaks, margins: LimitMargins) -> Table:
-    """The extremes of each limited output, with the margin to its limit."""
-    table = terminal_table()
-    table.add_column("joint", overflow="fold")
+def _print_margins(extremes: Peaks, margins: LimitMargins) -> None:
+    """Print the extremes of each limited output, with the margin to its limit."""
     values = {
         "q": [_range(*ends) for ends in zip(extremes.q_low, extremes.q_high, strict=True)],
         "v": [_short(each) for each in extremes.v],
@@ -175,13 +186,12 @@ def _margins_table(extremes: Peaks, margins: LimitMargins) -> Table:
         "tau": [_short(each) for each in extremes.tau],
     }
     shown = [kind for kind in values if kind != "a" or margins.is_limited("a")]
-    for kind in shown:
-        table.add_column(kind if kind == "q" else f"|{kind}|", justify="right")
-        table.add_column("margin", justify="right")
-    for i, name in enumerate(extremes.shown):
-        cells = [(values[kind][i], margins.text(kind, i)) for kind in shown]
-        table.add_row(name, *(cell for pair in cells for cell in pair))
-    return table
+    rows = [[name] for name in extremes.shown]
+    for i, row in enumerate(rows):
+        for kind in shown:
+            row += [values[kind][i], margins.text(kind, i)]
+    titles = [(kind if kind == "q" else f"|{kind}|", "margin") for kind in shown]
+    print_table(["joint", *(each for pair in titles for each in pair)], rows)
 
 
 def _margins_note(margins: LimitMargins) -> str:
@@ -190,16 +200,13 @@ def _margins_note(margins: LimitMargins) -> str:
     return note + (", ! beyond one." if margins.exceeded else ".")
 
 
-def _peaks_table(extremes: Peaks) -> Table:
-    table = terminal_table()
-    table.add_column("joint", overflow="fold")
-    for column in ("q", "limits", "|v|", "limit", "|tau|", "limit"):
-        table.add_column(column, justify="right")
+def _print_peaks(extremes: Peaks) -> None:
+    """Print the extremes of each joint beside the limits of the URDF."""
     beyond = {
         key: ["!" if each else "" for each in flags] for key, flags in extremes.beyond().items()
     }
-    for i, name in enumerate(extremes.shown):
-        table.add_row(
+    rows = [
+        (
             name,
             beyond["q"][i] + _range(extremes.q_low[i], extremes.q_high[i]),
             _range(extremes.lower[i], extremes.upper[i]),
@@ -208,7 +215,9 @@ def _peaks_table(extremes: Peaks) -> Table:
             beyond["tau"][i] + _short(extremes.tau[i]),
             _short(extremes.tau_limit[i]),
         )
-    return table
+        for i, name in enumerate(extremes.shown)
+    ]
+    print_table(("joint", "q", "limits", "|v|", "limit", "|tau|", "limit"), rows)
 
 
 def _peaks_json(extremes: Peaks) -> dict[str, dict[str, Any]]:

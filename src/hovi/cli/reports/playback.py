@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.cli.reports.terminal_table import print_table
 from hovi.system.files import finite
 
 if TYPE_CHECKING:
@@ -21,13 +21,11 @@ def playback_json(played: MujocoReplay) -> dict[str, Any]:
 
 def print_playback(played: MujocoReplay) -> None:
     """Print the largest deviation of each joint, and a sentence."""
-    print(f"played back in MuJoCo in {len(played.times) - 1:,} steps, without feedback")
-    table = terminal_table()
-    table.add_column("joint")
-    table.add_column("largest deviation [rad, m]", justify="right")
-    for name, error in zip(played.names, played.error, strict=True):
-        table.add_row(name, f"{error:.2e}")
-    print_table(table)
+    print_table(
+        ("joint", "largest deviation [rad, m]"),
+        [(name, f"{error:.2e}") for name, error in zip(played.names, played.error, strict=True)],
+        f"played back in MuJoCo in {len(played.times) - 1:,} steps, without feedback",
+    )
     if played.left_out:
         print(f"without the torques of {', '.join(played.left_out)}, which MuJoCo does not have")
     if played.success:

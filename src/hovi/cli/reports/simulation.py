@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hovi.cli.reports.terminal_table import terminal_table
+from hovi.cli.reports.terminal_table import print_table
 from hovi.planning.problem.limits import urdf_limits
+from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    pass
 
 if TYPE_CHECKING:
     from hovi.flows.simulator import Simulation
@@ -66,13 +66,10 @@ def end_state(motion: Simulation) -> list[dict[str, Any]]:
     ]
 
 
-def end_table(rows: list[dict[str, Any]]) -> Table:
-    """The final state as a table, one joint per line."""
-    table = terminal_table()
-    table.add_column("at the end", overflow="fold")
-    for column in ("q", "", "v", ""):
-        table.add_column(column, justify="left" if not column else "right")
-    for row in rows:
-        unit = row["unit"]
-        table.add_row(row["joint"], f"{row['q']:.4g}", unit, f"{row['v']:.4g}", f"{unit}/s")
-    return table
+def print_end(rows: list[dict[str, Any]]) -> None:
+    """Print the final state as a table, one joint per line."""
+    shown = [
+        (each["joint"], f"{each['q']:.4g}", each["unit"], f"{each['v']:.4g}", f"{each['unit']}/s")
+        for each in rows
+    ]
+    print_table(("at the end", "q", "", "v", ""), shown, texts=(0, 2, 4))

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from hovi.cli.reports.terminal_table import print_table, terminal_table
+from hovi.cli.reports.terminal_table import print_table
 from hovi.study.running.progress import duration_text
 from hovi.system.files import finite
 from hovi.system.progress import progress
@@ -83,12 +83,9 @@ def print_summary(found: dict[str, Any], as_json: bool) -> None:
     if found["irreproducible"]:
         print(f"{'':9s}{found['irreproducible']:,} may depend on a time limit")
     print(f"time     {duration_text(found['seconds'])} in all workers together")
-    table = terminal_table()
-    for column in ("minima", "least", "quarter", "median", "three quarters", "largest"):
-        table.add_column(column, justify="left" if column == "minima" else "right")
-    for name, values in found["quantiles"].items():
-        table.add_row(name, *(f"{x:.4g}" for x in values))
-    print_table(table, width=100)
+    columns = ("minima", "least", "quarter", "median", "three quarters", "largest")
+    quantiles = found["quantiles"].items()
+    print_table(columns, [(name, *(f"{x:.4g}" for x in values)) for name, values in quantiles])
     for each in found["worst"][:3]:
         given = ", ".join(f"{k} = {_shown(v)}" for k, v in each["parameters"].items())
         print(f"worst    cell {each['cell']}: cost {each['cost']:.6g}, {given[:WIDTH]}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from hovi.discrete.trajectory import Sample, Trajectory
 from hovi.errors import InputError
 from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

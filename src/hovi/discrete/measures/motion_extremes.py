@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,7 @@ from hovi.discrete.stored_torque import chebyshev_points
 from hovi.discrete.trajectory import Trajectory
 from hovi.robot.space.coordinates import NO_UNITS
 from hovi.robot.space.joint_kinds import Units
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

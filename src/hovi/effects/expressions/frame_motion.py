@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
@@ -11,6 +10,7 @@ from hovi.dynamics.symbolic_dynamics import casadi_functions
 from hovi.effects.expressions.symbols import SceneSymbols
 from hovi.errors import SceneError, nearest
 from hovi.robot.space.configuration_rate import configuration_rate
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.robot.robot import Robot

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import casadi as ca
+
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     import pinocchio as pin

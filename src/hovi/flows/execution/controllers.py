@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.robot.space.chart import Chart
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ uncoupled robot, reduced by the same G as the planned torques: an error in G is 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +22,7 @@ from hovi.robot.frame_distance import FrameDistance
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

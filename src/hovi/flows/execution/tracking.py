@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +16,7 @@ from hovi.flows.execution.controllers import Controller, controller
 from hovi.flows.simulator import Simulation, simulate
 from hovi.robot.frame_distance import FrameDistance
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

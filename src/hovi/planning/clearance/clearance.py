@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.planning.obstacles.obstacle import Obstacle
+from hovi.system.dataclass import dataclass
 
 DISTANCE_SCALE = 0.1
 """Unit in which the solver measures distances, in [m]; limits are measured by their ranges."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
 from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

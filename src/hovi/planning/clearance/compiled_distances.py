@@ -8,7 +8,6 @@ groups, only Coal knows the distances.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import coal
@@ -21,6 +20,7 @@ from hovi.robot.mimic_model import CoordinateMap, uncoupled
 from hovi.robot.robot import Robot
 from hovi.robot.space.groups import SE2, SE3, SO2, SO3, Group
 from hovi.robot.space.joint_kinds import kind_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -19,6 +18,7 @@ from hovi.planning.clearance.pair_distances import PairDistances
 from hovi.planning.clearance.self_collisions import self_collision_pairs
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -17,13 +16,14 @@ from hovi.checks.shapes import numbers_of
 from hovi.checks.tables import entries_of
 from hovi.effects import Payload
 from hovi.errors import InputError, expect, nearest
-from hovi.planning.obstacles.obstacle import Obstacle, obstacle_of_kind, pose_of
+from hovi.planning.obstacles.obstacle import GRASPED_KEYS, Obstacle, obstacle_of_kind, pose_of
 from hovi.planning.obstacles.primitives import Box, Capsule, Cylinder, Sphere
 from hovi.robot.model import build_model
 from hovi.robot.robot import Robot
 from hovi.robot.source import text_hash
 from hovi.robot.urdf.added_link import AddedLink, UrdfShape, with_link
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
@@ -34,12 +34,6 @@ MAX_MASS = 1e9
 _ORIGIN = (0.0, 0.0, 0.0)
 _SHAPES = (Box, Sphere, Cylinder, Capsule)
 _KINDS = {each.__name__.lower(): each for each in _SHAPES}
-NEEDED = {
-    "frame": "the name of a link of the robot",
-    "mass": "a positive number of kilograms",
-    "shape": "a table such as an obstacle's, or a list of them",
-}
-"""What a table of a grasped object must have, and what that is."""
 
 
 @check_arguments_except("shape", "mass", "position", "rpy", "center", "inertia", "may_touch")
@@ -201,7 +195,7 @@ def as_grasped(objects: Any) -> tuple[Grasped, ...]:
 def _from_table(table: Mapping[str, Any], number: int) -> Grasped:
     """An object from a table in the words of a scene file. Raises InputError."""
     keys = [each.name for each in dataclasses.fields(Grasped)]
-    return Grasped(**entries_of(table, f"grasped[{number}]", keys, NEEDED))
+    return Grasped(**entries_of(table, f"grasped[{number}]", keys, GRASPED_KEYS))
 
 
 def scene_holding(scene: Scene, objects: tuple[Grasped, ...]) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from hovi.planning.obstacles.hull import hull_of
 from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of
 from hovi.planning.obstacles.primitives import ConvexHull
 from hovi.planning.obstacles.triangle_mesh import TriangleMesh, read_mesh
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

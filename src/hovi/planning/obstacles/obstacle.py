@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, field, fields
 from typing import Any, NamedTuple
 
 import coal
@@ -15,12 +15,19 @@ import pinocchio as pin
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, nearest
 from hovi.planning.obstacles.obstacle_path import ObstaclePath
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
 
 MAX_NUMBER = 1e9
 """Largest number of an obstacle, in [m] or [rad]."""
+GRASPED_KEYS = {
+    "frame": "the name of a link of the robot",
+    "mass": "a positive number of kilograms",
+    "shape": "a table such as an obstacle's, or a list of them",
+}
+"""What a table of a grasped obstacle must have, and what that is."""
 
 
 class Body(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments_except
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError, nearest
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.obstacles.primitives import Box, Cylinder, Sphere
 from hovi.planning.obstacles.triangle_mesh import TriangleMesh
 from hovi.planning.obstacles.yaml_text import YamlNode, read_yaml
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import coal
@@ -13,6 +12,7 @@ import pinocchio as pin
 from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

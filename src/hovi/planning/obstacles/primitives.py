@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import coal
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +11,7 @@ from hovi.checks.arguments import check_arguments_except
 from hovi.errors import InputError
 from hovi.planning.obstacles.hull import hull_of
 from hovi.planning.obstacles.obstacle import Body, Obstacle, pose_of, turned_to
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

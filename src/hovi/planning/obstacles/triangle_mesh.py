@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy.typing as npt
 from hovi.errors import InputError, ModelError
 from hovi.robot.urdf.mesh_contents import MAX_COORDINATE, one_line
 from hovi.robot.urdf.mesh_files import check_mesh
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason
 
 Array = npt.NDArray[np.float64]

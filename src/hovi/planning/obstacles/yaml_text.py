@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hovi.errors import SceneError, nearest
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason, require_file
 
 MAX_BYTES = 1_000_000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from hovi.discrete.grid import DiscretePath
 from hovi.planning.paths.ompl_paths import has_ompl
 from hovi.planning.paths.path_guess import DEEP, depth_of, path_guesses
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 MAX_PATHS = 8

@@ -7,8 +7,6 @@ constant. A goal that prescribes these as well is redundant or infeasible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +14,7 @@ import pinocchio as pin
 
 from hovi.robot.space.joint_kinds import FLOATING, kind_of
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

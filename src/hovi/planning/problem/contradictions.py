@@ -15,6 +15,7 @@ from hovi.planning.problem.node_conditions import JointCondition
 from hovi.planning.problem.presolve.end_torques import unavoidable_torque
 from hovi.planning.problem.presolve.legs import Stop, states_too_far_apart
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.robot.space.angle_ranges import beyond_in_degrees
 from hovi.robot.space.coordinates import Coordinates
 
 Array = npt.NDArray[np.float64]
@@ -60,10 +61,12 @@ def _outside(
     if outside[i] <= limits.tolerance:
         return ""
     name, unit = coordinates.coordinate_names[i], coordinates.coordinate_units[i][row]
+    lower, upper = limits.lower[row, i], limits.upper[row, i]
+    slip = beyond_in_degrees(values[i], lower, upper) if row == 0 and unit == "rad" else ""
     return (
         f"the {KIND_NAMES[KINDS[row]]} of joint {name!r} at the {end} is {values[i]:.6g} {unit}, "
-        f"outside its limits [{limits.lower[row, i]:.6g}, {limits.upper[row, i]:.6g}]; change the "
-        f"{end} or widen the limits"
+        f"outside its limits [{lower:.6g}, {upper:.6g}]"
+        + (f", {slip}" if slip else f"; change the {end} or widen the limits")
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any
 
@@ -22,6 +22,7 @@ from hovi.planning.problem.kinematics.orientation import ORIENTATIONS, rotation_
 from hovi.planning.problem.node_conditions import Condition
 from hovi.robot.robot import Robot
 from hovi.robot.space.tangent import Symbols, hessian, jacobian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -24,6 +23,7 @@ from hovi.planning.problem.units import seconds
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.tip_frame import moves_frame
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +13,7 @@ from hovi.discrete.interval_batch import COORDINATES, Coordinates
 from hovi.optimize.banded_model import BandLayout
 from hovi.optimize.merge_tree import MergeTree, merge_levels
 from hovi.planning.problem.seams import Hold
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

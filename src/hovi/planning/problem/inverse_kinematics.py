@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +24,7 @@ from hovi.planning.problem.presolve.frame_hints import hint_on_frame
 from hovi.robot.robot import Robot
 from hovi.robot.space.joint_table import configuration_of
 from hovi.robot.tip_frame import moves_frame
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Bounds = tuple[Array, Array]

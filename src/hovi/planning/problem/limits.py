@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -20,6 +19,7 @@ from hovi.planning.problem.notation.summaries import LimitsSummary
 from hovi.robot.robot import Robot
 from hovi.robot.space.angle_ranges import ranges_in_degrees, speeds_in_degrees
 from hovi.robot.space.coordinates import Coordinates
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Range = tuple[Array, Array]

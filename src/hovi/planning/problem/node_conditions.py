@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.robot.space.coordinates import Coordinates
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

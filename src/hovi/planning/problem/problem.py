@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, Self
 
@@ -40,6 +40,7 @@ from hovi.scene.scene import Scene, require_plannable
 from hovi.scene.segment_scenes import SegmentScenes
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
 from hovi.schemes import require_regular
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -380,10 +381,9 @@ class TrajectoryProblem(ProblemSummary):
 
 def _require_supported(problem: TrajectoryProblem) -> None:
     """Raise InputError for what this order, or a periodic motion, does not support."""
-    k = problem.ld.k
+    k, limits = problem.ld.k, problem.limits
     if problem.periodic and (problem.via or len(problem.passive) > 0):
         raise InputError("periodic motions have no via points or passive joints: leave them out.")
-    limits = problem.limits
     wanted = {
         "limits": limits is not None and bool(limits.bounded.any()),
         "obstacles": problem.clearance is not None and problem.clearance.wanted,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Self
 
@@ -18,6 +17,7 @@ from hovi.planning.problem.goals import Via, goal_state, via_conditions
 from hovi.planning.problem.limits import Limits
 from hovi.planning.problem.node_conditions import NodeCondition
 from hovi.robot.space.coordinates import Coordinates
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Self
@@ -18,6 +18,7 @@ from hovi.errors import InputError, nearest
 from hovi.planning.problem.units import ANGLES, LENGTHS, SHARES, number_and_unit
 from hovi.robot.robot import Robot
 from hovi.robot.tip_frame import names_in_words
+from hovi.system.dataclass import dataclass
 
 CURVE_TOLERANCE = 1e-3
 """Relative error of the integral along the curve that no tolerance of another kind, and no smaller

@@ -13,7 +13,6 @@ With r + 2 points the moments vanish exactly where the torque vanishes at every 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -24,6 +23,7 @@ from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.interval_batch import IntervalBatch
 from hovi.discrete.interval_charts import IntervalCharts
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

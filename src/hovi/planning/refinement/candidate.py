@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -31,6 +30,7 @@ from hovi.planning.refinement.whirling import Whirl, whirl
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS
 from hovi.planning.solver.solver import Solution
 from hovi.schemes import is_galerkin
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 import numpy as np
@@ -21,6 +21,7 @@ from hovi.planning.refinement.error_estimate import estimate_error
 from hovi.planning.refinement.nodal_hamiltonian import NodalHamiltonian, nodal_hamiltonian
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import interruptible
 

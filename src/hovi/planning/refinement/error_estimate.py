@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -30,10 +29,9 @@ from hovi.planning.refinement.interpolated_outputs import interpolated_slopes
 from hovi.planning.refinement.nearby_minimum import nearby_minimum
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.central_path import CentralPath
-from hovi.planning.solver.methods.feasibility import follow
-from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 
@@ -139,6 +137,8 @@ def richer_within_limits(
     It starts from the solution's central path, and torques are not checked between the points.
     Finished, it is a solution within limits everywhere. time_limit: in [s].
     """
+    from hovi.planning.solver.methods.interior_point import InteriorPoint  # 10 ms
+
     problem, central = solution.problem, solution.central
     assert problem is not None
     assert central is not None
@@ -166,6 +166,8 @@ def followed_within_limits(solution: Solution, known: FinerSolution) -> FinerSol
     if not np.array_equal(known.problem.grid.steps, problem.grid.steps):
         return None
     fine = known.problem.between(problem.start, problem.goal)
+    from hovi.planning.solver.methods.feasibility import follow  # as above
+
     central = follow(fine, known.central, RICHER_BARRIER)
     if central is None:
         return None
@@ -179,6 +181,8 @@ def _finished(found: FinerSolution, barrier: float) -> Solution | None:
 
     barrier: last barrier parameter.
     """
+    from hovi.planning.solver.methods.interior_point import InteriorPoint
+
     known = found.finish()
     if known is None or known.central is None or known.problem is None:
         return None

@@ -9,7 +9,6 @@ the interval reduces rho itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.schemes import Scheme, galerkin
 from hovi.schemes.interval_curve import end_degrees, inverse_gamma
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -7,7 +7,6 @@ full Newton step, and cost less.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from hovi.optimize.quadratic_model import Factor, QuadraticModel
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.outcome.without_solve import minimum_at
 from hovi.planning.solver.solver import Solution
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 MAX_HESSIANS = 5

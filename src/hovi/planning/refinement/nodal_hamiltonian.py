@@ -6,7 +6,7 @@ the nodes. The interpolant's acceleration has a lower order, which would dominat
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from hovi.errors import InputError
 from hovi.optimize.batched_newton import newton
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.lagrangian import Lagrangian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ the discrete action, but not the integral along its curve.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -37,6 +36,7 @@ from hovi.planning.solver.solver import Check, MotionCheck, Solution, solve_on_g
 from hovi.planning.solver.status import Status
 from hovi.schemes import is_galerkin
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError, is_late
 from hovi.system.interruption import interruptible
 

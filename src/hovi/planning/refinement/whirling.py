@@ -7,8 +7,6 @@ that no joint of a robot reaches, if there is a minimum at all.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -16,6 +14,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.mass_matrix import MassMatrix
+from hovi.system.dataclass import dataclass
 
 SAMPLES = 33
 """Samples per interval of the velocity, both ends included."""

@@ -10,7 +10,6 @@ little as the cheapest one, and the nearest, by a motion within the limits on a 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +31,7 @@ from hovi.planning.solver.solver import solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name, of_order
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 
 Array = npt.NDArray[np.float64]

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from hovi.errors import InputError
 from hovi.planning.search.continuation import STOPPED
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import OutOfTimeError
 from hovi.system.interruption import record_interrupt
 

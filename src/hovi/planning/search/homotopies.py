@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
@@ -23,6 +22,7 @@ from hovi.planning.search.job import Job
 from hovi.robot.mass_matrix import MassMatrix
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     import pinocchio as pin

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, lru_cache
 from typing import Any, Self
 
@@ -24,6 +24,7 @@ from hovi.planning.solver.initial_path import guess_path
 from hovi.scene.lagrangian import Lagrangian
 from hovi.scene.scene import Scene
 from hovi.scene.segmented_lagrangian import SegmentedLagrangian
+from hovi.system.dataclass import dataclass
 
 MAX_CHART_INTERVALS = 2000
 """Maximum number of intervals after halving for the orientations of the initial guess."""

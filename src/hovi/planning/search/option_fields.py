@@ -6,11 +6,12 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Any
 
 from hovi.checks.kinds import is_number, shown
 from hovi.errors import InputError, nearest
+from hovi.system.dataclass import dataclass
 
 MAX_WHOLE_NUMBER = 10**9
 """Largest value of an integer option without a maximum of its own."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -30,6 +29,7 @@ from hovi.planning.search.option_fields import (
 )
 from hovi.scene.scene import Scene
 from hovi.schemes import Scheme, by_name
+from hovi.system.dataclass import dataclass
 
 if TYPE_CHECKING:
     from hovi.planning.obstacles.grasped import Grasped

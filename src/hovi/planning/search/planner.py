@@ -36,6 +36,7 @@ from hovi.planning.solver.outcome.without_solve import infeasible_at_once
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
 from hovi.robot.robot import Robot
+from hovi.robot.space.angle_ranges import LOOKS
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
@@ -136,9 +137,9 @@ def plan(
     for bound in () if free is None else (free.lower, free.upper):
         job.grid.stretched(bound)  # raises for steps that are too short or too long
     problem = job.problem()  # raises for invalid input before the search
-    warn_of_ends(scene.robot, job.start, job.goal, chosen)
     longest = problem if free is None else problem.on(problem.grid.stretched(free.upper))
     found = findings(longest, *given)
+    warn_of_ends(scene.robot, job.start, job.goal, chosen, found.reason)
     for sentence in found.warnings:
         warn(sentence)
     if found.reason:
@@ -297,12 +298,18 @@ def _goal(goal: End, robot: Robot, options: PlanOptions) -> State | FrameGoal:
     return state if options.turns is None else dataclasses.replace(state, turns=options.turns)
 
 
-def warn_of_ends(robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions) -> None:
+def warn_of_ends(
+    robot: Robot, start: State, goal: State | FrameGoal, options: PlanOptions, told: str = ""
+) -> None:
     """Warn if the given configurations, in order of time, or what is grasped look like degrees or
-    millimetres."""
+    millimetres.
+
+    told: why there is no motion, if that is known; degrees that it tells of are not told again.
+    """
     for sentence in grasped_slips(options.grasped):
         warn(sentence)
     stops = sorted(options.via, key=lambda via: via.time)
     given = [start, *(via.goal for via in stops), goal]
     states = [each for each in given if isinstance(each, State)]
-    warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])
+    if LOOKS not in told:
+        warn_of_degrees(robot, [state.on(robot, "state")[0] for state in states])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from hovi.discrete.grid import Grid
 from hovi.discrete.trajectory import Trajectory
@@ -28,6 +27,7 @@ from hovi.planning.search.multistart import Exploration, Pool, default_processes
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.solver import Solution
 from hovi.planning.solver.status import Status
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError
 from hovi.system.interruption import interrupted, raise_if_interrupted, record_interrupt
 from hovi.system.progress import Progress

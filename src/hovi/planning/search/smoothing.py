@@ -13,7 +13,7 @@ import dataclasses
 import numpy as np
 
 from hovi.discrete.state import State
-from hovi.effects import JerkCost
+from hovi.effects.motion_cost import JerkCost
 from hovi.errors import InputError
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.robot.mass_matrix import MassMatrix

@@ -9,7 +9,7 @@ programming. Free velocities, limits and obstacles on the way are not part of th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.inverse_kinematics import Bounds, configurations, first_configuration
 from hovi.robot.robot import Robot
 from hovi.scene.lagrangian import Lagrangian
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 End = State | FrameGoal

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, fields
+from dataclasses import KW_ONLY, fields
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from hovi.planning.problem.units import SECONDS_IN_WORDS, seconds
 from hovi.planning.search.options import PlanOptions
 from hovi.robot.robot import Robot
 from hovi.scene.scene import as_effects
+from hovi.system.dataclass import dataclass
 
 MAX_SEGMENTS = 1000
 """Largest number of segments of a sequence."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -13,6 +12,7 @@ from hovi.optimize.trust_region import Stop
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.multipliers import Multipliers, Residuals
+from hovi.system.dataclass import dataclass
 
 INITIAL_TORQUE_PENALTY = 10.0
 """Initial penalty of passive torques, relative to the mean weight of the other joints."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from hovi.discrete.grid import DiscretePath, Grid
 from hovi.optimize.barrier import Barrier
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

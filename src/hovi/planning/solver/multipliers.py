@@ -13,7 +13,6 @@ negative eigenvalues are those of the Hessian on the tangent space of the constr
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +20,7 @@ import numpy.typing as npt
 from hovi.discrete.grid import DiscretePath
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.scene.lagrangian import PointTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import dataclasses
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,11 +25,9 @@ from hovi.planning.problem.notation.ends import End
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.problem.tolerance import LAST_BARRIER, REMAINING_SHARE, Accuracy
 from hovi.planning.problem.units import as_time_limit, seconds
-from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.initial_path import guess_path
 from hovi.planning.solver.limits.row_forces import at_instants
-from hovi.planning.solver.methods.choice import method_for
-from hovi.planning.solver.methods.interior_point import InteriorPoint
+from hovi.planning.solver.methods.choice import method_for, method_from
 from hovi.planning.solver.methods.method import Method, MethodResult, Report
 from hovi.planning.solver.methods.result_motion import motion_of
 from hovi.planning.solver.methods.stationary import Stationary
@@ -45,13 +43,17 @@ from hovi.planning.solver.receding.ends import (
     require_known,
 )
 from hovi.planning.solver.receding.last_motion import last_motion, meets
-from hovi.planning.solver.receding.shift import Shift
 from hovi.planning.solver.status import Status, unfinished
 from hovi.planning.solver.warm_start import follow
 from hovi.scene.lagrangian import PointTerms
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
 from hovi.system.interruption import interruptible, record_interrupt
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.central_path import CentralPath
+    from hovi.planning.solver.receding.shift import Shift
 
 MAX_CORRECTIONS = 6
 """Maximum number of quasi-Newton steps on the initial guess of `replan`."""
@@ -216,6 +218,8 @@ class Solution(SolutionSummary):
         Raises InputError if this solution has no problem, if it ends before the time, or if it is
         periodic, in segments, among moving obstacles, or of a scene that depends on time.
         """
+        from hovi.planning.solver.receding.shift import Shift
+
         deadline = Deadline(as_time_limit(time_limit))
         require_known(options, Solution.advance, solve_on_grid)
         old = self._solved_problem
@@ -297,9 +301,9 @@ class _Again:
         problem, path, goal = self.problem, self.path, self.problem.goal
         if isinstance(goal, FrameGoal) and not is_near(goal, problem, path):
             path = problem.moved_to_guesses(path)
-        if problem.limited and self.central is not None:
-            options = {"method": InteriorPoint(self.central)} | options
         options = {"time_limit": time_limit} | options
+        if problem.limited and self.central is not None:
+            options = {"method": method_from(self.central)} | options
         if problem.limited or not problem.plain:
             return solve_on_grid(problem, path, near=True, **options)
         found = solve_on_grid(problem, follow(path, problem, MAX_CORRECTIONS), **options)

@@ -21,7 +21,8 @@ from pydantic import (
     create_model,
 )
 
-from hovi.effects import REGISTRY, Effect
+from hovi.effects.effect import Effect
+from hovi.effects.registration import REGISTRY
 from hovi.errors import SceneError, nearest
 from hovi.planning.task_file.messages import Keys, TomlText, first_sentence
 from hovi.planning.task_file.schema import Table

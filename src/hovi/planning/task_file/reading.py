@@ -6,20 +6,18 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from hovi.checks.arguments import check_arguments
 from hovi.errors import HoviError, InputError, SceneError, SchemeError
-from hovi.planning.obstacles.grasped import Grasped
 from hovi.planning.obstacles.obstacle import Obstacle
 from hovi.planning.problem.tolerance import Tolerance
 from hovi.planning.problem.units import as_duration
 from hovi.planning.search.options import INTERVALS_TWICE, TOLERANCE_AND_SCHEME, PlanOptions
 from hovi.planning.task_file.effect_tables import read_effects
 from hovi.planning.task_file.goal_tables import read_end, read_via
-from hovi.planning.task_file.grasped_tables import read_grasped
 from hovi.planning.task_file.limit_tables import read_limits
 from hovi.planning.task_file.messages import TomlText, first_sentence
 from hovi.planning.task_file.scene_cache import (
@@ -40,6 +38,9 @@ from hovi.robot.robot import Robot
 from hovi.scene.scene import Scene
 from hovi.schemes import by_name
 from hovi.system.files import reason, require_file
+
+if TYPE_CHECKING:
+    from hovi.planning.obstacles.grasped import Grasped
 
 MAX_BYTES = 2_000_000
 """Maximum size of a scene file."""
@@ -75,7 +76,7 @@ def task_of(data: Mapping[str, Any], toml: TomlText, cache: SceneCache | None = 
     grasped, held = kept.get(
         "grasped",
         chosen(data, (*ROBOT_KEYS, "grasped")),
-        lambda: read_grasped(table.grasped, robot, toml),
+        lambda: _grasped(table, robot, toml),
     )
     scene = kept.get("scene", chosen(data, SCENE_KEYS), lambda: _scene(table, robot, toml))
     start = read_end(table.start, ("start",), held, toml)
@@ -135,6 +136,15 @@ def _obstacles(
     from hovi.planning.task_file.obstacle_tables import read_obstacles  # most tasks have none
 
     return read_obstacles(table.obstacles, options.clearance, robot, toml)
+
+
+def _grasped(table: ShapedTable, robot: Robot, toml: TomlText) -> tuple[tuple[Grasped, ...], Robot]:
+    """What the robot holds, and the robot that holds it."""
+    if not table.grasped:
+        return (), robot
+    from hovi.planning.task_file.grasped_tables import read_grasped  # most robots hold nothing
+
+    return read_grasped(table.grasped, robot, toml)
 
 
 def _scene(table: ShapedTable, robot: Robot, toml: TomlText) -> Scene:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, Tag, create_model
 
-from hovi.planning.obstacles.grasped import NEEDED
+from hovi.planning.obstacles.obstacle import GRASPED_KEYS
 from hovi.planning.problem.arms.limit_set import LimitSetName
 from hovi.planning.problem.units import DURATION_IN_WORDS, SECONDS_IN_WORDS
 from hovi.planning.search.option_fields import SceneKey, option_infos
@@ -197,9 +197,9 @@ class GraspedTable(Table):
     """[[grasped]]."""
 
     name: str = Field(default="grasped", description="the name of the object's link")
-    frame: str = Field(description=NEEDED["frame"])
-    mass: FiniteFloat = Field(gt=0, description=NEEDED["mass"])
-    shape: Any = Field(description=NEEDED["shape"])
+    frame: str = Field(description=GRASPED_KEYS["frame"])
+    mass: FiniteFloat = Field(gt=0, description=GRASPED_KEYS["mass"])
+    shape: Any = Field(description=GRASPED_KEYS["shape"])
     position: Direction | None = Field(default=None, description="a list of three finite numbers")
     rpy: Direction | None = Field(
         default=None, description="a list of three finite numbers: roll, pitch and yaw in radians"

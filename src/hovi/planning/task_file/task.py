@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Self
 
 from hovi.checks.arguments import check_arguments_except
@@ -24,6 +24,7 @@ from hovi.planning.sequence.segment import (
     names_of,
 )
 from hovi.scene.scene import Scene
+from hovi.system.dataclass import dataclass
 from hovi.system.summary import Summarized, Summary
 
 

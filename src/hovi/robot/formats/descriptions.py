@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import importlib
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
 from hovi.errors import ModelError, nearest
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,10 @@ DEGREE_STEP = 0.5
 """Angles in degrees are mostly whole numbers, or halves."""
 
 
+LOOKS = "looks like degrees"
+"""What every clause about an angle says."""
+
+
 def ranges_in_degrees(
     names: Sequence[str], angles: npt.NDArray[np.bool_], lower: Array, upper: Array
 ) -> str:
@@ -87,9 +91,21 @@ def angles_in_degrees(
     count = len(found) - 1
     more = f" ({count} more {'joint' if count == 1 else 'joints'} too)" if count else ""
     return (
-        f"{names[i]} is {largest:g} rad in a given configuration{more}, which looks like degrees: "
+        f"{names[i]} is {largest:g} rad in a given configuration{more}, which {LOOKS}: "
         f"{largest:g} degrees are {np.radians(largest):.4g} rad"
     )
+
+
+def beyond_in_degrees(angle: float, lower: float, upper: float) -> str:
+    """A clause about an angle more than a turn beyond a range that it meets in degrees; or "".
+
+    All in [rad].
+    """
+    if -2 * np.pi <= angle - lower and angle - upper <= 2 * np.pi:
+        return ""
+    if not (abs(angle) <= MAX_SUSPICIOUS and lower <= np.radians(angle) <= upper):
+        return ""
+    return f"which {LOOKS}: {angle:g} degrees are {np.radians(angle):.4g} rad"
 
 
 def rpy_in_degrees(rpy: Array) -> str:
@@ -104,4 +120,4 @@ def rpy_in_degrees(rpy: Array) -> str:
     if not whole.all():
         return ""
     shown, radians = (", ".join(f"{x:.4g}" for x in each) for each in (rpy, np.radians(rpy)))
-    return f"rpy = ({shown}) rad looks like degrees: these degrees are ({radians}) rad"
+    return f"rpy = ({shown}) rad {LOOKS}: these degrees are ({radians}) rad"

@@ -8,13 +8,12 @@ coordinates and continuous joints J is the identity.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.robot.space.compiled_charts import local_rates, rates
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Jet = tuple[Array, Array, Array]

@@ -5,13 +5,12 @@ portable: use the baseline instruction set instead of the fastest available one,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import groups as native
 from hovi.robot.space.groups import Layout
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +14,7 @@ from hovi.checks.shapes import numbers_of, require_rows
 from hovi.errors import InputError
 from hovi.robot.space.groups import GROUPS, SE2, SO2, Group, Layout, differenced, integrated
 from hovi.robot.space.joint_kinds import COMPOSITE, kind_of
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +15,7 @@ from hovi.robot.space.chart import Chart
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.robot.space.joint_kinds import LENGTH, Units
 from hovi.robot.space.pinocchio_configurations import UNIT_TOLERANCE, check_vector
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

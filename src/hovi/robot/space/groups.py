@@ -7,14 +7,13 @@ vectors are left-invariant: g (+) d = g exp(d).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import groups as native
 from hovi.checks.shapes import numbers_of
 from hovi.errors import InputError
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Layout = npt.NDArray[np.int64]

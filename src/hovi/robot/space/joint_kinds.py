@@ -5,12 +5,12 @@ No other code compares joint names: `kind_of` returns the kind of a joint.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import pinocchio as pin
 
 from hovi.robot.space.groups import SE2, SE3, SO2, SO3, Group
+from hovi.system.dataclass import dataclass
 
 KernelSupport = Literal["anywhere", "as base", "nowhere"]
 

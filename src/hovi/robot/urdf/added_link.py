@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from hovi.robot.urdf.check import checked_urdf
+from hovi.system.dataclass import dataclass
 
 _COLOR = "0.30 0.55 0.35 1"
 """Of a link that is added: green."""

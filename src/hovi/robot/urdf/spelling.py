@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from xml.etree.ElementTree import Element
 
 from hovi.robot.urdf.elements import CHILDREN, EXTENSIONS, PARENTS, attributes_of, tag_and_name
+from hovi.system.dataclass import dataclass
 
 MAX_UNKNOWN = 10_000
 """Maximum number of unknown names, so that a file full of them is refused in time."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +18,7 @@ from hovi.study.axes.samplers import SamplerName, sampled
 from hovi.study.axes.table_columns import table_columns
 from hovi.study.cells.axis import MAX_VALUES, Axis
 from hovi.study.cells.field_path import FieldPath
+from hovi.system.dataclass import dataclass
 
 Count = Annotated[int, Field(ge=1, le=MAX_VALUES)]
 _COUNT = f"a whole number from 1 to {MAX_VALUES:,}"

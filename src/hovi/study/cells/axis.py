@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, overload
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from hovi.errors import SceneError
 from hovi.study.cells.field_path import FieldPath
+from hovi.system.dataclass import dataclass
 
 MAX_VALUES = 10_000_000
 """Maximum number of values of an axis."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +11,7 @@ from hovi.errors import SceneError
 from hovi.study.cells.axis import Axis
 from hovi.study.cells.field_path import FieldPath
 from hovi.study.cells.template import Template, content_hash
+from hovi.system.dataclass import dataclass
 
 MAX_CELLS = 100_000_000
 """Maximum number of cells."""

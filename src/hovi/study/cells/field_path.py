@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Any
 
 from hovi.errors import SceneError
+from hovi.system.dataclass import dataclass
 
 MAX_LENGTH = 500
 """Maximum number of characters of a path."""

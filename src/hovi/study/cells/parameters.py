@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 from hovi.study.cells.axis import Axis
 from hovi.study.cells.field_path import FieldPath, spelled
+from hovi.system.dataclass import dataclass
 
 Kind = Literal["number", "whole", "truth", "text", "json"]
 Entry = tuple[str | int, ...]

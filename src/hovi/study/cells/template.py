@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from hovi.planning.task_file.scene_cache import SceneCache
 from hovi.planning.task_file.task import Task
 from hovi.robot.example_robots import example_robot
 from hovi.study.cells.field_path import FieldPath
+from hovi.system.dataclass import dataclass
 from hovi.system.files import names_file
 
 HASH_DIGITS = 32

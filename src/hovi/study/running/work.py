@@ -10,7 +10,6 @@ import socket
 import tempfile
 import time
 import warnings
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -33,6 +32,7 @@ from hovi.study.storage.journal import JournalWriter, StorageError, Stored
 from hovi.study.storage.rows import FAILED, REFUSED, UNREACHABLE, PlanRow
 from hovi.study.storage.samples import SampleFormat, Samples
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 from hovi.version import __version__
 
 LEAST_GAIN = 1e-6

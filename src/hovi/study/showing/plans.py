@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from hovi.errors import InputError, StudyError, nearest
 from hovi.study.cells.extras import require_extra
 from hovi.study.storage.tables import PLANS, RUNS, read_table
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

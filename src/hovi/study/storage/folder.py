@@ -7,12 +7,12 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
 from hovi.errors import StudyError
 from hovi.study.storage.journal import FOLDER
+from hovi.system.dataclass import dataclass
 from hovi.system.files import names_file, reason, require_file, whole_file
 
 ABOUT = "study.json"

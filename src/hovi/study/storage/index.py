@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from hovi.errors import StudyError
 from hovi.study.storage.journal import FOLDER, LINES, Stored, entry_of
 from hovi.study.storage.rows import PlanRow
+from hovi.system.dataclass import dataclass
 from hovi.system.files import reason
 
 

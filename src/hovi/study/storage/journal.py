@@ -12,9 +12,11 @@ import os
 import secrets
 import socket
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, Self
+
+from hovi.system.dataclass import dataclass
 
 FOLDER = "journal"
 """Of the lines and of what they refer to, in a study's folder."""

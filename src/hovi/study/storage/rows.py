@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, fields
 from typing import Any, Self
+
+from hovi.system.dataclass import dataclass
 
 REFUSED, UNREACHABLE, FAILED = "refused", "unreachable", "failed"
 """What became of a cell that was not planned: its scene is invalid, no configuration meets its

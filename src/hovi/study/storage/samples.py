@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.trajectory import Trajectory
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 SampleFormat = Literal["parquet", "zarr"]

@@ -7,13 +7,14 @@ are constant, so that equal motions give equal bytes.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, BinaryIO
 from zipfile import ZipFile, ZipInfo
 
 import numpy as np
 
 from hovi.study.storage.samples import Samples
+from hovi.system.dataclass import dataclass
 
 Shape = tuple[int, int, int, int]
 _MODE = 0o644

@@ -11,7 +11,6 @@ import html
 import queue
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
@@ -21,6 +20,7 @@ from hovi.errors import HoviError
 from hovi.planning.task_file.reading import load_task
 from hovi.planning.task_file.task_plan import plan_task
 from hovi.robot.bundled_models import example
+from hovi.system.dataclass import dataclass
 from hovi.viewing.meshcat_server import limited_server, open_listener
 from hovi.viewing.replay_session import page_of
 

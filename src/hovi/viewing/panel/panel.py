@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from hovi.errors import InputError
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.robot.model import frame_id
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.viewing.curves.colors import COLORS
 from hovi.viewing.curves.scheme_torque import scheme_torque
 from hovi.viewing.curves.unwrapped_angles import shown_names, unwrapped

@@ -73,7 +73,10 @@ def limited(**kinds: Any) -> dict[str, Any]:
 REFUSED: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     "a goal in degrees": (
         UR5 | {"goal": {"q": [60.0, -30.0, 20.0, 40.0, -50.0, 60.0]}},
-        ("'shoulder_pan_joint' at the goal is 60 rad, outside its limits [-6.28319, 6.28319]",),
+        (
+            "'shoulder_pan_joint' at the goal is 60 rad, outside its limits [-6.28319, 6.28319]",
+            "which looks like degrees: 60 degrees are 1.047 rad",
+        ),
     ),
     "a position in millimetres": (
         UR5 | {"goal": HANDLE | {"position": [457.0, 191.0, 300.0]}},
@@ -449,6 +452,14 @@ def test_a_task_without_a_motion_is_refused_with_the_reason(mistake: str, comman
     code, printed = command(task)
     assert code == 1
     assert message in printed
+
+
+def test_degrees_outside_limits_are_told_once(command: Any) -> None:
+    task, _ = REFUSED["a goal in degrees"]
+    _, warnings, message = sentences(task)
+    assert "degrees" in message
+    assert not any("degrees" in warning for warning in warnings)
+    assert command(task)[1].count("degrees are") == 1
 
 
 @pytest.mark.parametrize("mistake", WRONG)

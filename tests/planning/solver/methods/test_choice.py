@@ -8,7 +8,7 @@ import pytest
 from hovi.errors import InputError
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-from hovi.planning.solver.methods.choice import METHODS, method_for
+from hovi.planning.solver.methods.choice import all_methods, method_for
 from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Method
@@ -41,7 +41,7 @@ def test_the_first_method_that_suits_is_chosen(name: str, kind: type[Method]) ->
 
 def test_methods_that_suit_the_same_problem_find_the_same_minimum() -> None:
     problem = problem_of("two_link_reach", limits="none")
-    supporting = [method for method in METHODS if method.supports(problem)]
+    supporting = [method for method in all_methods() if method.supports(problem)]
     assert [type(method) for method in supporting] == [TrustRegion, AugmentedLagrangian]
     found = [solve_on_grid(problem, method=method) for method in supporting]
     assert all(solution.success for solution in found)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -16,6 +15,7 @@ from hovi.checks.arguments import check_arguments
 from hovi.errors import InputError, nearest
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
+from hovi.system.dataclass import dataclass
 
 LimitSetName = Literal[
     "fr3",

@@ -8,7 +8,6 @@ ones; and ends when a number of seeds in a row have led to no new configuration.
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -19,6 +18,7 @@ from hovi.dynamics.kinematic_chain import KinematicChain, read_kinematic_chain
 from hovi.planning.problem.frame_goal import FrameGoal
 from hovi.planning.problem.kinematics.damped_newton import candidates, inside
 from hovi.robot.robot import Robot
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 Array = npt.NDArray[np.float64]

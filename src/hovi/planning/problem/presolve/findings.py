@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from hovi.discrete.state import Periodic, State
 from hovi.planning.clearance.clearance import Clearance
 from hovi.planning.problem.contradictions import contradiction
@@ -13,6 +11,7 @@ from hovi.planning.problem.presolve.end_torques import held_still
 from hovi.planning.problem.presolve.legs import Stop, frame_too_far
 from hovi.planning.problem.presolve.length_slips import length_slips
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ most
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.planning.problem.limits import Limits
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Rests = npt.NDArray[np.intp]

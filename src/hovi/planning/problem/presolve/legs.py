@@ -8,7 +8,6 @@ there, a proof is tried, and what is not proven is a warning.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -24,6 +23,7 @@ from hovi.planning.problem.presolve.reach_in_boxes import proven_out_of_reach
 from hovi.robot.robot import Robot
 from hovi.robot.space.coordinates import Coordinates
 from hovi.robot.tip_frame import moves_frame
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -6,19 +6,20 @@ All of them may be meant, so that nothing is refused: what is far beyond a robot
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import coal
 import numpy as np
 import numpy.typing as npt
 
-from hovi.effects import Payload
 from hovi.planning.clearance.clearance import Clearance
-from hovi.planning.obstacles.grasped import Grasped
 from hovi.planning.obstacles.obstacle import Body, Obstacle
-from hovi.planning.obstacles.primitives import HalfSpace
 from hovi.planning.problem.presolve.frame_hints import FAR, MILLIMETRE, reach_of
 from hovi.robot.space.angle_ranges import rpy_in_degrees
 from hovi.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from hovi.planning.obstacles.grasped import Grasped
 
 Array = npt.NDArray[np.float64]
 
@@ -50,6 +51,14 @@ def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iter
             f"are {MILLIMETRE * clearance.margin:g} m."
         )
     yield from _long_slides(scene, q)
+    yield from _far_payloads(scene)
+
+
+def _far_payloads(scene: Scene) -> Iterator[str]:
+    if not any(effect.key == "payload" for effect in scene.effects):
+        return
+    from hovi.effects import Payload
+
     for effect in scene.effects:
         if isinstance(effect, Payload) and np.linalg.norm(effect.center) > FAR_CENTER:
             shown = ", ".join(f"{x:g}" for x in effect.center)
@@ -60,6 +69,8 @@ def length_slips(scene: Scene, clearance: Clearance, q: Sequence[Array]) -> Iter
 
 
 def _obstacle_slips(obstacle: Obstacle, reach: float) -> Iterator[str]:
+    from hovi.planning.obstacles.primitives import HalfSpace  # loaded with the first obstacle
+
     nearest = _distance_from_origin(obstacle)
     if nearest > max(FAR, MANY_REACHES * reach):
         yield (

@@ -14,7 +14,6 @@ The columns of fixed ends, such as h v0, change with T themselves: by the chain 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +22,7 @@ from hovi.discrete.contraction import Expansion
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.interval_batch import Jet
 from hovi.scene.lagrangian import PointExpansion, PointTerms
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

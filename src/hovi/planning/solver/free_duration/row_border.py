@@ -6,14 +6,13 @@ fixed, y is proportional to T^-j, so that dy/ds = -j y and d2y/ds2 = j^2 y for s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi._native import intervals as native
 from hovi.planning.solver.free_duration.duration_border import DurationBorder
 from hovi.planning.solver.limits.limit_rows import LimitRows, push_rows
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +11,7 @@ from hovi.checks.arguments import without_checks
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

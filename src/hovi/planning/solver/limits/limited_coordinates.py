@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import Grid
 from hovi.planning.problem.limits import Limits
 from hovi.robot.space.configuration_space import ConfigurationSpace
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

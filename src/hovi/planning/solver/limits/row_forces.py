@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from functools import cache
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,10 +14,12 @@ from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import Grid
 from hovi.discrete.instants import Instants
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.scene.lagrangian import PointTerms
 from hovi.schemes.control_points import control_degree, control_nodes
 from hovi.schemes.interval_curve import jet_rows
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.limits.limit_rows import LimitRows
 
 Array = npt.NDArray[np.float64]
 

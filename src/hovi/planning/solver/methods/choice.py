@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
-from hovi.planning.solver.methods.interior_point import InteriorPoint
-from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
 from hovi.planning.solver.methods.method import Method
 from hovi.planning.solver.methods.trust_region import TrustRegion
 
-METHODS: tuple[Method, ...] = (
-    TrustRegion(),
-    LagrangeNewton(),
-    AugmentedLagrangian(),
-    InteriorPoint(),
-)
-"""In order of cost; every problem is supported by one of them."""
+if TYPE_CHECKING:
+    from hovi.planning.solver.central_path import CentralPath
+
+
+def all_methods() -> Iterator[Method]:
+    """In order of cost; every problem is supported by one of them.
+
+    Each is imported when it is its turn: most problems need the first one only.
+    """
+    yield TrustRegion()
+    from hovi.planning.solver.methods.lagrange_newton import LagrangeNewton
+
+    yield LagrangeNewton()
+    from hovi.planning.solver.methods.augmented_lagrangian import AugmentedLagrangian
+
+    yield AugmentedLagrangian()
+    from hovi.planning.solver.methods.interior_point import InteriorPoint
+
+    yield InteriorPoint()
 
 
 def method_for(problem: TrajectoryProblem) -> Method:
     """The first method that supports a problem."""
-    return next(method for method in METHODS if method.supports(problem))
+    return next(method for method in all_methods() if method.supports(problem))
+
+
+def method_from(central: CentralPath) -> Method:
+    """The method that begins on the central path of another motion."""
+    from hovi.planning.solver.methods.interior_point import InteriorPoint
+
+    return InteriorPoint(central)

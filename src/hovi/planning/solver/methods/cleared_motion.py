@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +28,7 @@ from hovi.planning.solver.methods.motion_legs import Leg, joined, legs_of
 from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.push_out import pushed_out
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import raise_if_late
 
 ROUGH_BARRIER = 1e-2

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
+from typing import TYPE_CHECKING
 
 from hovi.discrete.grid import DiscretePath
 from hovi.discrete.instants import Instants
 from hovi.discrete.interval_batch import Jet
 from hovi.optimize.trust_region import Iteration, Options
 from hovi.planning.problem.problem import TrajectoryProblem
-from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.status import Status
 from hovi.scene.lagrangian import PointTerms
+from hovi.system.dataclass import dataclass
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.central_path import CentralPath
 
 Report = Callable[[int, float], None]
 """Called with the number of each step and the least cost so far."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +13,7 @@ from hovi.planning.clearance.clearance import DISTANCE_SCALE
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.clearance_outputs import EXTRA_CLEARANCE
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

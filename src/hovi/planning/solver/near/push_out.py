@@ -8,7 +8,6 @@ motion inside an obstacle were moved at once, it would leave it forwards and bac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +18,7 @@ from hovi.discrete.guess import Curve, stretched
 from hovi.discrete.state import State
 from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from hovi.planning.clearance.distances import Distances
 from hovi.planning.problem.limit_violation import AT_LIMIT, excess_along
 from hovi.planning.problem.limits import KINDS, Limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

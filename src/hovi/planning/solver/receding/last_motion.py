@@ -6,6 +6,8 @@ torque where joints are passive.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
 
@@ -17,9 +19,11 @@ from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.action_objective import ActionObjective
 from hovi.planning.solver.augmented_lagrangian_rounds import FEASIBLE_RESIDUAL, within
-from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.methods.method import MethodResult
 from hovi.planning.solver.status import Status
+
+if TYPE_CHECKING:
+    from hovi.planning.solver.central_path import CentralPath
 
 Array = npt.NDArray[np.float64]
 

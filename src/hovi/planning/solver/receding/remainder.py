@@ -6,7 +6,6 @@ the motion stays as it is and as accurate, to rounding where the configurations 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +20,7 @@ from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.limits.limit_rows import LimitRows
 from hovi.robot.space.configuration_space import ConfigurationSpace
 from hovi.schemes.interval_curve import end_basis, gamma, jet_rows
+from hovi.system.dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

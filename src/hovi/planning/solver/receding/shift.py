@@ -7,7 +7,6 @@ the whole motion has: a horizon that moves keeps its grid.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +22,7 @@ from hovi.planning.problem.goals import Via
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.central_path import CentralPath
 from hovi.planning.solver.receding.remainder import Array, Index, Remainder
+from hovi.system.dataclass import dataclass
 
 SPACING = 8.0
 """Least ratio of barrier parameters of the points that are kept of a central path."""
