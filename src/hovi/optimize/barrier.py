@@ -161,8 +161,8 @@ class Barrier:
     def handed_on(self, y: Array, new: Index, beside: Index) -> Barrier:
         """New outputs that are below their lower bounds take over the forces of those beside them.
 
-        It is foreseen that all of these rise together until the new ones are at their bounds: slacks
-        are where they will be then, with products z gap of mu.
+        It is foreseen that all of these rise together until the new ones are at their bounds:
+        slacks are where they will be then, with products z gap of mu.
         y: outputs, (R,). new, beside: see Refinement.handed.
         """
         rise = np.maximum(self.bounds.lower[new] - y[new], 0.0)

@@ -154,7 +154,7 @@ class ClearanceRows:
         return self._add(problem, path, found)
 
     def sharpen(self, path: DiscretePath) -> bool:
-        """Round the shapes of rows less that have come nearer to their bounds; whether there are any.
+        """Round shapes less in rows that have come nearer to their bounds; whether there are any.
 
         Their outputs grow by that. Shapes that are rounder than their pair is far bend the motion
         less, and so steps may be longer; at a bound they are nearly as they are.
@@ -250,7 +250,7 @@ class ClearanceRows:
         pairs: Index,
         rounding: Array,
     ) -> None:
-        """Take rows: their intervals, positions in these, numbers of their pairs and rounding, (E,)."""
+        """Take rows: their intervals, positions in these, numbers of pairs, and rounding, (E,)."""
         self.grid: Grid = problem.grid
         self._problem = problem
         self.intervals, self.positions, self.pairs = intervals, positions, pairs
