@@ -81,6 +81,8 @@ LEAST_CUT_RADIUS = 1e-3
 SHORTENED = 0.3
 """Ratio of the radius after such a step while outputs are not matched; its square, where the step
 was refused."""
+MOST_HANDED = 5e-3
+"""How far outside its bounds a new output may be that takes over the forces of those beside it."""
 OUTSIDE_RADIUS = 3.0
 """The largest radius when outputs are added outside of their bounds."""
 DENSITY_FLOOR = 1e-9
@@ -350,8 +352,10 @@ class _Iteration(BoundedSteps[X]):
         if beyond[len(found.kept) :].any():
             self.radius = min(self.radius, OUTSIDE_RADIUS)
         if found.handed is not None:
-            barrier = barrier.handed_on(outputs.y, *found.handed)
-            beyond[found.handed[0]] = 0.0
+            new, beside = found.handed
+            near = beyond[new] <= MOST_HANDED
+            barrier = barrier.handed_on(outputs.y, new[near], beside[near])
+            beyond[new[near]] = 0.0
         outside = float(beyond[len(found.kept) :].max(initial=0.0))
         mu = min(REOPENED * outside, MOST_REOPENED) * self.density
         if mu > barrier.mu:  # room for the others to move

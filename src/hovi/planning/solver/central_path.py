@@ -56,13 +56,14 @@ class CentralPath:
         return dataclasses.replace(self, points=(*self.points[:-1], (self.level, path)))
 
     def on(self, grid: Grid, paths: tuple[DiscretePath, ...]) -> CentralPath:
-        """The same with other paths, on a grid of the same intervals, and with its limits fixed."""
+        """The same with other paths, on a grid of the same intervals, and with its rows fixed."""
         rows = None if self.rows is None else self.rows.fixed_on(grid)
-        near = None if self.near is None else self.near.copied()
+        near = None if self.near is None else self.near.copied(fixed=True)
         levels = (level for level, _ in self.points)
         return CentralPath(tuple(zip(levels, paths, strict=True)), rows, near=near)
 
     def freed(self) -> CentralPath:
-        """The same with limits that may be refined."""
+        """The same with rows that may be refined."""
         rows = None if self.rows is None else self.rows.freed()
-        return dataclasses.replace(self, rows=rows)
+        near = None if self.near is None else self.near.copied(fixed=False)
+        return dataclasses.replace(self, rows=rows, near=near)

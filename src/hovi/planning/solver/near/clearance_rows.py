@@ -62,7 +62,7 @@ class ClearanceRows:
 
     def __init__(self, problem: TrajectoryProblem, distances: Distances, least: float) -> None:
         self.distances, self.least = distances, least
-        self.guard = GUARD
+        self.fixed, self.guard = False, GUARD
         self.handed: tuple[Index, Index] | None = None
         self.probing = self.blocked = self.watchful = False
         self.order: Index = np.zeros(0, dtype=np.intp)
@@ -72,9 +72,11 @@ class ClearanceRows:
         none = np.zeros(0, dtype=np.intp)
         self._set(problem, none, np.zeros(0), none, np.zeros(0))
 
-    def copied(self) -> ClearanceRows:
-        """The same rows, to be extended on their own."""
-        return copy.copy(self)
+    def copied(self, fixed: bool = False) -> ClearanceRows:
+        """The same rows, to be extended on their own, or not at all."""
+        rows = copy.copy(self)
+        rows.fixed = fixed
+        return rows
 
     def on(self, problem: TrajectoryProblem) -> ClearanceRows:
         """The same rows of another problem, on as many intervals."""
@@ -146,6 +148,8 @@ class ClearanceRows:
         While they are `probing`, the first motion that does not keep its distances sets `blocked`.
         ahead: distance beyond the least one up to which a pair counts as near, in [m].
         """
+        if self.fixed:
+            return 0
         found = approaches_along(problem, path, self.distances, self.least, ahead)
         if self.probing and found.nearest < self.least:
             self.blocked = True
@@ -187,11 +191,15 @@ class ClearanceRows:
 
         At the positions that near pairs have rows at.
         """
+        if self.fixed:
+            return -np.inf
         hidden = np.where(self._watched, self.least - self._spread_distances(path), -np.inf)
         return float(hidden.max(initial=-np.inf))
 
     def follow(self, path: DiscretePath) -> int:
         """Add rows where pairs without rows have come near; returns how many."""
+        if self.fixed:
+            return 0
         d = self._spread_distances(path)
         found = spread_approaches(d, self._watched, self.least, self.guard)
         return self._add(self._problem, path, found)
