@@ -26,7 +26,11 @@ from hovi.planning.solver.methods.bounded_search import (
 )
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.penalized_action import PenalizedAction
+from hovi.planning.solver.penalized_action import (
+    LeastViolation,
+    PenalizedAction,
+    least_violation,
+)
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the mean density, if the interior point fails."""
@@ -61,6 +65,8 @@ WARM_STEPS = 100
 """Its maximum number of steps."""
 SHIFT_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
+SAME_VIOLATION = 0.5
+"""Relative difference of the squares up to which two motions of least violation are taken as one."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
@@ -76,6 +82,10 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if search.near is not None:
         failed = outcome.stop is Stop.DIVERGED and not outcome.feasible
         return outcome, search.worst(outcome.x) if failed else ""
+    if outcome.stop is Stop.DIVERGED and not outcome.feasible:
+        reason = _locally_infeasible(search, outcome)
+        if reason or outcome.stop in STOPPED:
+            return outcome, reason
     if outcome.stop is Stop.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(path)
@@ -228,6 +238,36 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
     return result.x if np.isfinite(result.value) else path
 
 
+def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
+    """Why there is no motion within limits, where attempts from two motions meet at one of least
+    violation: from that of a failed solve and from a perturbed guess; else "".
+
+    That motion becomes the outcome's.
+    """
+    if search.problem.constrained or search.clearance is not None:
+        return ""
+    rows, search.rows = search.rows, search.fine_rows()
+    objective = search.objective(None)
+    density = mean_density(outcome.outputs, objective.bounds.measure)
+    found: list[LeastViolation] = []
+    for path in (outcome.x, _bumped_guess(search, 0)):
+        each = least_violation(objective, path, density, search.remaining_options())
+        search.iterations += each.steps
+        found.append(each)
+        if each.stop in STOPPED:
+            outcome.stop = each.stop
+        if not each.least or each.violation <= SMALL_VIOLATION:
+            search.rows = rows
+            return ""
+    if abs(found[0].squares - found[1].squares) > SAME_VIOLATION * found[0].squares:
+        search.rows = rows
+        return ""
+    outcome.x = min(found, key=lambda each: each.squares).path
+    outcome.outputs = objective.outputs(outcome.x)
+    outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
+    return search.worst(outcome.x)
+
+
 def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     """Further attempts from motions of small violation; or the reason for infeasibility."""
     constrained = search.problem.constrained
@@ -276,11 +316,15 @@ def _without_forces(
 def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
     """The guess, then perturbations of it."""
     yield search.guess
+    for seed in range(BUMPED_GUESSES):
+        yield _bumped_guess(search, seed)
+
+
+def _bumped_guess(search: BoundedSearch, seed: int) -> DiscretePath:
     problem = search.problem
     T = problem.grid.duration
-    base = stretched(search.problem.trajectory(search.guess), T, problem.ld.k)
-    for seed in range(BUMPED_GUESSES):
-        yield problem.path(with_bump(base, problem.coordinates, T, seed))
+    base = stretched(problem.trajectory(search.guess), T, problem.ld.k)
+    return problem.path(with_bump(base, problem.coordinates, T, seed))
 
 
 def _penalized(
