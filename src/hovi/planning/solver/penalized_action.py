@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hovi.discrete.grid import DiscretePath
+from hovi.optimize.bounded_objective import Outputs
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Objective, Options, Stop, minimize
 from hovi.planning.solver.bounded_action import BoundedAction
@@ -21,7 +22,7 @@ Array = npt.NDArray[np.float64]
 
 LEAST_VIOLATION_PENALTY = 1e6
 """Penalty, relative to the mean density of the action, at which the violation outweighs it."""
-STALLED = 0.05
+STALLED = 0.1
 """Share by which some steps have to decrease it; else it is near its least value."""
 MAX_STEPS = 40
 """Maximum number of steps."""
@@ -35,6 +36,7 @@ class PenalizedAction(Objective[DiscretePath]):
     def __init__(self, limited: BoundedAction, penalty: float) -> None:
         self.limited = limited
         self.penalty = penalty
+        self._last: tuple[DiscretePath, Outputs] | None = None
 
     def violation(self, x: DiscretePath) -> float:
         """Largest distance outside the bounds, as a share of the range."""
@@ -42,7 +44,7 @@ class PenalizedAction(Objective[DiscretePath]):
 
     def value(self, x: DiscretePath) -> float:
         """The penalized action."""
-        return self.limited.outputs(x).value + 0.5 * self.penalty * self.squares(x)
+        return self._outputs(x).value + 0.5 * self.penalty * self.squares(x)
 
     def squares(self, x: DiscretePath) -> float:
         """Sum weights (distance outside the bounds)^2."""
@@ -64,8 +66,13 @@ class PenalizedAction(Objective[DiscretePath]):
         """As for the action."""
         return self.limited.action.relative_size(x, step, model)
 
+    def _outputs(self, x: DiscretePath) -> Outputs:
+        if self._last is None or self._last[0] is not x:
+            self._last = x, self.limited.outputs(x)
+        return self._last[1]
+
     def _outside(self, x: DiscretePath) -> Array:
-        y, bounds = self.limited.outputs(x).y, self.limited.bounds
+        y, bounds = self._outputs(x).y, self.limited.bounds
         return np.asarray(np.maximum(y - bounds.upper, 0) - np.maximum(bounds.lower - y, 0))
 
 
@@ -73,11 +80,12 @@ class PenalizedAction(Objective[DiscretePath]):
 class LeastViolation:
     """A motion near one of least violation.
 
-    violation: the largest, as a share of its range. squares: sum weights (distance outside)^2.
-    least: whether the violation is near a minimum, which is not zero. stop: see Stop.
+    value: the action. violation: the largest, as a share of its range. squares: sum weights
+    (distance outside)^2. least: whether the violation is near a minimum, which is not zero.
     """
 
     path: DiscretePath
+    value: float
     violation: float
     squares: float
     least: bool
@@ -96,8 +104,9 @@ def least_violation(
     steps = min(MAX_STEPS, options.max_iterations)
     options = dataclasses.replace(options, max_iterations=steps, stalled=STALLED)
     found = minimize(penalized, path, options)
-    squares = penalized.squares(found.x)
-    outweighed = found.value - 0.5 * penalized.penalty * squares <= OUTWEIGHED * found.value
-    least = found.stop in (Stop.STALLED, Stop.STATIONARY) and outweighed
-    violation = penalized.violation(found.x)
-    return LeastViolation(found.x, violation, squares, least, found.iterations, found.stop)
+    squares, violation = penalized.squares(found.x), penalized.violation(found.x)
+    action = found.value - 0.5 * penalized.penalty * squares
+    least = found.stop in (Stop.STALLED, Stop.STATIONARY) and action <= OUTWEIGHED * found.value
+    return LeastViolation(
+        found.x, action, violation, squares, least, found.iterations, found.stop
+    )

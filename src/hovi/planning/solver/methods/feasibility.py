@@ -65,8 +65,10 @@ WARM_STEPS = 100
 """Its maximum number of steps."""
 SHIFT_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
-SAME_VIOLATION = 0.5
-"""Relative difference of the squares up to which two motions of least violation are taken as one."""
+SAME_VIOLATION = 1.5
+"""Ratio of the squares up to which two minima of the violation are taken as one."""
+BUMP_SHARE = 0.3
+"""Share of a perturbation of the guess that keeps it near enough for few steps."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
@@ -239,10 +241,10 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
 
 
 def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
-    """Why there is no motion within limits, where attempts from two motions meet at one of least
-    violation: from that of a failed solve and from a perturbed guess; else "".
+    """Why no motion within limits is near, where the violation has minima that are not zero; else "".
 
-    That motion becomes the outcome's.
+    These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
+    If all three find one, and two of them the lowest, that becomes the outcome's motion.
     """
     if search.problem.constrained or search.clearance is not None:
         return ""
@@ -250,22 +252,24 @@ def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
     objective = search.objective(None)
     density = mean_density(outcome.outputs, objective.bounds.measure)
     found: list[LeastViolation] = []
-    for path in (outcome.x, _bumped_guess(search, 0)):
+    for path in (outcome.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
         each = least_violation(objective, path, density, search.remaining_options())
         search.iterations += each.steps
         found.append(each)
         if each.stop in STOPPED:
             outcome.stop = each.stop
         if not each.least or each.violation <= SMALL_VIOLATION:
-            search.rows = rows
-            return ""
-    if abs(found[0].squares - found[1].squares) > SAME_VIOLATION * found[0].squares:
-        search.rows = rows
-        return ""
-    outcome.x = min(found, key=lambda each: each.squares).path
-    outcome.outputs = objective.outputs(outcome.x)
-    outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
-    return search.worst(outcome.x)
+            break
+    else:
+        most = SAME_VIOLATION * min(each.squares for each in found)
+        same = [each for each in found if each.squares <= most]
+        if len(same) > 1:
+            outcome.x = min(same, key=lambda each: each.value).path
+            outcome.outputs = objective.outputs(outcome.x)
+            outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
+            return search.worst(outcome.x)
+    search.rows = rows
+    return ""
 
 
 def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
@@ -320,11 +324,11 @@ def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
         yield _bumped_guess(search, seed)
 
 
-def _bumped_guess(search: BoundedSearch, seed: int) -> DiscretePath:
+def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
     problem = search.problem
     T = problem.grid.duration
     base = stretched(problem.trajectory(search.guess), T, problem.ld.k)
-    return problem.path(with_bump(base, problem.coordinates, T, seed))
+    return problem.path(with_bump(base, problem.coordinates, T, seed, share))
 
 
 def _penalized(
