@@ -79,7 +79,8 @@ class BoundedSearch:
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve.
     points: of the central path, with a larger barrier than that of the last solution.
-    along, level: see InteriorPoint. plain: see minimize_bounded.
+    along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
+        MethodResult.
     """
 
     problem: TrajectoryProblem
@@ -94,6 +95,7 @@ class BoundedSearch:
     level: float | None = None
     plain: bool = False
     lazy: bool = False
+    locally_infeasible: bool = False
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.options.time_limit)

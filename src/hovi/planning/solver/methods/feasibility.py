@@ -267,6 +267,7 @@ def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
             outcome.x = min(same, key=lambda each: each.value).path
             outcome.outputs = objective.outputs(outcome.x)
             outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
+            search.locally_infeasible = True
             return search.worst(outcome.x)
     search.rows = rows
     return ""
