@@ -107,6 +107,4 @@ def least_violation(
     squares, violation = penalized.squares(found.x), penalized.violation(found.x)
     action = found.value - 0.5 * penalized.penalty * squares
     least = found.stop in (Stop.STALLED, Stop.STATIONARY) and action <= OUTWEIGHED * found.value
-    return LeastViolation(
-        found.x, action, violation, squares, least, found.iterations, found.stop
-    )
+    return LeastViolation(found.x, action, violation, squares, least, found.iterations, found.stop)
