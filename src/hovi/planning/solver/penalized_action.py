@@ -1,4 +1,4 @@
-"""The action with quadratic penalties instead of limits: restores feasibility, or shows there is none.
+"""The action with quadratic penalties instead of limits, to restore feasibility, or to refute it.
 
 A motion at which the violation has a minimum that is not zero is locally infeasible: none near it
 violates the limits less. [NocedalWright2006, section 17.2]

@@ -241,7 +241,7 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
 
 
 def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
-    """Why no motion within limits is near, where the violation has minima that are not zero; else "".
+    """Why no motion is within limits, if their violation has minima that are not zero; else "".
 
     These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
     If all three find one, and two of them the lowest, that becomes the outcome's motion.
