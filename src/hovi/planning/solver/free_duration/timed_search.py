@@ -79,7 +79,10 @@ class TimedSearch(BoundedSearch):
         self.rows = objective.rows
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
-        return self._at_its_duration(found, objective)
+        outcome = self._at_its_duration(found, objective)
+        if outcome.stop is Stop.STATIONARY and outcome.marks:
+            self._followed(outcome, objective.at(found.x.duration))
+        return outcome
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, roughly."""
@@ -99,14 +102,18 @@ class TimedSearch(BoundedSearch):
         self, found: BoundedOutcome[TimedPath], objective: TimedBoundedAction
     ) -> Bounded:
         """The outcome for the problem of its duration, whose points weigh more or less."""
-        share, barrier = objective.share(found.x.duration), found.barrier
-        price = self.price.weight * found.x.duration
+        T, barrier = found.x.duration, found.barrier
+        share, price = objective.share(T), self.price.weight * T
+        marks = [
+            (share * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
+            for product, x in found.marks
+        ]
         return BoundedOutcome(
             found.x.path,
             Outputs(found.outputs.value - price, found.outputs.y),
             dataclasses.replace(
                 barrier,
-                bounds=objective.at(found.x.duration).bounds,
+                bounds=objective.at(T).bounds,
                 zl=share * barrier.zl,
                 zu=share * barrier.zu,
                 mu=share * barrier.mu,
@@ -115,6 +122,7 @@ class TimedSearch(BoundedSearch):
             found.iterations,
             found.history,
             found.model,
+            marks=marks,
         )
 
     def negative_eigenvalues(self, outcome: Bounded) -> int:
@@ -143,8 +151,20 @@ def _searched(search: TimedSearch) -> MethodResult:
         curved = f"{n_neg} directions of negative curvature"
         status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
     instants, forces = search.forces(outcome)
-    history, message = search.history, f"{what}."
-    return MethodResult(problem, x, value, status, message, steps, n_neg, history, forces, instants)
+    central = search.central_path(outcome) if status is Status.MINIMUM else None
+    return MethodResult(
+        problem,
+        x,
+        value,
+        status,
+        f"{what}.",
+        steps,
+        n_neg,
+        search.history,
+        forces,
+        instants,
+        central=central,
+    )
 
 
 def _at_the_points(search: TimedSearch) -> Bounded:
