@@ -32,6 +32,8 @@ LAST_DECREASE = 1e-11
 relative error of the slope in the duration."""
 ROUGH_DECREASE = 1e-3
 """Relative decrease at which the motion of the first duration is good enough to be stretched."""
+SAME_DURATION = 1e-1
+"""Relative difference of a duration from the last one up to which a motion is on the way to it."""
 ROUGH_BARRIER = 1e-2
 """Its last barrier parameter, with which the next solve begins."""
 
@@ -64,6 +66,7 @@ class TimedSearch(BoundedSearch):
     price: of time.
     """
 
+    timed = True
     price: TimePrice = dataclasses.field(kw_only=True)
 
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
@@ -80,6 +83,7 @@ class TimedSearch(BoundedSearch):
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
         outcome = self._at_its_duration(found, objective)
+        self.points = []  # these are of other durations
         if outcome.stop is Stop.STATIONARY and outcome.marks:
             self._followed(outcome, objective.at(found.x.duration))
         return outcome
@@ -107,6 +111,7 @@ class TimedSearch(BoundedSearch):
         marks = [
             (share * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
             for product, x in found.marks
+            if abs(T / x.duration - 1.0) <= SAME_DURATION
         ]
         return BoundedOutcome(
             found.x.path,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -79,10 +80,12 @@ class BoundedSearch:
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve.
     points: of the central path, with a larger barrier than that of the last solution.
+    timed: whether the duration is free.
     along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
         MethodResult.
     """
 
+    timed: ClassVar[bool] = False
     problem: TrajectoryProblem
     limits: Limits
     options: Options

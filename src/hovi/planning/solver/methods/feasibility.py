@@ -246,7 +246,7 @@ def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
     These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
     If all three find one, and two of them the lowest, that becomes the outcome's motion.
     """
-    if search.problem.constrained or search.clearance is not None:
+    if search.problem.constrained or search.clearance is not None or search.timed:
         return ""
     rows, search.rows = search.rows, search.fine_rows()
     objective = search.objective(None)
