@@ -261,8 +261,9 @@ def test_the_central_path_of_a_free_duration_is_one_of_its_last_duration(
     assert min(costs) >= found.cost * (1.0 - 1e-9)
     method = InteriorPoint(found.central.freed())
     again = solve_on_grid(found.problem, found.trajectory.path, method=method, near=True)
-    assert again.nit <= 10
-    assert again.cost == pytest.approx(found.cost, rel=1e-6)
+    cold = solve_on_grid(found.problem)
+    assert again.nit < 0.7 * cold.nit
+    assert again.cost == pytest.approx(found.cost, rel=1e-4)
 
 
 def test_the_bounded_action_at_a_duration_is_that_of_its_problem(two_link: hovi.Robot) -> None:
