@@ -278,7 +278,7 @@ def test_the_bounded_action_at_a_duration_is_that_of_its_problem(two_link: hovi.
     assert at.outputs(path).value == pytest.approx(built.outputs(path).value, rel=1e-13)
     for name in ("lower", "upper", "weights"):
         assert np.allclose(getattr(at.bounds, name), getattr(built.bounds, name), rtol=1e-13)
-    assert at.bounds.measure == built.bounds.measure
+    assert at.bounds.measure == pytest.approx(built.bounds.measure, rel=1e-14)
     sigma, rho, force = np.random.default_rng(0).random((3, len(at.bounds.lower)))
     models = [each.model(path, sigma, rho, force) for each in (at, built)]
     assert np.allclose(models[0].gradient, models[1].gradient, rtol=1e-10)

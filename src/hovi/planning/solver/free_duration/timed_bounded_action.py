@@ -28,8 +28,8 @@ from hovi.planning.solver.limits.limit_rows import LimitRows
 Array = npt.NDArray[np.float64]
 
 
-DURATION_METRIC = 100.0
-"""Entry of log T in the metric: with the first radius of 10 it may change by 1, since only longer
+DURATION_METRIC = 400.0
+"""Entry of log T in the metric: with the first radius of 20 it may change by 1, since only longer
 motions may be within the limits at all."""
 
 
@@ -43,7 +43,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     duration T0. limits, margins, rows: as for BoundedAction. price: of time.
     """
 
-    radii = 10.0, 10.0  # a long step in time leads to another motion
+    radii = 20.0, 20.0  # a long step in time leads to another motion
 
     def __init__(
         self,
