@@ -514,3 +514,19 @@ def test_no_step_is_taken_once_only_rounding_remains(cubic: float) -> None:
     left = [x**2 / 2 + cubic * x**3 for x in iterates]
     assert left[-1] <= 1e-26 < left[-2]
     assert found.x[0] == pytest.approx(iterates[-1], abs=1e-16)
+
+
+def test_it_ends_where_some_steps_together_decrease_the_value_by_a_small_share() -> None:
+    """Far above the minimum, in the valley, where it goes on without that option."""
+    start, share = np.array([-1.2, 1.0] * 5), 0.3
+    problem = objective(10, chained_rosenbrock)
+    first = problem.value(start)
+    whole = minimize(problem, start, Options())
+    found = minimize(problem, start, Options(stalled=share))
+    assert whole.stop is Stop.STATIONARY
+    assert found.stop is Stop.STALLED
+    assert found.iterations < whole.iterations
+    values = np.minimum.accumulate([first, *(each.value for each in found.history)])
+    decreases = 1.0 - values[5:] / values[:-5]
+    assert decreases[-1] < share
+    assert (decreases[:-1] >= share).all()

@@ -92,18 +92,20 @@ def in_chart(
     return coordinates.chart.jet(np.broadcast_to(q0, (len(x), coordinates.nq)), x, dx, ddx)
 
 
-def with_bump(base: Curve, coordinates: Coordinates, duration: float, seed: int) -> Curve:
+def with_bump(
+    base: Curve, coordinates: Coordinates, duration: float, seed: int, share: float = 1.0
+) -> Curve:
     """A curve plus a smooth random bump that vanishes with its rate at both ends.
 
     x(t) = sum_j c_j sin(pi t/T) sin(j pi t/T), j = 1 .. 8, with c_j normally distributed,
     decreasing like 1/sqrt(j), and scaled by a random amplitude of up to about half a turn.
 
     base: the curve, up to the jerk on vector spaces. duration: T, in [s]. seed: of the
-        coefficients.
+        coefficients. share: of the bump that is added.
     """
     random = np.random.default_rng(seed)
     j = np.arange(1, BUMP_MODES + 1)
-    amplitude = random.uniform(*BUMP_AMPLITUDES)
+    amplitude = share * random.uniform(*BUMP_AMPLITUDES)
     c = amplitude * random.standard_normal((BUMP_MODES, coordinates.nv)) / np.sqrt(j)[:, None]
     w = np.pi / duration
 

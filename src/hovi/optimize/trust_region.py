@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Generic, NamedTuple, TypeVar
@@ -38,6 +39,8 @@ SIZE_TEST_LENGTH = 1e-4
 """Step length, relative to the first radius, up to which the relative size is evaluated."""
 LAST_DECREASE = 1e-14
 """Relative predicted decrease below which an exact Newton step is the last in any case."""
+STALLED_STEPS = 5
+"""Steps whose decrease together tells whether the iteration has stalled: see Options.stalled."""
 REMAINING_DECREASE = 1e-26
 """Estimated relative decrease that may remain after the last step; its square root is the relative
 error of the point."""
@@ -51,6 +54,7 @@ class Stop(StrEnum):
     TIME_LIMIT = "time_limit"
     INTERRUPTED = "interrupted"
     DIVERGED = "diverged"
+    STALLED = "stalled"
 
 
 class Objective(ABC, Generic[X]):
@@ -93,6 +97,8 @@ class Options:
     barrier: last barrier parameter, relative to the mean density of the objective.
     enough: with a barrier, stop within the bounds where a whole Newton step predicts a smaller
         decrease, relative to the value, even if it would be cut short.
+    stalled: without a barrier, stop where STALLED_STEPS steps together have decreased the value by
+        a smaller share.
     """
 
     decrease: float = 1e-11
@@ -105,6 +111,7 @@ class Options:
     near: bool = False
     barrier: float = 1e-10
     enough: float = 0.0
+    stalled: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -195,6 +202,7 @@ def _iterate(
     raise_if_interrupted()
     raise_if_late()
     radius, shift = options.radius, 0.0
+    values = deque([outcome.value], STALLED_STEPS + 1)
     model, exact, before = objective.model(outcome.x, None, None), True, math.inf
     while outcome.iterations < options.max_iterations:
         raise_if_interrupted()
@@ -223,6 +231,10 @@ def _iterate(
         if last or (settled and not accepted):
             outcome.stop, outcome.convex = Stop.STATIONARY, exact
             return
+        values.append(outcome.value)
+        if len(values) > STALLED_STEPS and _has_stalled(values, options):
+            outcome.stop = Stop.STALLED
+            return
         shift = next_shift(trial.shift, trial.norm, radius)
         if accepted:
             before = trial.decrease if trial.newton else math.inf
@@ -232,6 +244,10 @@ def _iterate(
         elif radius < 1e-14 * options.radius:
             outcome.stop = Stop.DIVERGED
             return
+
+
+def _has_stalled(values: Sequence[float], options: Options) -> bool:
+    return values[0] - values[-1] < options.stalled * abs(values[0])
 
 
 def _is_stationary(

@@ -8,10 +8,11 @@ import pytest
 from hovi.discrete.discrete_lagrangian import DiscreteLagrangian
 from hovi.discrete.grid import DiscretePath, Grid
 from hovi.discrete.state import State
+from hovi.optimize.trust_region import Options
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.solver.bounded_action import BoundedAction
-from hovi.planning.solver.penalized_action import PenalizedAction
+from hovi.planning.solver.penalized_action import PenalizedAction, least_violation
 from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 from hovi.schemes import galerkin
@@ -89,3 +90,29 @@ def test_motions_within_the_bounds_have_no_penalty(arm_scene: Scene) -> None:
     still = guess_path(problem, "cubic")
     assert penalized.violation(still) == 0.0
     assert penalized.value(still) == pytest.approx(ld.action(still), rel=1e-14)
+
+
+def test_the_least_violation_of_a_mean_velocity_above_its_bound(arm_scene: Scene) -> None:
+    """A joint that moves by 1.2 rad in 1 s, at up to 1 rad/s, exceeds that by 0.2 on average.
+
+    So the integral of the squares, as shares of the range of 2 rad/s, is at least 0.01.
+    """
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 16, galerkin(2)))
+    problem = TrajectoryProblem(ld, State([-1.2, 0.2], [1.2, 0.0]), State([0.0, 0.2], [1.2, 0.0]))
+    limited = BoundedAction(problem, as_limits(arm_scene.robot, {"base": "none", "v": 1.0}))
+    found = least_violation(limited, guess_path(problem, "cubic"), 1.0, Options())
+    assert found.least
+    assert 0.01 <= found.squares <= 0.0115
+    assert found.value == pytest.approx(ld.action(found.path), rel=1e-12)
+    assert found.violation == PenalizedAction(limited, 1.0).violation(found.path)
+
+
+def test_bounds_that_a_motion_can_meet_have_no_least_violation(arm_scene: Scene) -> None:
+    ld = DiscreteLagrangian(arm_scene.effort_lagrangian(), Grid.uniform(1.0, 16, galerkin(2)))
+    problem = TrajectoryProblem(ld, State([-1.2, 0.2]), State([0.0, 0.2]))
+    limited = BoundedAction(problem, as_limits(arm_scene.robot, {"base": "none", "v": 1.4}))
+    guess = guess_path(problem, "cubic")
+    assert PenalizedAction(limited, 1.0).violation(guess) > 0.1
+    found = least_violation(limited, guess, 1.0, Options())
+    assert not found.least
+    assert found.violation < 1e-3

@@ -51,8 +51,11 @@ def may_help(solution: Solution) -> bool:
     """Whether continuation may find a minimum that a direct solve did not.
 
     Not if limits and ends contradict each other or the guess has no finite cost, both of which are
-    detected before the first step.
+    detected before the first step; nor where searches from several guesses ended at the same least
+    violation of limits.
     """
+    if solution.locally_infeasible:
+        return False
     return solution.status in CONTINUABLE and solution.nit > 0
 
 

@@ -86,6 +86,8 @@ class Solution(SolutionSummary):
     instants: these instants; None for none.
     central: the path of a barrier method towards this motion, from which `replan` starts.
     check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
+    locally_infeasible: whether the violation of limits has minima that are not zero from several
+        guesses, so that easier problems are not tried.
     """
 
     success: bool
@@ -106,6 +108,7 @@ class Solution(SolutionSummary):
     instants: Instants | None = field(default=None, repr=False)
     central: CentralPath | None = field(default=None, repr=False)
     check: Check | None = field(default=None, repr=False)
+    locally_infeasible: bool = field(default=False, repr=False)
 
     @cached_property
     def effort(self) -> float | None:
@@ -390,6 +393,7 @@ def solution_of(result: MethodResult, setup_seconds: float, solve_seconds: float
         forces=result.forces,
         instants=result.instants,
         central=result.central,
+        locally_infeasible=result.locally_infeasible,
     )
 
 

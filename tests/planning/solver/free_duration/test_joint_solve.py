@@ -23,6 +23,7 @@ from hovi.planning.solver.free_duration.joint_solve import solve_jointly, solves
 from hovi.planning.solver.free_duration.timed_bounded_action import TimedBoundedAction
 from hovi.planning.solver.free_duration.timed_path import TimedPath, TimePrice
 from hovi.planning.solver.limits.limit_rows import MAX_LOSS, LimitRows
+from hovi.planning.solver.methods.interior_point import InteriorPoint
 from hovi.planning.solver.solver import Solution, solve_on_grid
 from hovi.planning.solver.status import Status
 from hovi.scene.standard_lagrangians import spline
@@ -242,3 +243,44 @@ def test_problems_with_equations_obstacles_and_torque_rates_are_not_supported(
     rates = as_limits(two_link, {"base": "none", "torque_rate": 50.0}, 3)
     smooth = TrajectoryProblem(third, problem.start, problem.goal, rates)
     assert not any(map(solves_jointly, (around, acrobot, fine, smooth)))
+
+
+def test_the_central_path_of_a_free_duration_is_one_of_its_last_duration(
+    two_link: hovi.Robot,
+) -> None:
+    """Its points do not cost less than the motion, as those of a longer duration would."""
+    found = jointly(limited(two_link, 5.0))
+    assert found.success
+    assert found.problem is not None
+    assert found.central is not None
+    assert found.trajectory.duration < 2.5
+    points = found.central.points
+    assert len(points) > 1
+    assert np.array_equal(points[-1][1].q, found.trajectory.q)
+    costs = [found.problem.ld.action(path) for _, path in points]
+    assert min(costs) >= found.cost * (1.0 - 1e-4)  # their rows and margins differ a little
+    method = InteriorPoint(found.central.freed())
+    again = solve_on_grid(found.problem, found.trajectory.path, method=method, near=True)
+    cold = solve_on_grid(found.problem)
+    assert again.nit < 0.7 * cold.nit
+    assert again.cost == pytest.approx(found.cost, rel=1e-4)
+
+
+def test_the_bounded_action_at_a_duration_is_that_of_its_problem(two_link: hovi.Robot) -> None:
+    problem, T = limited(two_link, 1.3), 1.9
+    assert problem.limits is not None
+    limits, rows = problem.limits, LimitRows(problem.grid, problem.limits, None)
+    timed = TimedBoundedAction(problem, limits, None, PRICE, rows)
+    other = problem.on(problem.grid.stretched(T))
+    built = BoundedAction(other, limits, rows=rows.on(other.grid))
+    path, at = other.guess("cubic"), timed.at(T)
+    assert np.allclose(at.outputs(path).y, built.outputs(path).y, rtol=1e-12, atol=1e-14)
+    assert at.outputs(path).value == pytest.approx(built.outputs(path).value, rel=1e-13)
+    for name in ("lower", "upper", "weights"):
+        assert np.allclose(getattr(at.bounds, name), getattr(built.bounds, name), rtol=1e-13)
+    assert at.bounds.measure == pytest.approx(built.bounds.measure, rel=1e-14)
+    sigma, rho, force = np.random.default_rng(0).random((3, len(at.bounds.lower)))
+    models = [each.model(path, sigma, rho, force) for each in (at, built)]
+    assert np.allclose(models[0].gradient, models[1].gradient, rtol=1e-10)
+    pulled = [each.pull(rho, model) for each, model in zip((at, built), models, strict=True)]
+    assert np.allclose(*pulled, rtol=1e-10)

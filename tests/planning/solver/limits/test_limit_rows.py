@@ -470,3 +470,18 @@ def test_solutions_lose_no_more_than_what_they_promise(two_link: hovi.Robot) -> 
     assert exact.feasible
     assert 0 < found.cost / exact.outputs.value - 1 < 2 * MAX_LOSS
     assert excess_by_sampling(problem, found.trajectory.path).max() <= 1e-8
+
+
+def test_stretched_rows_are_those_on_the_stretched_grid() -> None:
+    problem, path = limited(-1e-5)
+    rows = rows_of(problem)
+    rows.refine(path, 1e-4)
+    longer = problem.grid.stretched(1.7 * problem.grid.duration)
+    stretched, built = rows.stretched(longer), rows.on(longer)
+    assert stretched.grid is longer
+    assert np.allclose(stretched.values(path), built.values(path), rtol=1e-12, atol=0)
+    assert np.allclose(stretched.columns("nodal"), built.columns("nodal"), rtol=1e-12, atol=1e-15)
+    assert np.allclose(stretched.weights, built.weights, rtol=1e-14)
+    data = stretched._data(path)
+    beyond = (push_rows(each, each._beyond, data) for each in (stretched, built))
+    assert np.allclose(*beyond, rtol=1e-12, atol=1e-15)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import hovi
@@ -12,10 +13,12 @@ from hovi.optimize.trust_region import Options, Stop
 from hovi.planning.problem.limit_violation import excess_along
 from hovi.planning.problem.limits import as_limits
 from hovi.planning.problem.problem import TrajectoryProblem
+from hovi.planning.search.continuation import may_help
 from hovi.planning.solver.methods import feasibility
 from hovi.planning.solver.methods.bounded_search import BoundedSearch
 from hovi.planning.solver.methods.feasibility import follow, unlimited_minimum
 from hovi.planning.solver.solver import Solution, solve_on_grid
+from hovi.planning.solver.status import Status
 from hovi.schemes import galerkin
 
 
@@ -91,3 +94,32 @@ def test_a_central_path_is_followed_to_a_nearby_problem_only(limited: Solution) 
     np.testing.assert_allclose(found.last.q[-1], [1.204, 0.797], atol=1e-12)
     far = problem.between(problem.start, hovi.State([-0.5, 1.5]))
     assert follow(far, central, 1e-7) is None
+
+
+def weak_pendulum(torque: float, duration: float) -> TrajectoryProblem:
+    """A swing from hanging at rest to nearly upright, within a torque."""
+    robot = hovi.load_robot(pin.buildModelFromXML(hovi.chain(1)))
+    scene = hovi.Scene(robot, [hovi.effects.Gravity()])
+    ld = DiscreteLagrangian(scene.effort_lagrangian(), Grid.uniform(duration, 24, galerkin(2)))
+    limits = as_limits(robot, {"base": "none", "tau": torque})
+    return TrajectoryProblem(ld, hovi.State([-np.pi / 2]), hovi.State([1.394]), limits=limits)
+
+
+@pytest.mark.parametrize(("torque", "duration"), [(1.5, 1.0), (0.8, 1.5)])
+def test_a_violation_with_one_least_value_ends_the_search(torque: float, duration: float) -> None:
+    """After fewer steps than a solve that is given more torque takes twice."""
+    found = solve_on_grid(weak_pendulum(torque, duration))
+    assert found.status is Status.INFEASIBLE
+    assert found.locally_infeasible
+    assert "the torque of joint 'joint1' reaches" in found.message
+    assert not may_help(found)
+    assert found.nit < 120
+
+
+def test_a_swing_up_is_found_past_motions_of_least_violation_that_lift_it_directly() -> None:
+    """The failed solve and the guess both lead to such a motion, the perturbed guess does not."""
+    found = solve_on_grid(weak_pendulum(1.5016, 3.673))
+    assert found.status is Status.MINIMUM
+    assert not found.locally_infeasible
+    swings = np.sign(found.trajectory.v[1:-1, 0])
+    assert (np.diff(swings) != 0).sum() >= 2

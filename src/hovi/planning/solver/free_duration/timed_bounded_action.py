@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+
 import numpy as np
 import numpy.typing as npt
 
@@ -25,8 +28,8 @@ from hovi.planning.solver.limits.limit_rows import LimitRows
 Array = npt.NDArray[np.float64]
 
 
-DURATION_METRIC = 100.0
-"""Entry of log T in the metric: with the first radius of 10 it may change by 1, since only longer
+DURATION_METRIC = 400.0
+"""Entry of log T in the metric: with the first radius of 20 it may change by 1, since only longer
 motions may be within the limits at all."""
 
 
@@ -40,7 +43,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
     duration T0. limits, margins, rows: as for BoundedAction. price: of time.
     """
 
-    radii = 10.0, 10.0  # a long step in time leads to another motion
+    radii = 20.0, 20.0  # a long step in time leads to another motion
 
     def __init__(
         self,
@@ -56,20 +59,24 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         self.price = price
         self.rows = rows
         self._at: dict[float, _AtDuration] = {}
-        self._first = self.at(problem.grid.duration)
+        self._first = self._begun()
         self.bounds = self._first.bounds
         self._slopes: list[Array] = []
         self._stretch = np.zeros(0)
 
     def at(self, duration: float) -> _AtDuration:
-        """The bounded action for a duration, in [s]; the last two are kept."""
+        """The bounded action for a duration, in [s]; the first and the last two are kept."""
+        if duration == self.problem.grid.duration:
+            return self._first
         if duration not in self._at:
             if len(self._at) > 1:
                 del self._at[next(iter(self._at))]
-            problem = stretched_problem(self.problem, duration)
-            rows = self.rows.on(problem.grid)
-            self._at[duration] = _AtDuration(problem, self.limits, self.margins, rows)
+            self._at[duration] = self._first.stretched(duration)
         return self._at[duration]
+
+    def _begun(self) -> _AtDuration:
+        """The bounded action for the first duration, of which the others are stretched ones."""
+        return _AtDuration(self.problem, self.limits, self.margins, self.rows)
 
     def action(self, duration: float) -> ActionObjective:
         """The action for a duration, in [s]."""
@@ -132,7 +139,7 @@ class TimedBoundedAction(BoundedObjective[TimedPath]):
         if found is not None:
             self.rows = self.at(x.duration).extended.on(self.problem.grid)
             self._at.clear()
-            self._first = self.at(self.problem.grid.duration)
+            self._first = self._begun()
             self.bounds = self._first.bounds
         return found
 
@@ -151,10 +158,29 @@ class _AtDuration(BoundedAction):
         self.extended = rows
         self.action.keep_points = True
 
+    def stretched(self, duration: float) -> _AtDuration:
+        """The same for another duration, in [s], before the first model.
+
+        Bounds and the columns of the Hessian's pattern stay, weights grow with the duration.
+        """
+        ratio = duration / self.problem.grid.duration
+        other = copy.copy(self)
+        other.problem = stretched_problem(self.problem, duration)
+        other.action = ActionObjective(other.problem, "band", keep_points=True)
+        other.ld, other.lagrangian = other.action.ld, other.action.lagrangian
+        lower, upper, weights = self._at_points
+        other._at_points = lower, upper, ratio * weights
+        other._predicted = None
+        other.rows = other.extended = self.extended.stretched(other.problem.grid)
+        other._row_weights, other._row_columns = other.rows.weights, other.rows.columns("nodal")
+        other.bounds = dataclasses.replace(
+            self.bounds, weights=ratio * self.bounds.weights, measure=duration
+        )
+        return other
+
     def row_map(self, path: DiscretePath) -> RowMap:
         """The rows with their values and derivatives at a path."""
-        rows = self.extended
-        return RowMap(rows, rows.columns("nodal"), rows.values(path))
+        return RowMap(self.extended, self._row_columns, self.extended.values(path))
 
     def predict(self, slopes: list[Array]) -> None:
         """Take `output_slope` of predicted outputs, per batch; those of the path if empty."""

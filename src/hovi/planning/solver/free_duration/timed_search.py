@@ -32,6 +32,8 @@ LAST_DECREASE = 1e-11
 relative error of the slope in the duration."""
 ROUGH_DECREASE = 1e-3
 """Relative decrease at which the motion of the first duration is good enough to be stretched."""
+SAME_DURATION = 1e-1
+"""Relative difference of a duration from the last one up to which a motion is on the way to it."""
 ROUGH_BARRIER = 1e-2
 """Its last barrier parameter, with which the next solve begins."""
 
@@ -64,6 +66,7 @@ class TimedSearch(BoundedSearch):
     price: of time.
     """
 
+    timed = True
     price: TimePrice = dataclasses.field(kw_only=True)
 
     def solve(self, path: DiscretePath, start: Barrier | None = None) -> Bounded:
@@ -79,7 +82,11 @@ class TimedSearch(BoundedSearch):
         self.rows = objective.rows
         self._stretch(found.x.duration)
         self.last = self.problem, found.x.path
-        return self._at_its_duration(found, objective)
+        outcome = self._at_its_duration(found, objective)
+        self.points = []  # these are of other durations
+        if outcome.stop is Stop.STATIONARY and outcome.marks:
+            self._followed(outcome, objective.at(found.x.duration))
+        return outcome
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:
         """Solve for the problem's duration, roughly."""
@@ -99,14 +106,19 @@ class TimedSearch(BoundedSearch):
         self, found: BoundedOutcome[TimedPath], objective: TimedBoundedAction
     ) -> Bounded:
         """The outcome for the problem of its duration, whose points weigh more or less."""
-        share, barrier = objective.share(found.x.duration), found.barrier
-        price = self.price.weight * found.x.duration
+        T, barrier = found.x.duration, found.barrier
+        share, price = objective.share(T), self.price.weight * T
+        marks = [
+            (share * product, self.problem.moved(stretched_path(x.path, T / x.duration)))
+            for product, x in found.marks
+            if abs(T / x.duration - 1.0) <= SAME_DURATION
+        ]
         return BoundedOutcome(
             found.x.path,
             Outputs(found.outputs.value - price, found.outputs.y),
             dataclasses.replace(
                 barrier,
-                bounds=objective.at(found.x.duration).bounds,
+                bounds=objective.at(T).bounds,
                 zl=share * barrier.zl,
                 zu=share * barrier.zu,
                 mu=share * barrier.mu,
@@ -115,6 +127,7 @@ class TimedSearch(BoundedSearch):
             found.iterations,
             found.history,
             found.model,
+            marks=marks,
         )
 
     def negative_eigenvalues(self, outcome: Bounded) -> int:
@@ -143,8 +156,20 @@ def _searched(search: TimedSearch) -> MethodResult:
         curved = f"{n_neg} directions of negative curvature"
         status, what = Status.SADDLE, f"a saddle of cost {value:.10g} with {curved}"
     instants, forces = search.forces(outcome)
-    history, message = search.history, f"{what}."
-    return MethodResult(problem, x, value, status, message, steps, n_neg, history, forces, instants)
+    central = search.central_path(outcome) if status is Status.MINIMUM else None
+    return MethodResult(
+        problem,
+        x,
+        value,
+        status,
+        f"{what}.",
+        steps,
+        n_neg,
+        search.history,
+        forces,
+        instants,
+        central=central,
+    )
 
 
 def _at_the_points(search: TimedSearch) -> Bounded:

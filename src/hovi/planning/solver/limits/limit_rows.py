@@ -94,6 +94,16 @@ class LimitRows:
         rows._set(self._rows if same else rows._rows_of(rows.parts))
         return rows
 
+    def stretched(self, grid: Grid) -> LimitRows:
+        """The same rows on the grid with all steps multiplied by a factor."""
+        if grid is self.grid:
+            return self
+        rows = copy.copy(self)
+        rows.grid = grid
+        powers = (grid.duration / self.grid.duration) ** -self.orders[:, None].astype(float)
+        rows._regular, rows._beyond = self._regular * powers, self._beyond * powers
+        return rows
+
     def remaining(self, grid: Grid, first: int) -> tuple[LimitRows, Index]:
         """The rows of the parts from an interval on, and those at their places, -1 for none.
 

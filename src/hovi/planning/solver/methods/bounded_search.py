@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -80,9 +81,12 @@ class BoundedSearch:
     multipliers, unmet: of the constraints, and why they cannot be met, or "".
     last: the problem and the motion of the last solve. solved: its outcome and its objective.
     points: of the central path, with a larger barrier than that of the last solution.
-    along, level: see InteriorPoint. plain: see minimize_bounded.
+    timed: whether the duration is free.
+    along, level: see InteriorPoint. plain: see minimize_bounded. locally_infeasible: see
+        MethodResult.
     """
 
+    timed: ClassVar[bool] = False
     problem: TrajectoryProblem
     limits: Limits
     options: Options
@@ -95,6 +99,7 @@ class BoundedSearch:
     level: float | None = None
     plain: bool = False
     lazy: bool = False
+    locally_infeasible: bool = False
 
     def __post_init__(self) -> None:
         self.deadline = Deadline(self.options.time_limit)

@@ -28,7 +28,11 @@ from hovi.planning.solver.methods.bounded_search import (
 )
 from hovi.planning.solver.methods.cleared_motion import cleared_motion
 from hovi.planning.solver.multipliers import Multipliers
-from hovi.planning.solver.penalized_action import PenalizedAction
+from hovi.planning.solver.penalized_action import (
+    LeastViolation,
+    PenalizedAction,
+    least_violation,
+)
 
 PENALTIES = 1.0, 1e2, 1e4, 1e6
 """Penalties of violated limits, relative to the mean density, if the interior point fails."""
@@ -65,6 +69,10 @@ WARM_STEPS = 100
 """Its maximum number of steps."""
 SHIFT_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
+SAME_VIOLATION = 1.5
+"""Ratio of the squares up to which two minima of the violation are taken as one."""
+BUMP_SHARE = 0.3
+"""Share of a perturbation of the guess that keeps it near enough for few steps."""
 SMALL_VIOLATION = 1e-3
 """Violation, as a share of the range, below which the interior point is tried again."""
 
@@ -80,6 +88,10 @@ def feasible_motion(search: BoundedSearch) -> tuple[Bounded, str]:
     if search.near is not None:
         failed = outcome.stop is Stop.DIVERGED and not outcome.feasible
         return outcome, search.worst(outcome.x) if failed else ""
+    if outcome.stop is Stop.DIVERGED and not outcome.feasible:
+        reason = _locally_infeasible(search, outcome)
+        if reason or outcome.stop in STOPPED:
+            return outcome, reason
     if outcome.stop is Stop.DIVERGED and outcome.corrected:
         search.plain, search.rows = True, search.fine_rows()
         outcome = search.solve(path)
@@ -272,6 +284,39 @@ def _without_obstacles(search: BoundedSearch, path: DiscretePath) -> DiscretePat
     return result.x if np.isfinite(result.value) else path
 
 
+def _locally_infeasible(search: BoundedSearch, outcome: Bounded) -> str:
+    """Why no motion is within limits, if their violation has minima that are not zero; else "".
+
+    These are looked for from the motion of a failed solve, from the guess and from a perturbed one.
+    If all three find one, and two of them the lowest, that becomes the outcome's motion.
+    """
+    if search.problem.constrained or search.clearance is not None or search.timed:
+        return ""
+    rows, search.rows = search.rows, search.fine_rows()
+    objective = search.objective(None)
+    density = mean_density(outcome.outputs, objective.bounds.measure)
+    found: list[LeastViolation] = []
+    for path in (outcome.x, search.guess, _bumped_guess(search, 0, BUMP_SHARE)):
+        each = least_violation(objective, path, density, search.remaining_options())
+        search.iterations += each.steps
+        found.append(each)
+        if each.stop in STOPPED:
+            outcome.stop = each.stop
+        if not each.least or each.violation <= SMALL_VIOLATION:
+            break
+    else:
+        most = SAME_VIOLATION * min(each.squares for each in found)
+        same = [each for each in found if each.squares <= most]
+        if len(same) > 1:
+            outcome.x = min(same, key=lambda each: each.value).path
+            outcome.outputs = objective.outputs(outcome.x)
+            outcome.barrier = Barrier.inactive(objective.bounds, outcome.outputs.y)
+            search.locally_infeasible = True
+            return search.worst(outcome.x)
+    search.rows = rows
+    return ""
+
+
 def _restored(search: BoundedSearch, outcome: Bounded) -> tuple[Bounded, str]:
     """Further attempts from motions of small violation; or the reason for infeasibility."""
     constrained = search.problem.constrained
@@ -320,11 +365,15 @@ def _without_forces(
 def _guesses(search: BoundedSearch) -> Iterator[DiscretePath]:
     """The guess, then perturbations of it."""
     yield search.guess
+    for seed in range(BUMPED_GUESSES):
+        yield _bumped_guess(search, seed)
+
+
+def _bumped_guess(search: BoundedSearch, seed: int, share: float = 1.0) -> DiscretePath:
     problem = search.problem
     T = problem.grid.duration
-    base = stretched(search.problem.trajectory(search.guess), T, problem.ld.k)
-    for seed in range(BUMPED_GUESSES):
-        yield problem.path(with_bump(base, problem.coordinates, T, seed))
+    base = stretched(problem.trajectory(search.guess), T, problem.ld.k)
+    return problem.path(with_bump(base, problem.coordinates, T, seed, share))
 
 
 def _penalized(

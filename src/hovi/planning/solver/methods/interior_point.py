@@ -131,7 +131,8 @@ def _searched(search: BoundedSearch) -> MethodResult:
     if status is Status.MINIMUM:
         central = search.central_path(outcome)
     result = MethodResult(problem, x, value, status, message, nit, n_neg, history, forces, instants)
-    return dataclasses.replace(result, central=central)
+    locally = status is Status.INFEASIBLE and search.locally_infeasible
+    return dataclasses.replace(result, central=central, locally_infeasible=locally)
 
 
 def _ended(search: BoundedSearch, stop: Stop) -> MethodResult:

@@ -36,6 +36,8 @@ class MethodResult:
     instants: these instants; None without any.
     jets: (q, v, a) of the path at the quadrature points, if they were computed.
     central: the path of a barrier method towards the motion, for warm starts.
+    locally_infeasible: whether the violation of limits has minima that are not zero from several
+        guesses.
     """
 
     problem: TrajectoryProblem
@@ -50,6 +52,7 @@ class MethodResult:
     instants: Instants | None = None
     jets: list[Jet] | None = None
     central: CentralPath | None = None
+    locally_infeasible: bool = False
 
 
 class Method(ABC):
