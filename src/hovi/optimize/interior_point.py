@@ -243,13 +243,15 @@ class _Iteration(BoundedSteps[X]):
         """The radius after a step, which the bounds may have cut."""
         norm, last = step.trial.norm, self.radius
         length = norm * step.share
-        radius = next_radius(last, length, ratio)
-        if abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+        radius, among = next_radius(last, length, ratio), self.objective.reopens
+        if among and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
             return max(radius, MOST_GROWTH * last)
         if step.trial.newton or step.share >= SHORT_SHARE:
             return radius
         if self.outcome.violation.max(initial=0.0) <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
+        if not among:
+            return radius
         # towards bounds that are not met yet a radius as short as the step would lead nowhere
         return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
