@@ -538,16 +538,26 @@ def _hulls_fit(lists: dict[str, list[Any]]) -> bool:
 _CHOSEN = {
     **{"q": _in("P q"), "chosen": _in("k", "int64")},
     **{"distances": _out("P k"), "known": Kind("P k", "int64", output=True)},
-    "wanted": _in("P k", "bool"),
+    **{"wanted": _in("P k", "bool"), "rounding": _in("P k")},
 }
+
+
+def _small_rounding(arguments: Arguments, sizes: Sizes) -> None:
+    arguments["rounding"] = 1e-4 * np.abs(arguments["rounding"]) % 1e-2
+
+
+def _pair_calls_fit(arguments: Arguments, sizes: Sizes) -> bool:
+    pairs, rounding = pair_distances(), arguments["rounding"]
+    known = sizes["q"] == pairs.nq and sizes.get("n", pairs.nv) == pairs.nv
+    chosen = all(0 <= k < pairs.size for k in arguments["chosen"].tolist())
+    rounded = rounding is None or bool(((rounding >= 0.0) & (rounding <= 1.0)).all())
+    return known and chosen and rounded
+
+
 _PAIRS = {
     "letters": {"P": (0, 9)},
-    "fits": lambda arguments, sizes: (
-        sizes["q"] == pair_distances().nq
-        and sizes.get("n", pair_distances().nv) == pair_distances().nv
-        and all(0 <= k < pair_distances().size for k in arguments["chosen"].tolist())
-        and 0.0 <= arguments["rounding"] <= 1.0
-    ),
+    "values": _small_rounding,
+    "fits": _pair_calls_fit,
 }
 
 ENTRIES: dict[str, Entry] = {
@@ -900,8 +910,8 @@ ENTRIES: dict[str, Entry] = {
     "distances.values": Entry(
         lambda **arguments: pair_distances().values(**arguments),
         _CHOSEN,
-        {"reach": 0.5, "rounding": 1e-4},
-        optional=("wanted",),
+        {"reach": 0.5},
+        optional=("wanted", "rounding"),
         **_PAIRS,
     ),
     "distances.expand": Entry(
@@ -910,8 +920,8 @@ ENTRIES: dict[str, Entry] = {
             **{**_CHOSEN, "force": _in("P k")},
             **{"jacobian": _out("P k n"), "curvature": _out("P n n")},
         },
-        {"reach": 0.5, "rounding": 1e-4},
-        optional=("force", "wanted"),
+        {"reach": 0.5},
+        optional=("force", "wanted", "rounding"),
         **_PAIRS,
     ),
     "symbolic.frame_placement": Entry(

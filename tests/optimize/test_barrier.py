@@ -385,7 +385,7 @@ def test_a_refined_barrier_keeps_what_it_had(seed: int) -> None:
     further = np.where(both.has_lower, both.lower, 0.0) + 0.2
     further = np.where(both.has_upper, both.upper - 0.2, further)
     new = np.full(len(further), -1)
-    whole = barrier.refined(bounds, np.append(y, further), np.arange(old), new)
+    whole = barrier.refined(bounds, np.append(y, further), np.arange(old), new, y)
     close(whole.s[:old], barrier.s)
     close(whole.zl[:old], barrier.zl)
     close(whole.zu[:old], barrier.zu)
@@ -401,11 +401,36 @@ def test_new_outputs_take_the_multipliers_of_those_at_whose_place_they_are() -> 
     barrier = Barrier(bounds, np.full(3, 0.5), np.full(3, 1e-3), zu, 1e-3, 1.0)
     more = Bounds(np.zeros(4), np.ones(4), np.ones(4))
     kept, origin, y = np.array([0, 2]), np.array([1, -1]), np.array([0.5, 0.5, 0.9, 1.5])
-    whole = barrier.refined(more, y, kept, origin)
+    whole = barrier.refined(more, y, kept, origin, y[:2])
     close(whole.zu[:3], [2.0, 3.0, 5.0])
     assert whole.zu[3] == pytest.approx(1e-3 / (1.0 - whole.s[3]))
     assert whole.s[2] == 0.9
     assert 0.9 < whole.s[3] < 1.0
+
+
+def test_slacks_move_with_outputs_that_move_away_from_their_only_bound() -> None:
+    bounds = Bounds(np.zeros(3), np.array([np.inf, np.inf, 2.0]), np.ones(3))
+    barrier = Barrier(bounds, np.full(3, 0.5), np.full(3, 1e-3), np.zeros(3), 1e-3, 1.0)
+    before, y, none = np.full(3, 0.5), np.array([0.7, 0.3, 0.7]), np.zeros(0, dtype=np.intp)
+    whole = barrier.refined(bounds, y, np.arange(3), none, before)
+    close(whole.s, [0.7, 0.5, 0.5])  # the second came nearer, the third has another bound
+    close(whole.zl, barrier.zl)
+
+
+def test_new_outputs_below_their_bounds_take_over_the_forces_beside_them() -> None:
+    """All rise together until the new ones are at their bounds, with products of mu."""
+    inf = np.full(4, np.inf)
+    bounds, mu = Bounds(np.zeros(4), inf, np.ones(4)), 1e-6
+    s, zl = np.array([1e-5, 2e-5, 0.4, 0.3]), np.array([0.1, 0.05, 1e-5, 1e-5])
+    barrier = Barrier(bounds, s, zl, np.zeros(4), mu, 1.0)
+    y = np.array([1e-5, 2e-5, 0.4, -3e-3])
+    after = barrier.handed_on(y, np.array([3, 3]), np.array([0, 1]))
+    close(after.s[:2], s[:2] + 3e-3)
+    assert after.zl[3] == pytest.approx(0.15)
+    close(after.zl * after.s, [mu, mu, 4e-6, mu])
+    inside = barrier.handed_on(np.abs(y), np.array([3, 3]), np.array([0, 1]))
+    close(inside.s, s)
+    close(inside.zl, zl)
 
 
 def test_a_warm_barrier_takes_multipliers_along_and_stays_inside() -> None:

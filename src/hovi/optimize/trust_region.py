@@ -40,7 +40,7 @@ SIZE_TEST_LENGTH = 1e-4
 LAST_DECREASE = 1e-14
 """Relative predicted decrease below which an exact Newton step is the last in any case."""
 STALLED_STEPS = 5
-"""Steps whose decrease together tells whether the iteration has stalled: see Options.stalled."""
+"""See Options.stalled."""
 REMAINING_DECREASE = 1e-26
 """Estimated relative decrease that may remain after the last step; its square root is the relative
 error of the point."""
@@ -87,18 +87,16 @@ class Options:
     decrease: stop when a Newton step predicts a smaller decrease, relative to the value; what
         remains after it is of the order of its square.
     step: stop when a Newton step is smaller than this, relative to the data.
-    max_iterations: number of steps, rejected ones included. time_limit: in [s]; no limit when None.
+    max_iterations: number of steps, rejected ones included. time_limit: in [s], or None.
     radius: initial radius of the trust region, in the norm of the metric; objectives with bounds
         have their own: see BoundedObjective.radii.
     escape_saddles: leave a saddle along negative curvature; False stops there.
-    exact: stop only after a Newton step of an exact model, one not updated from an earlier model,
-        after which only rounding errors remain.
+    exact: stop only after a Newton step of an exact model, after which only rounding remains.
     near: whether the first iterate is near a solution, so that a barrier begins small.
-    barrier: last barrier parameter, relative to the mean density of the objective.
+    barrier: its last parameter, relative to the mean density of the objective.
     enough: with a barrier, stop within the bounds where a whole Newton step predicts a smaller
         decrease, relative to the value, even if it would be cut short.
-    stalled: without a barrier, stop where STALLED_STEPS steps together have decreased the value by
-        a smaller share.
+    stalled: without one, stop where STALLED_STEPS steps decrease the value by a smaller share.
     """
 
     decrease: float = 1e-11

@@ -21,8 +21,13 @@ Array = npt.NDArray[np.float64]
 
 def hull(seed: int, points: int) -> coal.ConvexBase:
     """Of random points within 0.2 m."""
+    return hull_around(np.random.default_rng(seed).uniform(-0.2, 0.2, (points, 3)))
+
+
+def hull_around(points: Array) -> coal.ConvexBase:
+    """Of points (M, 3)."""
     corners = coal.StdVec_Vec3s()
-    corners.extend(list(np.random.default_rng(seed).uniform(-0.2, 0.2, (points, 3))))
+    corners.extend(list(points))
     return coal.Convex.convexHull(corners, True, "Qt")
 
 
@@ -329,7 +334,8 @@ def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
     compiled, pairs = CompiledDistances(robot, geometry), everything(geometry)
     q = configurations(robot, 20)
     plain, known = compiled.values(q, pairs, np.inf)
-    rounded, _, jacobian, _ = compiled.expand(q, pairs, np.inf, rounding=ROUNDING)
+    sizes = np.full(plain.shape, ROUNDING)
+    rounded, _, jacobian, _ = compiled.expand(q, pairs, np.inf, rounding=sizes)
     exact = (known == EXACT) & (plain > 1e-3)
     loss = (plain - rounded)[exact]
     assert loss.min() >= -1e-12
@@ -337,7 +343,7 @@ def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
 
     def values(dq: Array) -> Array:
         at = robot.integrate(q, dq)
-        distances, known = compiled.values(at, pairs, np.inf, rounding=ROUNDING)
+        distances, known = compiled.values(at, pairs, np.inf, rounding=sizes)
         return np.where(known == EXACT, distances, np.nan)
 
     zero = np.zeros((len(q), robot.nv))
@@ -347,14 +353,56 @@ def test_rounded_distances_are_hardly_smaller_and_have_derivatives(
     force = np.random.default_rng(2).uniform(0.5, 1.0, plain.shape) * exact
 
     def slope(dq: Array) -> Array:
-        J = compiled.expand(robot.integrate(q, dq), pairs, np.inf, rounding=ROUNDING)[2]
+        J = compiled.expand(robot.integrate(q, dq), pairs, np.inf, rounding=sizes)[2]
         return np.einsum("pk,pki->pi", force, J)
 
     rows = derivative_per_point(slope, zero, 1e-7)
     numeric = 0.5 * (rows + rows.transpose(0, 2, 1))
-    curvature = compiled.expand(q, pairs, np.inf, force, rounding=ROUNDING)[3]
+    curvature = compiled.expand(q, pairs, np.inf, force, rounding=sizes)[3]
     error = np.abs(curvature - numeric).max(axis=(1, 2)) / np.abs(numeric).max(axis=(1, 2))
     assert error.max() < 1e-4
+
+
+def test_parallel_faces_are_never_taken_for_an_overlap() -> None:
+    """The origin may seem to be inside a flat simplex, by rounding: it did in 1 of 144."""
+    random = np.random.default_rng(0)
+    robot = robot_of(chain([pin.JointModelRX(), pin.JointModelPY()]))
+    place = robot.model.jointPlacements[1] * robot.model.jointPlacements[2]
+    for _ in range(100):
+        quaternion = random.normal(size=4)
+        R = pin.Quaternion(*(quaternion / np.linalg.norm(quaternion))).matrix()
+        first, second = random.uniform(0.05, 0.4, (2, 3))
+        gap = 10.0 ** random.uniform(-3, -1)
+        at = np.append(random.uniform(-0.1, 0.1, 2), 0.5 * (first[2] + second[2]) + gap)
+        base, turn = pin.SE3(R, np.zeros(3)), pin.utils.rotate("z", random.uniform(0, 3))
+        wall, link = place * base, base * pin.SE3(turn, at)
+        geometry = pin.GeometryModel()
+        geometry.addGeometryObject(pin.GeometryObject("wall", 0, 0, wall, coal.Box(*first)))
+        geometry.addGeometryObject(pin.GeometryObject("link", 2, 0, link, coal.Box(*second)))
+        geometry.addCollisionPair(pin.CollisionPair(0, 1))
+        q = random.uniform(-1, 1, (40, robot.nq)) * 10.0 ** random.uniform(-17, -4, (40, 1))
+        _, known = CompiledDistances(robot, geometry).values(q, np.arange(1), np.inf)
+        assert (known == EXACT).all()
+
+
+def test_shapes_of_many_vertices_are_rounded_without_jumps() -> None:
+    """A dense sphere beside a box: more vertices count than one search looks at."""
+    robot = robot_of(chain([pin.JointModelPX()]))
+    geometry = pin.GeometryModel()
+    place, unit = robot.model.jointPlacements[1], pin.SE3.Identity()
+    wall = place * pin.SE3(np.eye(3), np.array([0.7, 0.0, 0.0]))
+    geometry.addGeometryObject(pin.GeometryObject("wall", 0, 0, wall, coal.Box(0.2, 1.0, 1.0)))
+    index = np.arange(6_000) + 0.5
+    z, turn = 1.0 - 2.0 * index / len(index), np.pi * (1.0 + 5.0**0.5) * index
+    ring = np.sqrt(1.0 - z**2)
+    points = 0.5 * np.column_stack([ring * np.cos(turn), ring * np.sin(turn), z])
+    geometry.addGeometryObject(pin.GeometryObject("ball", 1, 0, unit, hull_around(points)))
+    geometry.addCollisionPair(pin.CollisionPair(0, 1))
+    compiled, pairs = CompiledDistances(robot, geometry), np.arange(1)
+    q = np.linspace(-0.05, 0.05, 400)[:, None]
+    d, _ = compiled.values(q, pairs, np.inf, rounding=np.full((400, 1), 1e-3))
+    slopes = np.diff(d[:, 0]) / np.diff(q[:, 0])
+    np.testing.assert_allclose(slopes, -1.0, atol=2e-3)
 
 
 def test_a_rounded_distance_is_smooth_where_faces_are_parallel() -> None:
@@ -372,7 +420,8 @@ def test_a_rounded_distance_is_smooth_where_faces_are_parallel() -> None:
     slope = compiled.expand(tilt, pairs, np.inf)[2][:, 0, 0]
     assert slope[2] - slope[0] == pytest.approx(-0.2, rel=1e-3)  # half a width to either side
     force = np.ones((3, 1))
-    _, _, jacobian, curvature = compiled.expand(tilt, pairs, np.inf, force, rounding=ROUNDING)
+    sizes = ROUNDING * force
+    _, _, jacobian, curvature = compiled.expand(tilt, pairs, np.inf, force, rounding=sizes)
     rounded = jacobian[:, 0, 0]
     # the corners of each face have radii of their variance over the rounding, which add up inverse
     radii = np.array([0.1, 0.5]) ** 2 / ROUNDING

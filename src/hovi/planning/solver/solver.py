@@ -69,25 +69,21 @@ class Solution(SolutionSummary):
 
     success: whether a minimum, or the stationary point that was sought, was found; after `plan`,
         `solve` and `replan`, a resolved one.
-    status, message: the outcome, as a word and in a sentence. Whatever it is, `usable` says whether
-        ends and limits hold, and `violation` what does not.
+    status, message: the outcome, as a word and in a sentence; `usable` says whether ends and limits
+        hold, and `violation` what does not.
     trajectory: the motion; the best one found if there is no minimum.
     cost: the discrete action of L~, by default 1/2 integral |tau|^2.
     error_estimate: of the cost, relative; None if there is none.
-    accuracy: the accuracy that was reached; None if no tolerance was given.
-    nit: steps of the optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they
-        were not counted.
+    accuracy: the accuracy that was reached; None if no tolerance was given. nit: steps of the
+        optimiser. n_neg: negative eigenvalues of the action's Hessian; -1 if they were not counted.
     minima: costs of all minima that a multi-start found, ascending.
     history: one record per step.
-    setup_seconds, solve_seconds: wall time before and during the solve.
-    problem: the trajectory problem; `replan` starts from it.
+    setup_seconds, solve_seconds: wall time before and during the solve. problem: that was solved.
     forces: multipliers of limits and of passive joints' torques at the quadrature points, and of
-        limits at the instants between them at which these act.
-    instants: these instants; None for none.
-    central: the path of a barrier method towards this motion, from which `replan` starts.
-    check: returns a replanned motion with its error estimate or as UNRESOLVED; None for no check.
-    locally_infeasible: whether the violation of limits has minima that are not zero from several
-        guesses, so that easier problems are not tried.
+        limits at instants between them. instants: these; None for none.
+    central: the path of a barrier method to this motion; `replan` starts there. check: returns a
+        replanned motion with its error estimate or as UNRESOLVED; None for no check.
+    locally_infeasible: whether the violation of limits has nonzero minima from several guesses.
     """
 
     success: bool

@@ -14,8 +14,15 @@ from hovi.planning.clearance.clearance import DISTANCE_SCALE, Clearance
 from hovi.planning.problem.problem import TrajectoryProblem
 from hovi.planning.search.job import Job
 from hovi.planning.solver.action_objective import ActionObjective
-from hovi.planning.solver.near.approaches import approaches_along
-from hovi.planning.solver.near.clearance_rows import ClearanceRows
+from hovi.planning.solver.near.approaches import Approaches, approaches_along
+from hovi.planning.solver.near.clearance_rows import (
+    BESIDE,
+    LEAST_ROUNDING,
+    MOST_INFLATION,
+    MOST_ROUNDING,
+    ROUNDED_SHARE,
+    ClearanceRows,
+)
 from hovi.planning.solver.solver import guess_path
 from hovi.scene.scene import Scene
 
@@ -68,8 +75,44 @@ def test_rows_are_distances_along_the_motion(name: str) -> None:
     expected = (d[np.arange(rows.size), rows.pairs] - LEAST) / DISTANCE_SCALE
     near = expected < 1.0  # beyond, rows level off
     assert near.sum() > 10
-    np.testing.assert_allclose(rows.values(path)[near], expected[near], atol=1e-3)
-    assert (rows.values(path)[~near] >= 1.0).all()
+    loss = (expected - rows.values(path))[near]  # of rounded shapes, the less the nearer
+    assert loss.min() >= -1e-9
+    assert (loss <= MOST_INFLATION * rows.rounding[near] / DISTANCE_SCALE).all()
+    assert (rows.values(path)[~near] >= 0.9).all()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_shapes_are_rounded_less_the_nearer_a_row_is_to_its_bound(name: str) -> None:
+    problem = problem_of(name)
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.2)
+    y, size = rows.values(path), rows.rounding
+    assert size.min() >= LEAST_ROUNDING
+    assert size.max() <= MOST_ROUNDING
+    assert (size <= np.maximum(ROUNDED_SHARE * DISTANCE_SCALE * 3.0 * y, LEAST_ROUNDING)).all()
+    assert not rows.sharpen(path)  # nothing has come nearer
+    rows._round(np.full(rows.size, MOST_ROUNDING))
+    coarse = rows.values(path)
+    assert rows.sharpen(path)
+    sharper = rows.rounding < MOST_ROUNDING
+    assert sharper.any()
+    assert (rows.values(path)[sharper] >= coarse[sharper]).all()
+    assert (rows.rounding[~sharper] == MOST_ROUNDING).all()
+
+
+def test_rows_beside_a_new_one_are_those_of_its_pair_nearby() -> None:
+    problem = problem_of("ur5")
+    path = wavy(problem)
+    rows = rows_of(problem, path, 0.2)
+    at, pair = rows.intervals + rows.positions, rows.pairs
+    k = int(np.argmax(pair == pair[0]))
+    found = Approaches(np.array([at[k] + 0.1]), pair[[k]], np.zeros(1, dtype=bool))
+    new, beside = rows._beside(found)
+    assert (new == rows.size).all()
+    apart = np.abs(at - found.at[0])
+    expected = np.flatnonzero((pair == pair[k]) & (apart <= BESIDE))
+    np.testing.assert_array_equal(np.sort(beside), expected)
+    assert k in beside
 
 
 @pytest.mark.parametrize("name", ROBOTS)

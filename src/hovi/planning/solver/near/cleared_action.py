@@ -41,7 +41,6 @@ class ClearedAction(BoundedAction):
     near: rows of distances, extended in place. Other arguments as for BoundedAction.
     """
 
-    reopens = True
     radii = 50.0, 50.0  # the neighborhood of obstacles is not convex
 
     def __init__(
@@ -63,6 +62,7 @@ class ClearedAction(BoundedAction):
     def _with_rows(self) -> None:
         super()._with_rows()
         bounds, near = self.bounds, self.near
+        self.reopens = near.size > 0
         if near.size == 0:
             return
         lower, upper, weights = (
