@@ -48,11 +48,58 @@ struct Candidates {
   Vector point[most_candidates];
 };
 
+// Whether a vertex may have weight while n turns by less than `turn`: `below` the highest one in the
+// direction n by more than what counts, and away from it by w.
+inline bool may_count(double below, const Vector& w, double turn) {
+  return below <= 0.0 || below * below <= turn * turn * dot(w, w);
+}
+
+// Hulls with more points than this, up to as many as there are bits, are searched from the highest
+// point to neighboring ones: those that may count are connected.
+constexpr std::size_t most_scanned = 128, mark_words = 1024;
+
+inline bool find_connected(const Model& model, const Shape& shape, const Vector& n, double eps,
+                           double turn, Candidates& out) {
+  std::uint64_t marks[mark_words];
+  for (std::size_t i = 0; i <= shape.count / 64; ++i) marks[i] = 0;
+  std::size_t list[most_candidates];
+  const auto mark = [&](std::size_t i) {
+    const std::uint64_t bit = std::uint64_t{1} << (i % 64);
+    const bool known = marks[i / 64] & bit;
+    marks[i / 64] |= bit;
+    return !known;
+  };
+  list[0] = farthest_by_neighbors(model, shape, n, 0);
+  mark(list[0]);
+  const std::size_t first = shape.first;
+  const double top = along(model, first + list[0], n);
+  const auto vertex = [&](std::size_t i) {
+    return Vector{model.x[first + i], model.y[first + i], model.z[first + i]};
+  };
+  out.point[0] = vertex(list[0]);
+  out.count = 1;
+  for (std::size_t k = 0; k < out.count; ++k) {
+    const std::size_t* const near = model.first_neighbor + first + list[k];
+    for (std::size_t l = near[0]; l < near[1]; ++l) {
+      const std::size_t i = model.neighbor[l];
+      if (!mark(i)) continue;
+      const Vector v = vertex(i);
+      if (!may_count(top - dot(v, n) - most_below * eps, v - out.point[0], turn)) continue;
+      if (out.count == most_candidates) return false;
+      list[out.count] = i;
+      out.point[out.count++] = v;
+    }
+  }
+  return true;
+}
+
 // False where there are too many. n: in the shape's frame.
 inline bool find_candidates(const Model& model, const Shape& shape, const Vector& n, double eps,
                             double turn, Candidates& out) {
   out.count = 0;
   if (shape.kind == ShapeKind::cylinder) return true;
+  if (shape.linked && shape.count > most_scanned && shape.count < 64 * mark_words)
+    return find_connected(model, shape, n, eps, turn, out);
   double top = -__builtin_inf();
   Vector highest{};
   for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
@@ -62,7 +109,7 @@ inline bool find_candidates(const Model& model, const Shape& shape, const Vector
   for (std::size_t i = shape.first; i < shape.first + shape.count; ++i) {
     const double below = top - along(model, i, n) - most_below * eps;
     const Vector v{model.x[i], model.y[i], model.z[i]}, w = v - highest;
-    if (below > 0.0 && below * below > turn * turn * dot(w, w)) continue;
+    if (!may_count(below, w, turn)) continue;
     if (out.count > 0 && same(v, out.point[out.count - 1])) continue;  // a copy
     if (out.count == most_candidates) return false;
     out.point[out.count++] = v;

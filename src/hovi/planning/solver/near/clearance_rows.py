@@ -97,23 +97,24 @@ class ClearanceRows:
 
     def values(self, path: DiscretePath) -> Array:
         """y of every row, shape (E,)."""
-        if self._last is None or self._last[0] is not path:
-            self._last = path, self._values(path)
-        return self._last[1]
+        return saturated(self._excess(path))[0]
 
-    def _values(self, path: DiscretePath) -> Array:
+    def _excess(self, path: DiscretePath) -> Array:
+        """What distances exceed the least one by, shape (E,); those of the last path are kept."""
         if self.size == 0:
             return np.zeros(0)
-        q = self._configurations(path)
-        d = self._some.values(q, self._reach, self._wanted, self._sizes)
-        return saturated(self._excess(d))[0]
+        if self._last is None or self._last[0] is not path:
+            q = self._configurations(path)
+            d = self._some.values(q, self._reach, self._wanted, self._sizes)
+            beyond = (d[self._instant, self._column] - self.least) / DISTANCE_SCALE
+            self._last = path, beyond
+        return self._last[1]
 
     def expanded(self, path: DiscretePath, force: Array, coordinates: Coordinates) -> ExpandedRows:
         """The rows with their derivatives. force: weights of their curvature, shape (E,)."""
         weights = np.zeros(self._wanted.shape)
         q, sums = self._configurations(path), self._sums
-        values = self._some.values(q, self._reach, self._wanted, self._sizes)
-        _, slope, bend = saturated(self._excess(values))
+        _, slope, bend = saturated(self._excess(path))
         weights[self._instant, self._column] = force * slope / DISTANCE_SCALE
         found = self._some.expansion(q, weights, self._reach, self._wanted, self._sizes)
         J = found[1][self._instant, self._column] / DISTANCE_SCALE
@@ -230,7 +231,7 @@ class ClearanceRows:
         self.handed = self._beside(found)
         rounding = np.append(self.rounding, np.full(added, LEAST_ROUNDING))
         self._set(problem, intervals, positions, pairs, rounding)
-        rounding[-added:] = _rounding_of(self._values(path)[-added:])
+        rounding[-added:] = _rounding_of(self.values(path)[-added:])
         self._round(rounding)
         self.order = np.append(self.order, len(self.order) + np.arange(added))
         return added
@@ -285,10 +286,6 @@ class ClearanceRows:
     def _configurations(self, path: DiscretePath) -> Array:
         """q at the instants, as distances take it."""
         return self._some.at(configurations(self._problem, path, self._batch), self._batch.t)
-
-    def _excess(self, d: Array) -> Array:
-        """What distances at all instants exceed the least one by, for each row, (E,)."""
-        return np.asarray((d[self._instant, self._column] - self.least) / DISTANCE_SCALE)
 
     @property
     def _reach(self) -> float:
