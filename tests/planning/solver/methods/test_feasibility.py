@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -80,6 +82,24 @@ def test_a_goal_that_moves_far_is_reached_all_the_same(limited: Solution) -> Non
     cold = solve_on_grid(again.problem, near=False)  # type: ignore[arg-type]
     assert again.success, again.message
     assert again.cost == pytest.approx(cold.cost, rel=2e-5)
+
+
+def test_a_solve_nearby_that_takes_long_is_given_up(
+    limited: Solution, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then there is one from the guess, which takes fewer steps than another minimum is away."""
+    begun, whole = [], feasibility._solved_at_all
+
+    def counted(*given: Any) -> Any:
+        begun.append(given)
+        return whole(*given)
+
+    monkeypatch.setattr(feasibility, "_solved_at_all", counted)
+    assert limited.replan(goal=hovi.State([0.9, 1.1])).success
+    assert not begun
+    monkeypatch.setattr(feasibility, "WARM_STEPS", 1)
+    assert limited.replan(goal=hovi.State([0.9, 1.1])).success
+    assert begun
 
 
 def test_a_central_path_is_followed_to_a_nearby_problem_only(limited: Solution) -> None:

@@ -66,7 +66,7 @@ cost exceeds its minimum by less than 1e-6."""
 WARM_MARGIN = 1e-6
 """Least distance of its slacks from their bounds."""
 WARM_STEPS = 100
-"""Its maximum number of steps."""
+"""Maximum number of steps from a motion that nearly is a solution, without obstacles."""
 SHIFT_MARGIN = 0.1
 """Distance of slacks from their bounds at a point of a central path, relative to its parameter."""
 SAME_VIOLATION = 1.5
@@ -105,10 +105,13 @@ def _solved_nearby(search: BoundedSearch, path: DiscretePath) -> Bounded | None:
     constrained = search.problem.constrained and search.near is None
     if not search.options.near or search.clearance is not None or constrained:
         return None
-    if search.along is None:
-        outcome = solved_from(search, path)
-    else:
-        outcome = _solved_along(search, search.along)
+    whole = search.options
+    if search.near is None:  # or a solve from the guess is shorter
+        most = min(WARM_STEPS, whole.max_iterations)
+        search.options = dataclasses.replace(whole, max_iterations=most)
+    along = search.along
+    outcome = solved_from(search, path) if along is None else _solved_along(search, along)
+    search.options = whole
     return outcome if _is_found(outcome) or outcome.stop in STOPPED else None
 
 
