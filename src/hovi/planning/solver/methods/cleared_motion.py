@@ -59,7 +59,7 @@ LEG_MARGIN = 0.1
 """Distance of slacks from their bounds then, relative to it."""
 LEG_AHEAD = 0.005
 """Distance beyond the least one up to which pairs get rows then, in [m]."""
-DETOUR = 1.02
+DETOUR = 1.05
 """Cost of a rough motion, relative to that of one without distances, above which it is one."""
 
 
