@@ -98,7 +98,7 @@ class _Newton(Generic[X]):
         outside = float(known.outside(outputs.y).max(initial=0.0))
         self.farthest = LARGEST_GROWTH * max(outside, LEAST_OUTSIDE)
         mu = min(FIRST_MU * outside**2, LARGEST_FIRST_MU) * self.density
-        outcome.barrier = known.recentred(self.weight, max(self.last_mu, mu))
+        outcome.barrier = known.recentered(self.weight, max(self.last_mu, mu))
         self.outside, self.work = 0.0, math.inf
         outcome.keep_best(objective.bounds)
 
@@ -165,5 +165,5 @@ class _Newton(Generic[X]):
         y = outcome.outputs.y
         bounds = objective.bounds.shrunk(ROOM)
         refined = outcome.barrier.refined(bounds, y, found.kept, found.origin, before)
-        outcome.barrier = refined.recentred(self.weight, refined.mu)
+        outcome.barrier = refined.recentered(self.weight, refined.mu)
         return True
