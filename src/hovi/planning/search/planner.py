@@ -40,6 +40,7 @@ from hovi.robot.space.angle_ranges import LOOKS
 from hovi.scene.scene import Scene
 from hovi.schemes import is_galerkin, of_order
 from hovi.system.blas_threads import one_blas_thread
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline
 from hovi.system.interruption import interruptible
 from hovi.system.progress import Progress, shows_progress, silent
@@ -204,7 +205,7 @@ def holding(scene: Scene, options: PlanOptions) -> Scene:
     return scene_holding(scene, tuple(options.grasped))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class _Planning:
     """What jobs are made of: see `plan`. duration: of the first solve, in [s]."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +46,7 @@ from hovi.planning.solver.multipliers import Multipliers
 from hovi.planning.solver.near.clearance_rows import ClearanceRows
 from hovi.planning.solver.near.cleared_action import ClearedAction
 from hovi.scene.lagrangian import PointTerms
+from hovi.system.dataclass import dataclass
 from hovi.system.deadline import Deadline, raise_if_late
 
 Array = npt.NDArray[np.float64]
