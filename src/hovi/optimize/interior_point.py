@@ -69,7 +69,7 @@ MAX_REFINEMENTS = 40
 """Maximum number of refinements."""
 ALIKE, MOST_GROWTH = 0.05, 4.0
 """Relative difference of the actual and the predicted decrease up to which the radius grows by the
-second of these."""
+second of these, if the objective reopens; others begin with a radius that is wide enough."""
 SHORT_SHARE = 0.1
 """Share of a step at the radius below which it was too long for the bounds that cut it."""
 MATCHED = 1e-4
@@ -243,16 +243,16 @@ class _Iteration(BoundedSteps[X]):
         """The radius after a step, which the bounds may have cut."""
         norm, last = step.trial.norm, self.radius
         length = norm * step.share
-        radius, among = next_radius(last, length, ratio), self.objective.reopens
-        if among and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
+        radius, reopens = next_radius(last, length, ratio), self.objective.reopens
+        if reopens and abs(ratio - 1.0) <= ALIKE and length > 0.7 * last:
             return max(radius, MOST_GROWTH * last)
         if step.trial.newton or step.share >= SHORT_SHARE:
             return radius
         if self.outcome.violation.max(initial=0.0) <= MATCHED:
             return min(radius, max(CUT_RADIUS * length, LEAST_CUT_RADIUS))
-        if not among:
+        if not reopens:
             return radius
-        # towards bounds that are not met yet a radius as short as the step would lead nowhere
+        # a radius as short as the step would lead nowhere while bounds are not met
         return min(last, norm) * (SHORTENED if ratio > 1e-4 else SHORTENED**2)
 
     def _hold(self, reaction: Array | None, sign: float) -> float:

@@ -78,10 +78,11 @@ class PenalizedAction(Objective[DiscretePath]):
 
 @dataclass(frozen=True, eq=False)
 class LeastViolation:
-    """A motion near one of least violation.
+    """A motion near one of least violation, and how it was found.
 
-    value: the action. violation: the largest, as a share of its range. squares: sum weights
-    (distance outside)^2. least: whether the violation is near a minimum, which is not zero.
+    path, value: the motion and its action. violation: the largest, as a share of its range.
+    squares: sum weights (distance outside)^2. steps, stop: how many, and why they ended.
+    least: whether the violation is near a minimum, which is not zero.
     """
 
     path: DiscretePath

@@ -85,7 +85,7 @@ class TimedSearch(BoundedSearch):
         outcome = self._at_its_duration(found, objective)
         self.points = []  # these are of other durations
         if outcome.stop is Stop.STATIONARY and outcome.marks:
-            self._followed(outcome, objective.at(found.x.duration))
+            self._add_points(outcome, objective.at(found.x.duration))
         return outcome
 
     def solve_fixed(self, path: DiscretePath) -> Bounded:

@@ -194,7 +194,7 @@ class BoundedSearch:
         barrier = outcome.barrier if apart else None
         return CentralPath(points, self.rows, barrier, self.margins, self.near)
 
-    def _followed(self, outcome: Bounded, objective: BoundedAction) -> None:
+    def _add_points(self, outcome: Bounded, objective: BoundedAction) -> None:
         """Add the points at which the barrier of a solve was larger to those of earlier solves.
 
         These are on the central path of a similar problem only, perhaps between other ends, but the
@@ -283,7 +283,7 @@ class BoundedSearch:
         self.history += outcome.history
         self.last, self.solved = (self.problem, outcome.x), (outcome, objective)
         if outcome.stop is Stop.STATIONARY and outcome.marks:
-            self._followed(outcome, objective)
+            self._add_points(outcome, objective)
         return outcome
 
     def forces(self, outcome: Bounded) -> tuple[Instants | None, list[PointTerms]]:

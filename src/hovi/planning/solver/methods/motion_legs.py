@@ -1,4 +1,4 @@
-"""Motions from seam to seam: where q and v are given, little joins what is before and after.
+"""Legs, motions from seam to seam: where q and v are given, little joins what is before and after.
 
 For Lagrangians of order 2 the action and all bounds are then a sum over the legs between such
 seams, which are independent of each other; for order 3 the accelerations at the seams join them,
