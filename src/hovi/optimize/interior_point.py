@@ -39,8 +39,8 @@ from hovi.optimize.bounded_objective import (
 from hovi.optimize.bounded_steps import BoundedStep, BoundedSteps
 from hovi.optimize.quadratic_model import QuadraticModel, decrease_ratio, next_radius, next_shift
 from hovi.optimize.trust_region import Iteration, Options, Stop
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -127,17 +127,8 @@ def minimize_bounded(
         outcome.stop = Stop.DIVERGED
         return outcome
     outcome.keep_best(objective.bounds)
-    try:
-        with Deadline(options.time_limit).in_force():
-            _Iteration(objective, outcome, options, density, report, plain).run()
-    except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
-        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
-    except ArithmeticError:
-        outcome.stop = Stop.DIVERGED
+    with outcome.recorded_end(options.time_limit):
+        _Iteration(objective, outcome, options, density, report, plain).run()
     return outcome
 
 

@@ -27,8 +27,8 @@ from hovi.optimize.barrier import Barrier
 from hovi.optimize.bounded_objective import BoundedObjective, BoundedOutcome
 from hovi.optimize.quadratic_model import QuadraticModel
 from hovi.optimize.trust_region import Iteration, Options, Stop
-from hovi.system.deadline import Deadline, OutOfTimeError, raise_if_late
-from hovi.system.interruption import raise_if_interrupted, record_interrupt
+from hovi.system.deadline import raise_if_late
+from hovi.system.interruption import raise_if_interrupted
 
 Array = npt.NDArray[np.float64]
 X = TypeVar("X")
@@ -64,17 +64,8 @@ def follow_bounded(
     outcome = BoundedOutcome(x, objective.outputs(x), known, Stop.DIVERGED)
     if not np.isfinite(outcome.outputs.value):
         return outcome
-    try:
-        with Deadline(options.time_limit).in_force():
-            _Newton(objective, outcome, options, report).run()
-    except OutOfTimeError:
-        outcome.stop = Stop.TIME_LIMIT
-        outcome.x, outcome.outputs = outcome.kept or (outcome.x, outcome.outputs)
-    except KeyboardInterrupt:
-        record_interrupt()
-        outcome.stop = Stop.INTERRUPTED
-    except ArithmeticError:
-        outcome.stop = Stop.DIVERGED
+    with outcome.recorded_end(options.time_limit):
+        _Newton(objective, outcome, options, report).run()
     return outcome
 
 
