@@ -231,16 +231,17 @@ inline void recenter(const Slacks& at, double c, double mu, const Direction& out
   }
 }
 
-// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds that
-// no longer hold the solution may give: the negative multipliers, times w and a distance.
+// How far outputs are outside their bounds at most, and sum w |zu - zl| |y - s| plus what bounds
+// that no longer hold the solution may give: the negative multipliers, times w and a distance.
 struct Misses {
   double outside = -infinity, work = 0.0;
 };
 
 // After a Newton step dy of the outputs y, to y_new, from a point of the central path with mu: the
 // point with the next mu. Multipliers are those that the step predicts, gaps those of y_new, and
-// what both say of a bound is weighed with c, between the ratio of multiplier and gap before and the
-// least one. With that ratio bounds would be released slowly, with the least one found slowly.
+// what both say of a bound is weighed with c, the geometric mean of the ratio of multiplier and gap
+// before and of the least one. With the ratio alone bounds would be released slowly, with the least
+// one found slowly.
 inline Misses follow(const Slacks& at, const double* weights, const double* y, const double* dy,
                      const double* y_new, double mu, double next_mu, double least,
                      const Direction& out) {
